@@ -14,7 +14,7 @@ use lnn::lagrangian::{
 };
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
-use lnn::pipeline::{EvaluationOptions, evaluate, trained_on};
+use lnn::pipeline::{EvaluationOptions, HELD, evaluate, trained_on};
 use lnn::report::page;
 use lnn::rollout::{Integrator, Options, Rollout, RolloutError, rollout_many};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
@@ -82,7 +82,7 @@ impl Subject {
     fn require_free(&self) -> PyResult<()> {
         match self.moving().manifold() {
             None => Ok(()),
-            Some(_) => Err(value("the motion is held by constraints, which this function does not know")),
+            Some(_) => Err(value(HELD)),
         }
     }
 
@@ -405,6 +405,7 @@ impl Subject {
         points: PyReadonlyArray2<'py, f64>,
         velocity: Vec<f64>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        self.require_free()?;
         let points = slice(&points)?;
         let model = self.moving();
         let found = py.detach(|| geometries(model, points, &velocity)).map_err(value)?;
@@ -444,6 +445,7 @@ impl Subject {
         seed: u64,
         tolerance: Option<f64>,
     ) -> PyResult<String> {
+        self.require_free()?;
         let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
         let periodic = self.periodic();
         let region = self.region(self.interest(), region)?;
@@ -488,6 +490,7 @@ impl Subject {
 
     /// The Lagrangian as a formula, as JSON.
     fn formula(&self, py: Python<'_>, choices: &str) -> PyResult<String> {
+        self.require_free()?;
         let (options, name) = FormulaChoices::read(choices)?;
         let (names, periodic) = (&self.columns[..self.n()], self.periodic());
         whole(py, |_| {
@@ -509,6 +512,7 @@ impl Subject {
         boxes: usize,
         threads: usize,
     ) -> PyResult<String> {
+        self.require_free()?;
         let mut known = self.bounds();
         if matches!(self.kind, Kind::Model(..)) {
             for (bounds, _) in known.position.iter_mut().zip(self.periodic()).filter(|(_, periodic)| *periodic) {
@@ -520,7 +524,6 @@ impl Subject {
         let region = Bounds { positions: pairs(position), velocities: pairs(velocity) };
         let usual = Signature::of(self.n(), self.time_like().is_some());
         let signature = signature.map_or(usual, |(positive, negative)| Signature { positive, negative });
-        self.require_free()?;
         let found: Certificate = attended(py, None, |watch| {
             let stop = Some(watch.interrupt.as_ref());
             let options = certificate::Options {

@@ -367,3 +367,12 @@ def test_stubs_have_what_the_extension_has():
     methods = {node.name for node in subject.body if isinstance(node, ast.FunctionDef)}
     public = lambda thing: {name for name in dir(thing) if not name.startswith("_")}
     assert functions | {"Subject"} == public(_lnn) and methods == public(_lnn.Subject)
+
+
+def test_what_knows_free_coordinates_alone_refuses_constraints(models):
+    for moves in [lnn.System("cartesian-chain-1"), lnn.Model.from_bytes(models["under constraints"].to_bytes())]:
+        n = len(moves.coordinates)
+        refused = "^the motion has constraints, which this command does not support; see `lnn constraints`$"
+        for call in [moves.certify, moves.symmetries, moves.formula, lambda: moves.geometry([0.5] * n)]:
+            with pytest.raises(ValueError, match=refused):
+                call()

@@ -31,10 +31,6 @@ def test_a_page_computes_what_the_package_computes(models, shipped, kind, tmp_pa
         model, q, v = lnn.Model.load(shipped), Q[:, :2], V[:, :2]
     else:
         model, q, v = lnn.Model.from_bytes(models[kind].to_bytes()), Q, V
-    if "constraints" in kind:
-        with pytest.raises(ValueError, match="constraints"):
-            model.page(tmp_path / "play.html")
-        return
     model.page(tmp_path / "play.html")
     html = (tmp_path / "play.html").read_text()
     assert len(html) < 500_000 and not re.search(r"https?://|\ssrc=", html)
@@ -143,6 +139,119 @@ def test_a_page_is_played_by_keys_and_by_dragging(play):
     time_of = lambda text: float(text.split()[2])
     assert seen["playing"] == "Pause" and seen["paused"] == "Play" and time_of(seen["played"]) > time_of(seen["stepped"])
     assert np.allclose(seen["dragged"], [0, np.pi / 2, 0, 0], atol=1e-6) and seen["dropped"] == "Pause"
+
+
+SMALL = {"hidden": [6], "epochs": 2, "threads": 1, "starts": 1, "structure": "constant-mass"}
+STATES = {"data.training": 256, "data.validation": 64, "data.test": 64}
+
+
+@pytest.fixture(scope="module", params=["cartesian-chain-2", "particle-on-sphere"])
+def held(request, tmp_path_factory):
+    """A system under constraints, a model of it, and its page."""
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    system, folder = lnn.System(request.param), tmp_path_factory.mktemp("held")
+    model = lnn.train(system, **SMALL, config=STATES).model
+    model.page(folder / "play.html")
+    return system, model, folder / "play.html"
+
+
+def test_a_page_under_constraints_moves_as_the_package_moves(held):
+    system, model, page = held
+    script = """
+      const data = JSON.parse(document.getElementById("data").textContent), both = load(data), n = data.columns.length / 2;
+      const found = { start: data.start, span: data.span / 40 };
+      for (const [kind, motion] of Object.entries(both)) {
+        const flight = new Flight(motion, data.start.q, data.start.v, 0.01), terms = motion.terms(data.start.q, data.start.v);
+        flight.advance(found.span, Infinity, 1e-9, 1e-11);
+        const q = flight.y.slice(0, n), v = flight.y.slice(n);
+        found[kind] = { ...terms, q, v, off: motion.distance(q, v), ended: flight.ended };
+      }
+      return found;
+    """
+    found = in_chromium(page, script)
+    assert found["problems"] == [] and page.stat().st_size < 500_000
+    q, v = np.array(found["start"]["q"]), np.array(found["start"]["v"])
+    for kind, moves, tolerance in [("learned", model, 1e-5), ("exact", system, 1e-7)]:
+        there, terms = found[kind], moves.terms(q, v)
+        for theirs, ours in [("lagrangian",) * 2, ("momentum",) * 2, ("mass", "mass_matrix"), ("acceleration",) * 2]:
+            here = np.asarray(getattr(terms, ours))
+            assert np.abs(np.array(there[theirs]) - here).max() <= tolerance * np.abs(here).max(), (kind, ours)
+        motion = moves.rollout(q, v, t_end=found["span"], dt=found["span"], method="dop853", rtol=1e-11, atol=1e-12)
+        for theirs, ours in [("q", motion.q[-1]), ("v", motion.v[-1])]:
+            assert np.abs(np.array(there[theirs]) - ours).max() <= tolerance * max(1, np.abs(ours).max()), (kind, theirs)
+        assert there["ended"] is None and there["off"] < 1e-14
+    # An orthonormal basis of what the constraints leave: the determinant does not depend on which.
+    gradient = 2 * q[None] if len(q) == 3 else 2 * np.array([[*q[:2], 0, 0], [*(q[:2] - q[2:]), *(q[2:] - q[:2])]])
+    free = np.linalg.svd(gradient)[2][len(gradient) :]
+    for kind, moves in [("learned", model), ("exact", system)]:
+        within = np.linalg.det(free @ moves.mass_matrix(q, v) @ free.T)
+        assert abs(found[kind]["determinant"] - within) <= 1e-5 * abs(within), kind
+
+
+def test_a_page_under_constraints_is_played_on_them(held):
+    _, model, page = held
+    solid = len(model.coordinates) == 3
+    script = """
+      const text = (id) => document.getElementById(id).textContent, stage = document.getElementById("stage"), solid = SOLID;
+      const data = JSON.parse(document.getElementById("data").textContent), { learned } = load(data), picture = pictureOf(data, learned);
+      const off = () => learned.distance(player.start.q, player.start.v);
+      const pixels = () => stage.toDataURL();
+      stage.setPointerCapture = () => {};
+      const box = stage.getBoundingClientRect(), unit = box.width / 2 / picture.reach();
+      const at = ([x, y]) => ({ clientX: box.left + box.width / 2 + unit * x, clientY: box.top + box.height / 2 - unit * y, pointerId: 1 });
+      const bobs = () => picture.joints(player.flights()[0].y).slice(1), last = () => bobs()[bobs().length - 1];
+      const seen = { held: text("held"), turned: document.getElementById("turned").hidden, begun: off(), rods: picture.links(player.start.q, learned).length };
+      // A bob is dragged to a place that it cannot reach, and to one that it can.
+      send("pointerdown", stage, at(last()));
+      send("pointermove", stage, at([9, 0]));
+      seen.far = [off(), last()[0] - bobs().reduce((least, bob) => Math.min(least, bob[0]), 9)];
+      const place = solid ? [0.3, 0.2] : [0.5, -0.9];
+      send("pointermove", stage, at(place));
+      seen.near = [off(), Math.hypot(last()[0] - place[0], last()[1] - place[1])];
+      send("pointerup", stage, at(place));
+      seen.dropped = text("run");
+      for (let k = 0; k < 20; k++) player.advance(0.02);
+      seen.moved = learned.distance(player.flights()[0].y.slice(0, data.columns.length / 2), player.flights()[0].y.slice(data.columns.length / 2));
+      send("keydown", stage, { key: " " });
+      send("keydown", stage, { key: "r" });
+      // The value under the cursor is one on the constraints.
+      send("pointermove", stage, at([0.4, -0.5]));
+      seen.reading = text("reading");
+      send("pointerleave", stage, {});
+      // A slider of a coordinate, and one of a parameter of the system.
+      const [slider] = document.querySelectorAll("#states input"), parameter = [...document.querySelectorAll("#parameters .slide")].find((row) => /^[lR] /.test(row.textContent)).querySelector("input");
+      slider.value = 0.5;
+      send("input", slider, { pointerId: 1 });
+      seen.slid = [off(), player.start.q[0] - slider.value];
+      const before = player.flights()[1].y.slice();
+      parameter.value = 0.7;
+      send("input", parameter, { pointerId: 1 });
+      seen.size = Math.hypot(...player.flights()[1].y.slice(0, solid ? 3 : 2)) - parameter.value;
+      seen.other = before.some((x, i) => x !== player.flights()[1].y[i]);
+      // The view.
+      const [q, drawn] = [player.start.q.slice(), pixels()];
+      stage.focus();
+      send("keydown", stage, { key: "ArrowLeft" });
+      const keyed = pixels();
+      send("pointerdown", stage, at([-0.95 * picture.reach(), 0.95 * picture.reach()]));
+      send("pointermove", stage, at([-0.5 * picture.reach(), 0.95 * picture.reach()]));
+      send("pointerup", stage, at([-0.5 * picture.reach(), 0.95 * picture.reach()]));
+      seen.view = [keyed !== drawn, pixels() !== keyed, q.every((x, i) => x === player.start.q[i])];
+      return seen;
+    """
+    seen = in_chromium(page, script.replace("SOLID", "true" if solid else "false"))
+    assert seen["problems"] == [] and seen["begun"] < 1e-14 and "= 0" in seen["held"]
+    assert seen["rods"] == (1 if solid else 2) and seen["turned"] != solid
+    for off, _ in [seen["far"], seen["near"], seen["slid"]]:
+        assert off < 1e-14
+    # The outer bob is drawn to the right as far as the rods reach, and follows to where it can be.
+    assert solid or seen["far"][1] > 0.99
+    assert seen["near"][1] < 1e-3 and seen["dropped"] == "Pause" and seen["moved"] < 1e-14
+    assert "under the cursor" in seen["reading"] and "det M within the constraints" in seen["reading"]
+    assert abs(seen["slid"][1]) < 1e-6 and abs(seen["size"]) < 1e-9 and seen["other"]
+    # In space the background turns the view; in a plane there is nothing to turn.
+    assert not solid or seen["view"] == [True, True, True]
 
 
 @pytest.mark.parametrize("width", [420, 1200])

@@ -32,8 +32,7 @@ pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
 
 /// What a command that knows no constraints says of a motion that is held by some.
 pub fn held(name: &dyn std::fmt::Display) -> CliError {
-    let problem = "the motion has constraints, which this command does not support; see `lnn constraints`";
-    CliError::usage(format_args!("{name}: {problem}"))
+    CliError::usage(format_args!("{name}: {}", pipeline::HELD))
 }
 
 impl<S: Scalar> Learned<S> {

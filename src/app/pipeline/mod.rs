@@ -125,6 +125,8 @@ pub use hold_out::HoldOut;
 #[doc(hidden)]
 pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_hold_out};
 #[doc(hidden)]
+#[doc(hidden)]
+pub use model::HELD;
 pub use model::{model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
 #[doc(hidden)]

@@ -102,7 +102,19 @@ fn a_system_with_constraints_is_learned_on_them() {
     // What knows free coordinates only says so, and so does a second set of constraints.
     lnn(&["symmetries", "--model", &run]).refused(2, &["constraints"]);
     lnn(&["certify", "--model", &run]).refused(2, &["constraints"]);
-    lnn(&["page", &run, "--out", &text(&folder.path("page.html"))]).refused(2, &["constraints"]);
+    // Its page has what holds the motion, beside the exact system under the same constraint.
+    let page = fs::read_to_string(folder.path("run/play.html")).unwrap();
+    lnn(&["page", &run, "--out", &text(&folder.path("page.html"))]).succeeded();
+    assert_eq!(fs::read_to_string(folder.path("page.html")).unwrap(), page);
+    let (_, data) = page.split_once("id=\"data\">").unwrap();
+    let data = json(data.split_once("</script>").unwrap().0);
+    assert_eq!(data["constraints"]["rod"], "x^2 + y^2 - l^2");
+    for kind in ["learned", "exact"] {
+        let rows = data[kind]["held"]["rows"].as_array().unwrap();
+        assert_eq!((rows.len(), &rows[0]["holonomic"]), (1, &Value::Bool(true)), "{kind}");
+    }
+    let start: Vec<f64> = data["start"]["q"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    assert!((start[0].hypot(start[1]) - 1.0).abs() < 1e-14, "{start:?}");
     let roll = ["rollout", &run, "--state", "0.6,-0.8,0,0", "--t-end", "1", "--dt", "0.1", "--constraints", &file];
     lnn(&[&roll[..], &["--out", &text(&folder.path("two.csv"))]].concat()).refused(2, &["constraints of its own"]);
     // One of the catalogue: formulas are kept with the model.

@@ -85,13 +85,7 @@ fn a_page_computes_what_the_program_computes_for_every_kind_of_model() {
     for (k, (kind, model)) in kinds::kinds().into_iter().enumerate() {
         let [file, page] = ["safetensors", "html"].map(|end| text(&folder.path(&format!("{k}.{end}"))));
         model.save(Path::new(&file)).unwrap();
-        let made = lnn(&["page", &file, "--out", &page]);
-        let described = model.header.description.as_ref().is_some_and(|described| !described.constraints.is_empty());
-        if described || !model.header.constraints.is_empty() {
-            assert_eq!(made.code, Some(2), "{kind}");
-            continue;
-        }
-        made.succeeded();
+        lnn(&["page", &file, "--out", &page]).succeeded();
         if node {
             let ours = lnn(&["inspect", "--model", &file, "--states", &table]);
             let ours: Vec<Value> = ours.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();

@@ -189,8 +189,10 @@ function pictureOfPoints(data, { points, letters, arms }, learned) {
       return found;
     },
     take: (q, k, [x, y]) => {
-      const next = q.slice(), now = seen(place(q, k - 1)), [right, up] = axes();
-      points[k - 1].forEach((at, i) => (next[at] += right[i] * (x - now[0]) + up[i] * (y - now[1])));
+      const next = q.slice(), now = seen(place(q, k - 1)), [right, up, towards = [0, 0]] = axes();
+      // At the rim of a surface the way back to it leads to the rim again: from a little before it, it does not.
+      const before = solid && learned.held.length && Math.abs(now[2]) < 0.02 * reach ? 0.02 * reach : 0;
+      points[k - 1].forEach((at, i) => (next[at] += right[i] * (x - now[0]) + up[i] * (y - now[1]) + before * towards[i]));
       return next;
     },
   };

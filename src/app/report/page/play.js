@@ -8,7 +8,10 @@ function play(data) {
   const kinds = [["learned", learned]].concat(exact ? [["exact", exact]] : []);
   const start = { q: data.start.q.slice(), v: data.start.v.slice() };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-  const digits = (x) => (Number.isFinite(x) ? Number(x.toPrecision(4)).toString() : "no number");
+  const digits = (x) => {
+    if (!Number.isFinite(x)) return "no number";
+    return x !== 0 && Math.abs(x) < 1e-3 ? x.toExponential(1) : Number(x.toPrecision(4)).toString();
+  };
   const held = kinds.some(([, motion]) => motion.held.length);
   let flights, paths, running = false, last = 0, dragged = 0, speed = 1, reading = null, turning = null;
 
