@@ -1,6 +1,8 @@
 """Measures the package: ``python python/benches/measure.py [--program lnn]``. One JSON object; processor times in seconds, the least of several.
 
-Processor time counts all threads, and other work on the machine hardly changes it. With the program a fit is compared with the same fit by it.
+Processor time counts all threads, and other work on the machine hardly changes it. With the program a fit is compared with the same fit by it,
+in turns; ``--epochs`` makes the fit longer, ``--rounds`` says how often, and ``--fits`` leaves the rest out. The load of the machine over the last
+minute is stated beside.
 """
 
 import argparse
@@ -57,26 +59,35 @@ def imported(code):
     return run(code) - run("pass")
 
 
-def fits(program):
-    """Processor times of a fit by the program and by the package, in turn, and whether their models are the same."""
+def fits(program, epochs, rounds):
+    """Processor times of a fit by the program and by the package, in turns, and whether their models are the same."""
     angles, found = "theta1,theta2", {"program": [], "package": []}
-    choices = "trajectory='run', threads=1, epochs=10, out=sys.argv[2]"
+    choices = "trajectory='run', threads=1, epochs=int(sys.argv[3]), out=sys.argv[2]"
     code = f"import lnn, sys; a = ['theta1', 'theta2']; lnn.fit(sys.argv[1], coordinates=a, angles=a, {choices})"
     with tempfile.TemporaryDirectory() as folder:
         outs = [Path(folder, name) for name in found]
-        columns = ["--coords", angles, "--periodic", angles, "--trajectory", "run", "--threads", "1", "--epochs", "10"]
-        for _ in range(5):
+        columns = ["--coords", angles, "--periodic", angles, "--trajectory", "run", "--threads", "1", "--epochs", str(epochs)]
+        for _ in range(rounds):
             found["program"].append(spent([program, "fit", DATA / "pendulum.csv", *columns, "--out", outs[0], "--overwrite"]))
-            found["package"].append(spent([sys.executable, "-c", code, DATA / "pendulum.csv", outs[1]]))
+            found["package"].append(spent([sys.executable, "-c", code, DATA / "pendulum.csv", outs[1], str(epochs)]))
         same = len({(out / "model.safetensors").read_bytes() for out in outs}) == 1
-    return {f"fit, {name}": min(times) for name, times in found.items()} | {"fit, same model": same}
+    # Of a round, which meets one load of the machine.
+    ratios = sorted(package / program for program, package in zip(*found.values()))
+    least = {f"fit of {epochs} epochs, {name}": min(times) for name, times in found.items()}
+    return least | {"package over program, median of the rounds": ratios[rounds // 2], "same model": same, "load": os.getloadavg()[0]}
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--program", help="the program, to compare a fit with")
     arguments.add_argument("--model", default=DATA / "double_pendulum.safetensors")
+    arguments.add_argument("--epochs", type=int, default=10, help="epochs of the fit")
+    arguments.add_argument("--rounds", type=int, default=5, help="fits of each")
+    arguments.add_argument("--fits", action="store_true", help="only the fits, which need --program")
     given = arguments.parse_args()
+    if given.fits:
+        print(json.dumps(fits(given.program, given.epochs, given.rounds), indent=1))
+        return
     model, arm = lnn.Model.load(given.model), lnn.System("double-pendulum")
     q, v = np.random.default_rng(0).uniform(-3, 3, (2, STATES, 2))
     one = np.array([[0.3, 0.1]]), np.array([[0.0, 0.2]])
@@ -93,7 +104,7 @@ def main():
         "accelerations of a million states, model": best(lambda: model.acceleration(q, v), 5),
     }
     if given.program:
-        found |= fits(given.program)
+        found |= fits(given.program, given.epochs, given.rounds)
     try:
         import jax
     except ImportError:

@@ -4,7 +4,8 @@
 use super::html::{base64, escape};
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{
-    Constraints, EulerLagrange, ExpressionConstraints, Lagrangian, LagrangianVisitor, SystemError, SystemInstance, project,
+    Constraints, EulerLagrange, ExpressionConstraints, Lagrangian, LagrangianVisitor, SystemError, SystemInstance,
+    project,
 };
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFileError};
@@ -63,7 +64,7 @@ pub fn page(
             architecture.rayleigh_dissipation(p, &x[..n], &x[n..])
         })?),
     };
-    let motion = header.constrain(Box::new(network.clone()))?;
+    let motion = header.constrain::<f64>(Box::new(network.clone()))?;
     let held = match header.constraints()? {
         Some((constraints, parameters)) => json!({
             "rows": rows(&constraints, motion.as_ref(), parameters.len())?, "parameters": parameters,
@@ -152,8 +153,7 @@ fn rows(
     let (n, kept) = (constraints.coordinates(), motion.manifold().map_or(&[][..], |manifold| manifold.names()));
     let all = constraints.names().into_iter().enumerate().filter(|(_, name)| kept.contains(name));
     all.map(|(row, name)| {
-        let value =
-            Listing::record::<f64, _>(2 * n, parameters, |x, p| constraints.value(row, p, &x[..n], &x[n..]))?;
+        let value = Listing::record::<f64, _>(2 * n, parameters, |x, p| constraints.value(row, p, &x[..n], &x[n..]))?;
         Ok(json!({ "name": name, "holonomic": constraints.is_holonomic(row), "value": operations(&value) }))
     })
     .collect()
