@@ -174,6 +174,7 @@ function pictureOfPoints(data, { points, letters, arms }, learned) {
   return {
     reach: () => reach,
     view,
+    names: arms ? points.map((_, k) => `axis ${k + 1}`) : [],
     hole,
     centre: () => seen(middle.map(() => 0)),
     free: true,

@@ -10,7 +10,7 @@ function play(data) {
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const digits = (x) => {
     if (!Number.isFinite(x)) return "no number";
-    return x !== 0 && Math.abs(x) < 1e-3 ? x.toExponential(1) : Number(x.toPrecision(4)).toString();
+    return x !== 0 && Math.abs(x) < 1e-3 ? x.toExponential(2) : Number(x.toPrecision(4)).toString();
   };
   const held = kinds.some(([, motion]) => motion.held.length);
   let flights, paths, running = false, last = 0, dragged = 0, speed = 1, reading = null, turning = null;
@@ -117,6 +117,10 @@ function play(data) {
         pen.stroke();
       });
       // What is nearer is drawn later and larger.
+      (picture.names || []).forEach((label, bob) => {
+        const [x, y] = to(joints[bob + 1]);
+        pen.fillText(label, x + 12, y - 8);
+      });
       joints.slice(1).sort(([, , a = 0], [, , b = 0]) => a - b).forEach((joint) => {
         const [x, y] = to(joint), near = 1 + (0.3 * (joint[2] || 0)) / picture.reach(values);
         pen.beginPath();
