@@ -63,6 +63,7 @@ macro_rules! page {
             "[valid]: crate::docs::method#time-of-valid-prediction\n",
             "[off-shell]: crate::docs::method#metrics-from-geodesics\n",
             "[derivatives]: crate::docs::method#derivatives-of-the-network\n",
+            "[page]: crate::docs::commands#lnn-page\n",
             "[library]: crate::docs::library\n",
             "[python]: crate::docs::python\n",
             "[model-format]: crate::docs::model_format\n",
