@@ -64,7 +64,7 @@ pub fn page(
             architecture.rayleigh_dissipation(p, &x[..n], &x[n..])
         })?),
     };
-    let motion = header.constrain::<f64>(Box::new(network.clone()))?;
+    let motion = header.constrain::<f64>(Box::new(network.cast::<f64>()))?;
     let held = match header.constraints()? {
         Some((constraints, parameters)) => json!({
             "rows": rows(&constraints, motion.as_ref(), parameters.len())?, "parameters": parameters,
