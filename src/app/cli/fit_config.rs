@@ -233,11 +233,11 @@ impl<'a> Plan<'a> {
             shorten(&mut suggested);
         }
         let data = suggested.data.clone();
-        let FitConfig { mut training, horizon, formula, recording, shooting, .. } = self.over(suggested)?.0;
+        let FitConfig { mut training, horizon, formula, members, recording, shooting, .. } = self.over(suggested)?.0;
         self.finish(&mut training, &data)?;
         // A printed configuration shows the keys of multiple shooting in any case.
         let shooting = shooting.filter(|_| targets == Targets::Motion || self.args.run.print_config.is_some());
-        Ok(FitConfig { formula, ..prepared.config(training, horizon, recording, shooting) })
+        Ok(FitConfig { formula, members, ..prepared.config(training, horizon, recording, shooting) })
     }
 
     /// The layers over this training and what they mean for it.

@@ -12,6 +12,7 @@ use crate::pipeline::fit_summary::Found;
 use crate::pipeline::force_errors::force_errors;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 use crate::pipeline::losses::LossStates;
+use crate::pipeline::members::Members;
 use crate::pipeline::model::trained_on;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::prepared_fit::PreparedFit;
@@ -230,7 +231,12 @@ fn fit_in<S: Scalar>(
             .map_err(|error| watch.say(Event::Note(&format!("no formula was looked for: {error}"))))
     });
     let formula = formula.and_then(Result::ok);
+    let members = match trained.stop {
+        StopReason::Finished => Members::train(prepared, fit_config, (&network, &hold_out), (options, output, watch))?,
+        _ => None,
+    };
     let found = Found {
+        members: members.as_ref(),
         formula: formula.as_ref(),
         prepared,
         config,

@@ -18,6 +18,9 @@ pub const HELD_OUT: f64 = 0.2;
 const RESIDUAL_WIDTH: usize = 8;
 const RESIDUAL_DECAY: f64 = 0.01;
 
+/// Networks of a fit at most.
+const MOST_MEMBERS: usize = 32;
+
 /// Samples of a smoothing window at most.
 const MOST_WINDOW: usize = 1_000_001;
 
@@ -50,6 +53,11 @@ table! {
         /// Whether a formula of the Lagrangian is looked for in the training motion, with friction if the model has it: minutes.
         #[key("true, false", flag = "formula")]
         pub formula: bool = false,
+        /// Networks that are trained, one after another, on the same recording, by the seed and those that follow it; what they say
+        /// differently is what the recording leaves open, or the training.
+        #[key("1 to 32", example = "5", flag = "members", check = count(MOST_MEMBERS))]
+        #[serde(skip_serializing_if = "is_one")]
+        pub members: usize = 1,
         /// The files and the meaning of their columns, as in the options of the same names.
         #[table("recording", Below::Keys(FitColumns::KEYS))]
         pub recording: FitColumns = FitColumns::default(),
@@ -154,6 +162,11 @@ impl From<FitConstraints> for Written {
             FitConstraints::Formulas(formulas) => Self::Formulas(formulas),
         }
     }
+}
+
+/// A single network needs no mention.
+fn is_one(count: &usize) -> bool {
+    *count == 1
 }
 
 /// A finite number above 0.

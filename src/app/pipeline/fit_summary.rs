@@ -7,6 +7,7 @@ use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
 use crate::pipeline::determination::Determined;
 use crate::pipeline::hold_out::HoldOut;
+use crate::pipeline::members::Members;
 use crate::pipeline::physics::Physics;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::{ended, training_pictures, write_page, write_report_and_figures};
@@ -69,6 +70,9 @@ struct Summary<'a> {
     determined: &'a Determined,
     #[serde(skip_serializing_if = "Option::is_none")]
     formula: Option<FormulaSummary<'a>>,
+    /// The networks of a fit of several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    members: Option<&'a Members>,
     physics: &'a Physics,
 }
 
@@ -118,6 +122,8 @@ pub(crate) struct Found<'a, S> {
     pub determined: &'a Determined,
     /// A formula of the Lagrangian, if one was looked for.
     pub formula: Option<&'a FoundFormula>,
+    /// The networks of a fit of several.
+    pub members: Option<&'a Members>,
     /// Curvature, symmetries and signature.
     pub physics: &'a Physics,
     /// Header and network of the model.
@@ -154,6 +160,10 @@ impl<'a, S: Scalar> Found<'a, S> {
             }
             None => report,
         };
+        let report = match self.members {
+            Some(members) => members.report(report),
+            None => report,
+        };
         let report = self.physics.report(report).heading("Data");
         let report = report.preformatted(&wrap_text(opening.trim_end(), WIDTH)).section("Training", &figures);
         let report = report.heading("Configuration").preformatted(toml);
@@ -162,7 +172,8 @@ impl<'a, S: Scalar> Found<'a, S> {
             &report,
             figures.iter().chain(&self.hold_out.figures).chain(&self.physics.figures),
         )?;
-        let tables = self.hold_out.text() + &self.determined.text();
+        let members = self.members.map(Members::text).unwrap_or_default();
+        let tables = self.hold_out.text() + &self.determined.text() + &members;
         let text = wrap_text(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
         Ok((json, text))
     }
@@ -207,6 +218,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             judgement: self.hold_out,
             determined: self.determined,
             formula: self.formula.map(|formula| formula.summary(self.friction(), self.config.seed)),
+            members: self.members,
             physics: self.physics,
         }
     }

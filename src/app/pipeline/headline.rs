@@ -264,6 +264,7 @@ mod tests {
                 energy: None,
                 force_errors: Vec::new(),
                 figures: Vec::new(),
+                predicted: Default::default(),
             };
             of_hold_out("swing", &found).sentence
         };

@@ -94,6 +94,22 @@ pub struct HoldOut {
     /// Pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
+    /// What was predicted.
+    #[serde(skip)]
+    pub(crate) predicted: Predicted,
+}
+
+/// Windows with the model's predictions of them, and how errors are counted.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Predicted {
+    /// The windows.
+    pub windows: Vec<Window>,
+    /// The model's motion.
+    pub predictions: Predictions,
+    /// Coordinates that are angles.
+    pub periodic: Vec<bool>,
+    /// Scales of the coordinates' errors.
+    pub scales: Vec<f64>,
 }
 
 /// Predicts held-out motion in up to 500 windows and compares it with what was measured.
@@ -185,6 +201,8 @@ pub fn evaluate_hold_out(
         CoordinatePredictions { name, unit, model, constant_velocity }
     });
     let given_up = foretold.remarks();
+    let HeldOutPredictions { windows, predictions, .. } = foretold;
+    let predicted = Predicted { windows, predictions, periodic: periodic.clone(), scales };
     Ok(HoldOut {
         error_unit: unit,
         model,
@@ -197,6 +215,7 @@ pub fn evaluate_hold_out(
         energy,
         force_errors: Vec::new(),
         figures,
+        predicted,
     })
 }
 
@@ -404,6 +423,7 @@ impl HoldOut {
             energy: None,
             force_errors: Vec::new(),
             figures: Vec::new(),
+            predicted: Predicted::default(),
         }
     }
 

@@ -73,6 +73,7 @@ mod hold_out;
 mod hole_pictures;
 mod learned_functions;
 mod losses;
+mod members;
 pub(crate) mod memory;
 mod model;
 mod output;
@@ -125,9 +126,9 @@ pub use hold_out::HoldOut;
 #[doc(hidden)]
 pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_hold_out};
 #[doc(hidden)]
+pub use members::{Member, Members};
 #[doc(hidden)]
-pub use model::HELD;
-pub use model::{model_file, trained_on};
+pub use model::{HELD, model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
 #[doc(hidden)]
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};

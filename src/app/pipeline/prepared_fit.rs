@@ -132,6 +132,7 @@ impl<'a> PreparedFit<'a> {
             horizon,
             constraints,
             formula: false,
+            members: 1,
             recording,
             shooting,
             training,

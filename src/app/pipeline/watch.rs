@@ -76,6 +76,19 @@ impl Watch {
         Self { events, interrupt: Arc::clone(&self.interrupt) }
     }
 
+    /// The same without remarks.
+    pub(crate) fn without_remarks(&self) -> Self {
+        let events = self.events.clone().map(|events| {
+            let rest: EventSink = Arc::new(move |event: Event<'_>| {
+                if !matches!(event, Event::Note(_)) {
+                    events(event);
+                }
+            });
+            rest
+        });
+        Self { events, interrupt: Arc::clone(&self.interrupt) }
+    }
+
     /// `true` if the flag was raised.
     pub(crate) fn is_interrupted(&self) -> bool {
         self.interrupt.load(Ordering::SeqCst)

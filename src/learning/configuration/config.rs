@@ -64,7 +64,7 @@ pub(crate) const PENALTY: f64 = 100.0;
 /// Highest learning rate.
 pub(crate) const MOST_RATE: f64 = 1000.0;
 /// Largest seed: TOML has no larger whole number.
-const MOST_SEED: u64 = i64::MAX as u64;
+pub(crate) const MOST_SEED: u64 = i64::MAX as u64;
 
 table! {
     /// A complete training run. Keys that are left out have the values of a black box by the preset `quick`; others are refused.

@@ -262,3 +262,38 @@ fn a_formula_that_is_asked_for_is_in_summary_and_report() {
     let without = summary(&folder, &fit(&folder, &data, "plain", &["--epochs", "1"]), "plain");
     assert!(without.get("formula").is_none());
 }
+
+/// Three networks of one recording: their models, their errors, and what is left between them in one gauge.
+#[test]
+fn members_are_trained_and_compared() {
+    let folder = Folder::new();
+    let data = folder.file("swings.csv", pendulum(12, false, 0.0));
+    let run = fit(&folder, &data, "out", &["--epochs", "40", "--members", "3", "--seed", "4"]);
+    let found = summary(&folder, &run, "out");
+    let each = found["members"]["each"].as_array().unwrap();
+    let files: Vec<&str> = each.iter().map(|member| member["file"].as_str().unwrap()).collect();
+    assert_eq!(files, ["model.safetensors", "member-1.safetensors", "member-2.safetensors"]);
+    assert_eq!(each.iter().map(|member| member["seed"].as_u64().unwrap()).collect::<Vec<_>>(), [4, 5, 6]);
+    assert_eq!(each[0]["errors"], found["model"]);
+    assert!(each[0]["comparison"].is_null());
+    for member in &each[1..] {
+        assert_eq!(member["comparison"]["factors"].as_array().unwrap().len(), 1);
+        assert!(member["comparison"]["motion"].as_f64().unwrap() < 0.3, "{member}");
+    }
+    let median = |errors: &Value| errors.as_array().unwrap().last().unwrap()["median"].as_f64().unwrap();
+    let worst = each.iter().map(|member| median(&member["errors"])).fold(0.0, f64::max);
+    assert!(median(&found["members"]["mean"]) <= worst);
+    for spread in ["mass_matrix_spread", "potential_spread"] {
+        let spread = found["members"][spread].as_f64().unwrap();
+        assert!(spread > 0.0 && spread < 0.5, "{}", found["members"]);
+    }
+    assert!(run.stdout.contains("spread between the members") && run.stdout.contains("member-2.safetensors"));
+    // A member is the model of a fit by its seed, and another network.
+    let of = |name: &str| ModelFile::<f64>::load(folder.path("out").join(name).as_path()).unwrap();
+    let [first, second] = ["model.safetensors", "member-1.safetensors"].map(of);
+    assert_eq!((second.header.seed, first.weights == second.weights), (5, false));
+    for count in ["0", "33"] {
+        let refused = fit(&folder, &data, "none", &["--members", count]);
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+    }
+}
