@@ -13,13 +13,15 @@
 //!
 //! And made motion of three small systems, with tubes around its predictions.
 //!
+//! And a made recording with lost rows and a clock that jitters.
+//!
 //! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
 //! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour, `-- --part arm7` the arm, some minutes, `-- --part tubes` the tubes, some minutes;
-//! without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv`, `orbits.csv`, `arm7.csv` and `tubes.csv` into `target/measured`.
+//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour, `-- --part arm7` the arm, some minutes, `-- --part tubes` the tubes, some minutes, `-- --part lost` the lost rows, some minutes;
+//! without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv`, `orbits.csv`, `arm7.csv`, `tubes.csv` and `lost.csv` into `target/measured`.
 
 #[allow(dead_code)]
 #[path = "shared/arm.rs"]
@@ -28,6 +30,8 @@ pub mod arm;
 mod arm7;
 #[path = "measured/determination.rs"]
 mod determination;
+#[path = "measured/lost.rs"]
+mod lost;
 #[path = "measured/noise.rs"]
 mod noise;
 #[path = "measured/orbits.rs"]
@@ -72,7 +76,7 @@ const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits", "arm7", "tubes"];
+const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits", "arm7", "tubes", "lost"];
 
 /// Seeds of the small systems: those before them served to choose.
 const SEEDS: std::ops::Range<u64> = 20..40;
@@ -230,6 +234,7 @@ pub fn trial() {
     assert_eq!(arm7::compare(0..1, 8.0, place.path(), (Some(1), 1)).len(), 2 * 7);
     let few = tubes::Motions { counts: [4, 20, 3], seconds: 2.0, ahead: 0.1 };
     assert_eq!(tubes::compare(few, scale).len(), 3 * 2);
+    assert_eq!(lost::compare(0..1, (6, 4.0), Some(scale)).len(), 3);
     let found = rows::time(&place.path().join("rows.csv"), 2000);
     assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
 }
@@ -283,6 +288,11 @@ fn main() {
         let rows = tubes::compare(tubes::Motions { counts: [24, 1000, 1000], seconds: 3.0, ahead: 2.0 }, small);
         let csv = format!("system,share,calibrated,fresh,inside,half_width\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("tubes.csv"), csv).expect("room for the results");
+    }
+    if parts.iter().any(|part| part == "lost") {
+        let rows = lost::compare(0..3, (12, 8.0), None);
+        let csv = format!("seed,entry,error,seconds\n{}\n", rows.join("\n"));
+        std::fs::write(folder.join("lost.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "films") {
         std::fs::write(folder.join("films.csv"), filmed(films, Some(scale))).expect("room for the results");

@@ -203,6 +203,16 @@ impl EulerLagrange<f64> for Driven {
 }
 
 impl Case {
+    /// The exact system.
+    pub fn exact(&self) -> Box<dyn EulerLagrange<f64>> {
+        (self.exact)()
+    }
+
+    /// The same without noise, every so many seconds.
+    pub fn without_noise(&self, step: f64) -> Self {
+        Self { step, sigma: &[0.0, 0.0], ..*self }
+    }
+
     /// Runs with noise.
     pub fn recording(&self, runs: usize, seconds: f64, seed: u64) -> Recording {
         let rng = &mut RngStream::Training(0).generator(seed);
