@@ -5,13 +5,16 @@
 //! `--part arms` identifies recorded pendula of two and three arms (DynamicsLab, University of Washington) and predicts runs that were not
 //! identified from, if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files. `--seeds 10` takes fewer seeds.
 
+#[allow(dead_code)]
+#[path = "../examples/arms.rs"]
+mod arms;
+
 use lnn::cli::parse_system;
 use lnn::identification::{Between, Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure};
 use lnn::prelude::*;
 use lnn::random::RngStream;
-use lnn::recording::read::read_recording;
-use lnn::recording::{Columns, RecordedTrajectory, Recording};
+use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Driven, Motion, Options, SampledForce};
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
@@ -111,7 +114,8 @@ fn duffing(samples: usize) -> Outcome<()> {
     for column in [&mut track.times, &mut track.q, &mut track.force] {
         column.truncate(learned);
     }
-    for between in [None, Some(Between::Held), Some(Between::Linear), Some(Between::BandLimited)] {
+    for between in [None, Some(Between::Held), Some(Between::Linear), Some(Between::Cubic), Some(Between::BandLimited)]
+    {
         let started = Instant::now();
         let found = identify(&system("duffing.toml", &[])?, &part, &IdentifyOptions { between, ..options(&[]) })?;
         let seconds = started.elapsed().as_secs_f64();
@@ -131,33 +135,6 @@ fn duffing(samples: usize) -> Outcome<()> {
     Ok(())
 }
 
-/// Runs that are not identified from.
-const HELD_OUT: usize = 4;
-
-/// Length of the segments of the arms in s: what friction does to them takes longer than the segments that are chosen by default.
-const SEGMENT: f64 = 0.25;
-
-/// Median over starts in the held-out runs of the rms error of the angles, this long ahead; sensors have offsets, `(n)`.
-fn ahead(model: &dyn EulerLagrange<f64>, held: &[RecordedTrajectory], offsets: &[f64], seconds: f64) -> Outcome<f64> {
-    let n = offsets.len();
-    let mut errors = Vec::new();
-    for track in held {
-        let step = track.times[1] - track.times[0];
-        let samples = (seconds / step).round() as usize;
-        for first in (0..track.len().saturating_sub(samples)).step_by(100) {
-            let [q, v] = [&track.q, &track.v].map(|values| &values[first * n..(first + 1) * n]);
-            let q: Vec<f64> = q.iter().zip(offsets).map(|(q, offset)| q - offset).collect();
-            let motion = model.rollout(&q, v, seconds, seconds)?;
-            let end = track.q[(first + samples) * n..(first + samples + 1) * n].iter().zip(offsets);
-            let pairs = motion.q[motion.q.len() - n..].iter().zip(end);
-            let square: f64 = pairs.map(|(a, (b, offset))| (a - (b - offset)).powi(2)).sum();
-            errors.push((square / n as f64).sqrt());
-        }
-    }
-    errors.sort_by(f64::total_cmp);
-    Ok(errors[errors.len() / 2])
-}
-
 /// Constants of the textbook's form by the authors of the triple arm, from their masses, lengths and inertias.
 const PUBLISHED: [(&str, f64); 10] = [
     ("A1", 0.0185941),
@@ -172,28 +149,16 @@ const PUBLISHED: [(&str, f64); 10] = [
     ("c3", 0.00001),
 ];
 
-fn arms(folder: &Path) -> Outcome<()> {
+fn recorded_arms(folder: &Path) -> Outcome<()> {
     for (name, n) in [("double", 2), ("triple", 3)] {
         let path = folder.join(format!("{name}.csv"));
         if !path.exists() {
             println!("{}: not there", path.display());
             continue;
         }
-        let angles: Vec<String> = (1..=n).map(|i| format!("theta{i}")).collect();
-        let offsets = angles.clone();
-        let velocity = angles.iter().map(|name| format!("{name}_dot")).collect();
-        let columns = Columns {
-            periodic: angles.clone(),
-            coords: angles,
-            velocity,
-            trajectory: Some("run".into()),
-            ..Columns::default()
-        };
-        let mut recording = read_recording(&[path], &columns)?.recording;
-        let held = recording.tracks.split_off(recording.tracks.len() - HELD_OUT);
-        let form = system(&format!("{name}_arm.toml"), &[])?;
+        let (recording, held) = arms::read(&path)?;
         let started = Instant::now();
-        let found = identify(&form, &recording, &IdentifyOptions { offsets, segment: Some(SEGMENT), ..options(&[]) })?;
+        let found = arms::identified(&recording)?;
         println!(
             "{name}: {:.1} s, {} samples, {} segments of {:.3} s",
             started.elapsed().as_secs_f64(),
@@ -218,10 +183,9 @@ fn arms(folder: &Path) -> Outcome<()> {
             models.push(("published", published.collect(), vec![0.0; n]));
         }
         for (whose, values, offsets) in models {
-            let model = system(&format!("{name}_arm.toml"), &values)?.build()?;
-            let errors = [0.1, 0.25, 0.5, 1.0].map(|seconds| ahead(&*model, &held, &offsets, seconds));
-            let errors = errors.into_iter().map(|error| Ok(format!("{:.4}", error?))).collect::<Outcome<Vec<_>>>()?;
-            println!("  {whose} constants, 0.1, 0.25, 0.5, 1 s ahead: {} rad", errors.join(", "));
+            let model = arms::textbook(n, &values)?.build()?;
+            let errors = arms::line(arms::ahead(&*model, &held, &offsets)?);
+            println!("  {whose} constants, {:?} s ahead: {errors}", arms::AHEAD);
         }
     }
     Ok(())
@@ -241,7 +205,7 @@ fn main() -> Outcome<()> {
     match after("--part").map_or("coverage", String::as_str) {
         "coverage" => coverage(seeds),
         "duffing" => duffing(40_000),
-        "arms" => arms(&after("--arms").map_or_else(usual, PathBuf::from)),
+        "arms" => recorded_arms(&after("--arms").map_or_else(usual, PathBuf::from)),
         other => Err(format!("--part {other}: expected coverage, duffing or arms").into()),
     }
 }

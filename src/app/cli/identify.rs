@@ -70,6 +70,8 @@ pub enum Way {
     Held,
     /// On straight lines.
     Linear,
+    /// On curves of the third degree through the four nearest samples.
+    Cubic,
     /// Without frequencies above half the rate of the samples.
     BandLimited,
 }
@@ -79,6 +81,7 @@ impl From<Way> for Between {
         match way {
             Way::Held => Self::Held,
             Way::Linear => Self::Linear,
+            Way::Cubic => Self::Cubic,
             Way::BandLimited => Self::BandLimited,
         }
     }
@@ -315,6 +318,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         let way = match between {
             Between::Held => "held",
             Between::Linear => "linear",
+            Between::Cubic => "cubic",
             Between::BandLimited => "band-limited",
         };
         text += &format!(", forces {way} between the samples");

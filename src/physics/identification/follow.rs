@@ -276,6 +276,16 @@ pub(super) fn forces(track: &RecordedTrajectory, between: Between, (sample, x): 
             take(before as isize, 1.0 - x);
             take(sample as isize, x);
         }
+        Between::Cubic => {
+            let first = (before as isize - 1).clamp(0, (last - 3).max(0));
+            let nodes = first..=(first + 3).min(last);
+            let time = |at: isize| track.times[at as usize];
+            let now = time(before as isize) + x * (time(sample as isize) - time(before as isize));
+            for k in nodes.clone() {
+                let others = nodes.clone().filter(|&j| j != k);
+                take(k, others.map(|j| (now - time(j)) / (time(k) - time(j))).product());
+            }
+        }
         Between::BandLimited => {
             let weight = |k: isize| {
                 let t = x - k as f64;

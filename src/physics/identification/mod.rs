@@ -52,6 +52,8 @@ pub enum Between {
     Held,
     /// On straight lines.
     Linear,
+    /// On curves of the third degree, each through the four nearest samples: for forces that are smooth from sample to sample.
+    Cubic,
     /// By the smooth curve without frequencies above half the rate of the samples: a windowed sum of `sin(x)/x`.
     BandLimited,
 }

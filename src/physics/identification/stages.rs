@@ -326,7 +326,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
 /// The way between the samples of known forces that meets the motion best.
 fn best_between(problem: &mut Problem<'_>, fitted: Fitted) -> Fitted {
     let mut best = (problem.course.between, fitted);
-    for between in [Between::Held, Between::BandLimited] {
+    for between in [Between::Held, Between::Cubic, Between::BandLimited] {
         problem.course.between = between;
         let mut tried = best.1.clone();
         problem.settle(&tried.x, &mut tried.segments, 3);

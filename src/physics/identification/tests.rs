@@ -270,3 +270,45 @@ fn what_does_not_fit_together_is_refused() {
     let error = identify(&constrained, &plane, &Default::default()).unwrap_err();
     assert!(matches!(error, IdentifyError::Constrained { .. }), "{error}");
 }
+
+/// An oscillator under a force of which eight samples a period are known: curves between them leave less than straight lines do.
+#[test]
+fn a_smooth_force_is_seen_between_coarse_samples() {
+    let oscillator = |pairs: &Pairs<'_>| {
+        let text = r#"{"name": "swing", "lagrangian": "m*x_dot^2/2 - k*x^2/2",
+            "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-2, 2]}],
+            "parameters": {"m": 1.5, "k": 1}}"#;
+        described(text, pairs)
+    };
+    let model = oscillator(&[("m", 1.0), ("k", 1.2)]).build().unwrap();
+    let push = |t: f64| (0.8 * t).sin() + 0.5 * (0.37 * t).cos();
+    let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = push(t);
+    let motion = Driven::new(&*model, &force).rollout(&[0.4], &[0.0], &Options::reference(400.0, 0.9));
+    let motion = motion.complete().unwrap();
+    let mut rng = RngStream::Trajectories.generator(3);
+    let noisy = |q: &f64| {
+        let draw: f64 = StandardNormal.sample(&mut rng);
+        q + 1e-4 * draw
+    };
+    let (q, force) = (motion.q.iter().map(noisy).collect(), motion.t.iter().map(|t| push(*t)).collect());
+    let track = RecordedTrajectory { name: "run".into(), times: motion.t, q, v: vec![], a: vec![], force };
+    let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
+    let off = |between: Option<Between>| {
+        let options = IdentifyOptions { between, ..IdentifyOptions::default() };
+        let found = identify(&oscillator(&[]), &recording, &options).unwrap();
+        let truth = |symbol: &str| if symbol == "m" { 1.0 } else { 1.2 };
+        let off = found.constants.iter().map(|c| (c.value - truth(&c.symbol)).abs()).sum::<f64>();
+        (found.between.unwrap(), off)
+    };
+    let (lines, curves) = (off(Some(Between::Linear)).1, off(Some(Between::Cubic)).1);
+    assert!(curves < lines / 5.0, "{curves} {lines}");
+    assert_ne!(off(None).0, Between::Held);
+    // Of two samples and of one the curve is a line and a level.
+    let mut found = [0.0];
+    for (samples, expected) in [(2, 0.25), (1, 0.0)] {
+        let force: Vec<f64> = (0..samples).map(f64::from).collect();
+        let track = RecordedTrajectory { times: force.clone(), force, ..recording.tracks[0].clone() };
+        follow::forces(&track, Between::Cubic, ((samples - 1) as usize, 0.25), &mut found);
+        assert_eq!(found, [expected]);
+    }
+}

@@ -1,5 +1,8 @@
 //! Examples: each asserts its own result; those that need arguments are given them.
 
+#[allow(dead_code, reason = "its functions are called")]
+#[path = "../../../examples/arms.rs"]
+mod arms;
 #[path = "../../../examples/formula.rs"]
 mod formula;
 #[allow(dead_code, reason = "its functions are called")]
@@ -11,6 +14,9 @@ mod load_model;
 #[allow(dead_code, reason = "its functions are called")]
 #[path = "../../../examples/make_data.rs"]
 mod make_data;
+#[allow(dead_code, reason = "its functions are called")]
+#[path = "../../../examples/mercury.rs"]
+mod mercury;
 #[path = "../../../examples/nalgebra_matrices.rs"]
 mod nalgebra_matrices;
 #[path = "../../../examples/other_solver.rs"]
@@ -68,6 +74,30 @@ fn orbits_that_are_read_from_text_weigh_the_earth() {
     let wrong = text.replace("7490.690408 -17846.346485\n", "7490.690408 -17846.34x485\n");
     assert!(gps::read(&wrong).unwrap_err().to_string().contains("row 5"));
     gps::made().unwrap();
+}
+
+#[test]
+fn a_planets_orbit_tells_the_first_order_of_general_relativity() {
+    let [precession, error, einstein] = mercury::show(&mercury::made().unwrap()).unwrap();
+    assert!((precession - einstein).abs() < 0.1 && error < 0.1, "{precession} +- {error}, {einstein}");
+    assert!((einstein - 43.0).abs() < 1.0, "{einstein}");
+    let names: Vec<String> = ["mercury", "venus", "earthmoon", "mars", "jupiter", "saturn", "uranus", "neptune"]
+        .iter()
+        .flat_map(|planet| ["x", "y", "z"].map(|axis| format!("{planet}_{axis}")))
+        .collect();
+    let place = |k: usize| ((k + 1) as f64 * 5e7).to_string();
+    let row = |day: &str| format!("{day},{}\n", (0..24).map(place).collect::<Vec<_>>().join(","));
+    let text = format!("jd,{}\n{}{}", names.join(","), row("2451545"), row("2451545.5"));
+    let track = mercury::read(&text).unwrap();
+    assert_eq!((&track.times[..], track.q.len(), track.force.len()), (&[0.0, 0.5][..], 6, 6));
+    assert!((track.q[1] - 1e8 / 149_597_870.7).abs() < 1e-9, "{:?}", track.q);
+    assert!(mercury::read(&text.replace("2451545.5", "soon")).unwrap_err().to_string().contains("row 3"));
+    assert!(mercury::read(&text.replace("mars_y", "mars")).unwrap_err().to_string().contains("mars_y"));
+}
+
+#[test]
+fn a_network_and_the_textbook_predict_arms() {
+    arms::made().unwrap();
 }
 
 #[test]
