@@ -157,7 +157,17 @@ fn numbers_of_trainings_are_bounded() {
     let fit =
         ["fit", &data, "--coords", "x", "--trajectory", "run", "--hidden", "4", "--epochs", "1", "--threads", "1"];
     let fit = [&fit[..], &["--out", &out, "--overwrite"]].concat();
-    let options = ["--friction", "--window", "--noise", "--hold-out", "--horizon", "--seed", "--lambda", "--threads", "--members"];
+    let options = [
+        "--friction",
+        "--window",
+        "--noise",
+        "--hold-out",
+        "--horizon",
+        "--seed",
+        "--lambda",
+        "--threads",
+        "--members",
+    ];
     for option in options {
         every_value(&fit, option, &plain);
     }
