@@ -74,7 +74,7 @@ impl Case {
             let made = starts.iter().map(|start| self.driven(&*model, start, how, &mut rng));
             made.collect()
         } else {
-            let options = Options::new(how.seconds, step);
+            let options = Options { energy: false, ..Options::reference(how.seconds, step) };
             let motions = rollout_many(&*model, &starts, &options, 2);
             let tracks = motions.into_iter().enumerate().map(|(k, motion)| {
                 let motion = motion.trajectory;
