@@ -77,10 +77,11 @@ struct Motion {
 }
 
 impl Motion {
-    /// States whose torques the arm says.
-    fn of((q, v, a): (Vec<f64>, Vec<f64>, Vec<f64>)) -> Self {
-        let torque = inverse_dynamics(&Mechanics::new(Arm, []), &q, &v, &a).expect("smooth forces").generalized;
-        Self { q, v, a, torque }
+    /// The same states under the torques that the arm says.
+    fn under_its_torques(self) -> Self {
+        let arm = Mechanics::new(Arm, []);
+        let torque = inverse_dynamics(&arm, &self.q, &self.v, &self.a).expect("smooth forces").generalized;
+        Self { torque, ..self }
     }
 
     /// A letter by its positions: central differences inside, one-sided ones at the ends.
@@ -88,7 +89,7 @@ impl Motion {
         let (v, last) = (differences(&q), q.len() / 2 - 1);
         assert!(last > 0, "a letter has two samples at least");
         let a = differences(&v);
-        Self::of((q, v, a))
+        Self { q, v, a, torque: vec![] }.under_its_torques()
     }
 
     fn extend(&mut self, other: &Self) {
@@ -184,20 +185,20 @@ fn tight(time: f64, step: f64) -> Options<f64> {
 fn free_motion(start: [f64; 2]) -> Motion {
     let arm = Mechanics::new(Arm, []);
     let (mut q, mut v) = (start.to_vec(), vec![0.0; 2]);
-    let mut found = (Vec::new(), Vec::new(), Vec::new());
+    let mut found = Motion::default();
     for k in 0..FREE_SAMPLES * 10 {
         let a = arm.acceleration(&q, &v).expect("smooth forces");
         if k % 10 == 0 {
-            found.0.extend(&q);
-            found.1.extend(&v);
-            found.2.extend(&a);
+            found.q.extend(&q);
+            found.v.extend(&v);
+            found.a.extend(&a);
         }
         for j in 0..2 {
             v[j] += 0.002 * a[j];
             q[j] += 0.002 * v[j];
         }
     }
-    Motion::of(found)
+    found.under_its_torques()
 }
 
 fn valid_free(model: &dyn EulerLagrange<f64>, exact: &Motion) -> f64 {
