@@ -441,15 +441,16 @@ fn correct(model: &dyn EulerLagrange<f64>, chunks: &[States], dt: f64, a: &mut [
     for ((chunk, a), (before, after)) in chunks.iter().zip(a.chunks_exact_mut(CHUNK * n)).zip(ways) {
         // A motion that ends corrects nothing.
         let (Ok(before), Ok(after)) = (before.complete(), after.complete()) else { continue };
-        let states: Vec<_> =
-            (1..=middle).rev().map(|k| before.state(k)).chain((0..CHUNK - middle).map(|k| after.state(k))).collect();
-        let of_model: Option<Vec<f64>> =
-            states.iter().map(|(q, v)| model.acceleration(q, v).ok()).collect::<Option<Vec<_>>>().map(|a| a.concat());
-        let Some(of_model) = of_model else { continue };
-        let rest = |own: &[f64], of: fn(&(&[f64], &[f64])) -> Vec<f64>| {
-            own.iter().zip(states.iter().flat_map(of)).map(|(own, model)| own - model).collect()
-        };
-        let rest = States { q: rest(&chunk.q, |s| s.0.to_vec()), v: rest(&chunk.v, |s| s.1.to_vec()) };
+        let samples = (1..=middle).rev().map(|k| before.state(k)).chain((0..CHUNK - middle).map(|k| after.state(k)));
+        let (mut rest, mut of_model) = (chunk.clone(), Vec::new());
+        for (k, (q, v)) in samples.enumerate() {
+            rest.q[k * n..].iter_mut().zip(q).for_each(|(x, model)| *x -= model);
+            rest.v[k * n..].iter_mut().zip(v).for_each(|(x, model)| *x -= model);
+            of_model.extend(model.acceleration(q, v).unwrap_or(vec![f64::NAN; n]));
+        }
+        if of_model.iter().any(|a| a.is_nan()) {
+            continue;
+        }
         let left = accelerations(&rest, n, dt);
         a.iter_mut().zip(of_model.iter().zip(&left)).for_each(|(a, (model, left))| *a = model + left);
     }
