@@ -12,7 +12,7 @@ use lnn::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_con
 use lnn::data::Dataset;
 use lnn::forward::Dual;
 use lnn::lagrangian::{Constrained, EulerLagrange, ExpressionConstraints, Lagrangian, Mechanics, project};
-use lnn::network::{NetworkLagrangian, Structure};
+use lnn::network::Structure;
 use lnn::presets::Trainer;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Options, rollout_many};
@@ -422,40 +422,6 @@ fn accelerations(chunk: &States, n: usize, dt: f64) -> Vec<f64> {
     found
 }
 
-/// Accelerations at the samples of the chunks, `(states, n)`, by the motion of a model through the middle of each: those of the model there,
-/// and the second derivatives of what is left between the chunk and the motion by the polynomial through it. Where a force changes within a
-/// step the polynomial of the chunk misses it, and that of the rest, which is small and smooth for a model that is nearly right, does not.
-fn correct(model: &dyn EulerLagrange<f64>, chunks: &[States], dt: f64, a: &mut [f64]) {
-    let (n, middle) = (model.coordinates(), CHUNK / 2);
-    let at = |chunk: &States| {
-        let from = middle * n..(middle + 1) * n;
-        (chunk.q[from.clone()].to_vec(), chunk.v[from].to_vec())
-    };
-    let starts: Vec<_> = chunks.iter().map(at).collect();
-    let way = |samples: usize, sign: f64| {
-        let time = sign * samples as f64 * dt;
-        let options = Options { energy: false, rtol: 1e-9, atol: 1e-9, ..Options::new(time, dt) };
-        rollout_many(model, &starts, &options, 2)
-    };
-    let ways = way(middle, -1.0).into_iter().zip(way(CHUNK - 1 - middle, 1.0));
-    for ((chunk, a), (before, after)) in chunks.iter().zip(a.chunks_exact_mut(CHUNK * n)).zip(ways) {
-        // A motion that ends corrects nothing.
-        let (Ok(before), Ok(after)) = (before.complete(), after.complete()) else { continue };
-        let samples = (1..=middle).rev().map(|k| before.state(k)).chain((0..CHUNK - middle).map(|k| after.state(k)));
-        let (mut rest, mut of_model) = (chunk.clone(), Vec::new());
-        for (k, (q, v)) in samples.enumerate() {
-            rest.q[k * n..].iter_mut().zip(q).for_each(|(x, model)| *x -= model);
-            rest.v[k * n..].iter_mut().zip(v).for_each(|(x, model)| *x -= model);
-            of_model.extend(model.acceleration(q, v).unwrap_or(vec![f64::NAN; n]));
-        }
-        if of_model.iter().any(|a| a.is_nan()) {
-            continue;
-        }
-        let left = accelerations(&rest, n, dt);
-        a.iter_mut().zip(of_model.iter().zip(&left)).for_each(|(a, (model, left))| *a = model + left);
-    }
-}
-
 /// Means of the errors over the motions, arithmetic and geometric, `z` and `z'` sample by sample.
 fn errors(pairs: impl Iterator<Item = (Vec<[Vec<f64>; 2]>, Vec<[Vec<f64>; 2]>)>) -> [f64; 2] {
     let length = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
@@ -481,8 +447,6 @@ fn errors(pairs: impl Iterator<Item = (Vec<[Vec<f64>; 2]>, Vec<[Vec<f64>; 2]>)>)
 /// What a training is given and how large it is.
 struct Budget {
     chunks: usize,
-    /// Trainings after the first, each on accelerations that the motion of the one before corrects.
-    corrections: usize,
     steps: usize,
     hidden: Vec<usize>,
 }
@@ -496,6 +460,8 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
     let chunks: Vec<States> = data.chunks.iter().map(own).collect();
     let n = if cartesian { chunks[0].q.len() / CHUNK } else { row.exact.coordinates() };
     let part = |of: &dyn Fn(&States) -> Vec<f64>| chunks.iter().flat_map(of).collect::<Vec<f64>>();
+    let a = part(&|chunk| accelerations(chunk, n, row.dt));
+    let states = Dataset::new(n, part(&|c| c.q.clone()), part(&|c| c.v.clone()), a).expect("finite states");
     let names: Vec<String> = (1..=n).map(|i| format!("q{i}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let constraints = || {
@@ -524,38 +490,21 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
     } else {
         None
     };
-    let (q, v) = (part(&|chunk| chunk.q.clone()), part(&|chunk| chunk.v.clone()));
-    let learn = |a: Vec<f64>, structures: &[Structure]| {
-        let states = Dataset::new(n, q.clone(), v.clone(), a).expect("finite states");
-        let states = match held.as_ref().and_then(|held| EulerLagrange::<f64>::manifold(held)) {
-            Some(manifold) => states.on(manifold).expect("finite rows"),
-            None => states,
-        };
-        let epochs = (budget.steps * BATCH).div_ceil(states.len() * 8 / 10);
-        let trained = |structure| {
-            let angles = if cartesian { vec![] } else { row.exact.angles() };
-            let trainer = Trainer::new(&states).angles(&angles).structure(structure).hidden(&budget.hidden);
-            Some((structure, trainer.batch(BATCH).epochs(epochs).seed(seed).threads(2).train().ok()?))
-        };
-        let learned = structures.iter().filter_map(|&structure| trained(structure));
-        learned.min_by(|(_, a), (_, b)| a.validation_loss.total_cmp(&b.validation_loss))
+    let states = match held.as_ref().and_then(|held| EulerLagrange::<f64>::manifold(held)) {
+        Some(manifold) => states.on(manifold).expect("finite rows"),
+        None => states,
     };
-    let motion = |model: NetworkLagrangian<f64>| -> Option<Box<dyn EulerLagrange<f64>>> {
-        match cartesian {
-            true => Some(Box::new(Constrained::new(model, constraints()?, []).expect("the same coordinates"))),
-            false => Some(Box::new(model)),
-        }
+    let epochs = (budget.steps * BATCH).div_ceil(states.len() * 8 / 10);
+    let trained = |structure| {
+        let angles = if cartesian { vec![] } else { row.exact.angles() };
+        let trainer = Trainer::new(&states).angles(&angles).structure(structure).hidden(&budget.hidden);
+        trainer.batch(BATCH).epochs(epochs).seed(seed).threads(2).train().ok()
     };
     // In Cartesian coordinates the mass matrix may be constant: validation decides.
     let structures: &[_] =
         if cartesian { &[Structure::ConstantMass, Structure::Mechanical] } else { &[Structure::Mechanical] };
-    let mut a = part(&|chunk| accelerations(chunk, n, row.dt));
-    let (structure, learned) = learn(a.clone(), structures)?;
-    let mut model = motion(learned.model)?;
-    for _ in 0..budget.corrections {
-        correct(&*model, &chunks, row.dt, &mut a);
-        model = motion(learn(a.clone(), &[structure])?.1.model)?;
-    }
+    let learned = structures.iter().filter_map(|&structure| trained(structure));
+    let learned = learned.min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss))?;
     let starts: Vec<_> = data
         .motions
         .iter()
@@ -566,7 +515,13 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
         .collect();
     let time = (SAMPLES - 1) as f64 * row.dt;
     let options = Options { energy: false, rtol: 1e-8, atol: 1e-8, ..Options::new(time, row.dt) };
-    let predicted = rollout_many(&*model, &starts, &options, 2);
+    let predicted = match held {
+        Some(_) => {
+            let model = Constrained::new(learned.model, constraints()?, []).expect("the same coordinates");
+            rollout_many(&model, &starts, &options, 2)
+        }
+        None => rollout_many(&learned.model, &starts, &options, 2),
+    };
     let pairs = data.motions.iter().zip(&predicted).map(|(exact, predicted)| {
         let exact = exact.rows(row.exact.coordinates()).map(|(q, v)| row.exact.cartesian(q, v)).collect();
         let motion = &predicted.trajectory;
@@ -604,22 +559,16 @@ fn table(rows: &[&Row], seeds: u64, coordinates: &[bool], budget: &Budget) {
 
 /// One row at its smallest.
 pub fn trial() {
-    table(&[&ROWS[0]], 1, &[false, true], &Budget { chunks: 10, corrections: 1, steps: 4, hidden: vec![4] });
+    table(&[&ROWS[0]], 1, &[false, true], &Budget { chunks: 10, steps: 4, hidden: vec![4] });
 }
 
 /// Rows by name, all without one, in the coordinates of a name, in both without one.
-pub fn all(
-    name: Option<&str>,
-    seeds: u64,
-    coordinates: Option<&str>,
-    (chunks, corrections): (usize, usize),
-    steps: usize,
-) {
+pub fn all(name: Option<&str>, seeds: u64, coordinates: Option<&str>, chunks: usize, steps: usize) {
     let rows: Vec<&Row> = ROWS.iter().filter(|row| name.is_none_or(|name| name == row.name)).collect();
     let coordinates: &[bool] = match coordinates {
         Some("generalized") => &[false],
         Some("cartesian") => &[true],
         _ => &[false, true],
     };
-    table(&rows, seeds, coordinates, &Budget { chunks, corrections, steps, hidden: vec![128; 3] });
+    table(&rows, seeds, coordinates, &Budget { chunks, steps, hidden: vec![128; 3] });
 }

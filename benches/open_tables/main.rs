@@ -3,8 +3,7 @@
 //! `cargo bench --bench open_tables` runs all of them; `--table chunks` is of Finzi, Wang and Wilson, `--table hamiltonian` of Greydanus,
 //! Dzamba and Yosinski, `--table letters --letters FILE.csv` of Lutter, Ritter and Peters. `--row NAME` takes one system, `--seeds N` so
 //! many seeds from 0 (3 if not given), `--steps N` so many steps of the optimiser. Of the first table `--chunks N` takes so many chunks to
-//! learn from (800), `--in generalized` or `--in cartesian` one kind of coordinates, `--corrections N` so many corrections of the
-//! accelerations by motion (1).
+//! learn from (800), `--in generalized` or `--in cartesian` one kind of coordinates.
 
 mod chunks;
 mod hamiltonian;
@@ -28,8 +27,7 @@ fn main() {
         (after("--row").map(String::as_str), number("--seeds", 3) as u64, number("--steps", STEPS));
     let asked = |name: &str| after("--table").is_none_or(|table| table == name);
     if asked("chunks") {
-        let given = (number("--chunks", 800), number("--corrections", 1));
-        chunks::all(row, seeds, after("--in").map(String::as_str), given, steps);
+        chunks::all(row, seeds, after("--in").map(String::as_str), number("--chunks", 800), steps);
     }
     if asked("hamiltonian") {
         hamiltonian::all(row, seeds, steps);
