@@ -91,7 +91,7 @@ pub fn read(text: &str) -> Outcome<RecordedTrajectory> {
         let places: Vec<Place> = columns.iter().map(|at| at.map(|at| fields[at] / AU)).collect();
         push(&mut track, fields[date] - *first.get_or_insert(fields[date]), places[0], &places[1..]);
     }
-    Ok(track)
+    if track.times.is_empty() { Err("no rows below the header".into()) } else { Ok(track) }
 }
 
 fn empty() -> RecordedTrajectory {
