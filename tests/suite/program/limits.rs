@@ -14,14 +14,14 @@ fn bounded(arguments: &[&str]) -> Run {
     Run::of(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_lnn")]).args(arguments).env_remove("LNN_LOG"))
 }
 
-/// Values of a physical parameter, of positions and of velocities: large ones make a motion fast or its errors coarse, which takes the steps
+/// Values of a physical parameter, of forces, positions and velocities: large ones make a motion fast or its errors coarse, which takes the steps
 /// that are allowed.
 const PARAMETERS: [&str; 5] = ["0", "-1", "1e308", "1e-308", "nan"];
 
 /// Runs an option with every value, in place of its own where `base` has it; a result, a refusal of the argument or a failure of the data
 /// are the ends that are allowed.
 fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
-    let motion = ["--param", "--positions", "--velocities"].contains(&option);
+    let motion = ["--force", "--param", "--positions", "--velocities"].contains(&option);
     let values = if motion { &PARAMETERS[..] } else { &VALUES };
     for value in values.iter().map(|value| form(value)) {
         let given = base.iter().position(|word| *word == option);

@@ -158,13 +158,13 @@ fn an_ignored_hangup_ends_nothing() {
     assert_eq!(ended(child, "-TERM").0, Some(143));
 }
 
-/// Files may grow to a certain size, as on a disk that is almost full: model and tables fit, the report with its pictures
+/// Files may grow to a certain size, as on a disk that is almost full: model, tables and page fit, the report with its pictures
 /// does not.
 #[test]
 fn on_a_full_disk_pictures_are_lost_first() {
     let folder = Folder::new();
     let (config, out) = (configuration(&folder, 2), folder.path("out"));
-    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" \"$@\"";
+    let script = "trap '' XFSZ; ulimit -f 200; exec \"$0\" \"$@\"";
     let mut shell = Command::new("sh");
     shell.args(["-c", script, env!("CARGO_BIN_EXE_lnn"), "train", "--config", &config, "--out", &text(&out)]);
     let run = Run::of(shell.env_remove("LNN_LOG"));
