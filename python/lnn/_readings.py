@@ -142,7 +142,7 @@ def identify(
     noise : sequence of float, optional
         Standard deviation of the noise of every coordinate in SI units; estimated by default.
     between : str, optional
-        Known forces between the samples: ``"held"``, ``"linear"`` or ``"band-limited"``; what meets the motion best by default.
+        Known forces between the samples: ``"held"``, ``"linear"``, ``"cubic"`` or ``"band-limited"``; what meets the motion best by default.
     segment : float, optional
         Length of the segments that are followed in s; what makes the constants best known by default.
     robust : bool

@@ -221,7 +221,7 @@ def test_mistakes_of_an_identification_are_values(swung):
         {"constants": ["length"]},
         {"constants": ["l", "l"]},
         {"offsets": ["theta7"]},
-        {"between": "cubic"},
+        {"between": "quintic"},
         {"segment": 0.0},
         {"noise": [1.0, 1.0]},
         {"noise": [-1.0]},
