@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 
 def _learned(found: _lnn._Learned) -> Learned:
-    subject, history, summary, text, stop = found
-    return Learned(Model(subject), _history(history), json.loads(summary), text, stop)
+    subjects, history, summary, text, stop = found
+    models = [Model(subject) for subject in subjects]
+    return Learned(models[0], _history(history), json.loads(summary), text, stop, models)
 
 
 def _history(text: str) -> dict[str, np.ndarray]:
@@ -157,7 +158,8 @@ def learn(
     subject, history, validation, test, stop = found
     summary = {"validation_loss": validation, "test_loss": test}
     text = f"loss (paper): validation {validation:.4g}, fresh states {test:.4g}\n"
-    return Learned(Model(subject), _history(history), summary, text, stop)
+    model = Model(subject)
+    return Learned(model, _history(history), summary, text, stop, [model])
 
 
 def _choices(
@@ -200,6 +202,7 @@ def fit(
     epochs: int | None = None,
     precision: str = "f32",
     seed: int = 0,
+    members: int = 1,
     threads: int | None = None,
     out: str | os.PathLike | None = None,
     progress: Progress = None,
@@ -231,13 +234,16 @@ def fit(
         what `find_constraints` returned, or a file with a table ``constraints``. They are kept in the model.
     known : System, optional
         A formula that is added to what the network learns; its parameters marked ``learn`` are found, see `Model.constants`.
+    members : int
+        Networks that are trained one after another on the same recording, by `seed` and those that follow it, 32 at most: what they say
+        differently is what the recording leaves open, or the training. ``summary["members"]`` compares them.
     config : dict, optional
         Any other choice by its path in the configuration of a fit: ``{"held_out": 0.3, "training.optimizer.batch": 64}``.
     """
     more = {"dt": dt, "t": t, "v": v, "a": a, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
     choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
-    choices |= {"friction": friction, "constraints": _constraints(constraints)}
+    choices |= {"friction": friction, "members": int(members), "constraints": _constraints(constraints)}
     choices["known"] = None if known is None else _description(known)
     directory = None if out is None else os.fspath(out)
     return _learned(_lnn.fit(motion, json.dumps(choices), directory, receiver(progress)))

@@ -21,7 +21,7 @@ _Doubles = NDArray[np.float64]
 _Bounds = Sequence[tuple[str, float, float]]
 _Receiver = Callable[[str, float, float, str], None] | None
 _Motion = tuple[Sequence[str], Sequence[tuple[Any, ...]], str]
-_Learned = tuple[Subject, str, str, str, str | None]
+_Learned = tuple[list[Subject], str, str, str, str | None]
 
 @final
 class Subject:

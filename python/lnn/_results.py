@@ -554,6 +554,8 @@ class Learned:
         The same for a terminal.
     stop : str or None
         Why learning ended before its time: ``"interrupted"``, or a failure.
+    members : list of Model
+        The model, and those of the other seeds of a fit with `members`.
     """
 
     model: Model
@@ -561,6 +563,7 @@ class Learned:
     summary: dict
     text: str = field(repr=False)
     stop: str | None = None
+    members: list[Model] = field(default_factory=list, repr=False)
 
     def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws the losses over the epochs into `ax` or new axes of matplotlib, and returns these."""

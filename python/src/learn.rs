@@ -21,8 +21,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// What was learned: model, history as JSON, facts as JSON, text for a terminal, why it ended.
-type Learned = (Subject, String, String, String, Option<String>);
+/// What was learned: models, that of the fit or training first, history as JSON, facts as JSON, text for a terminal, why it ended.
+type Learned = (Vec<Subject>, String, String, String, Option<String>);
 
 fn preset(name: &str) -> PyResult<Preset> {
     match name {
@@ -144,7 +144,7 @@ pub fn train(
     .map_err(pipeline)?;
     let (text, result, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
     let json = report.json().map_err(pipeline)?;
-    Ok((Subject::learned(report.header, report.network)?, result, json, text, stop))
+    Ok((vec![Subject::learned(report.header, report.network)?], result, json, text, stop))
 }
 
 /// Choices of [`learn`] and [`fit`], as JSON.
@@ -161,6 +161,8 @@ struct Choices {
     dissipation: Option<usize>,
     #[serde(default)]
     friction: bool,
+    #[serde(default)]
+    members: Option<usize>,
     #[serde(default)]
     known: Option<Known>,
     #[serde(default)]
@@ -276,7 +278,10 @@ pub fn fit(
     let report = report.map_err(pipeline)?;
     let (text, result, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
     let json = report.json().to_string();
-    Ok((Subject::learned(report.header, report.network)?, result, json, text, stop))
+    let models = [(report.header, report.network)].into_iter();
+    let models = models.chain(report.others.into_iter().map(|other| (other.header, other.network)));
+    let models = models.map(|(header, network)| Subject::learned(header, network)).collect::<PyResult<_>>()?;
+    Ok((models, result, json, text, stop))
 }
 
 /// The fit with its choices; a change that the configuration refuses is put into `refused`.
@@ -301,6 +306,9 @@ fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, o
         }
         if let Some(epochs) = choices.epochs {
             set_epochs(&mut config.training, epochs);
+        }
+        if let Some(members) = choices.members {
+            config.members = members;
         }
         match changed(config, &choices.changes) {
             Ok(new) => *config = new,

@@ -239,6 +239,19 @@ def test_angles_that_jump_by_a_turn_are_fitted_as_they_go_on():
     assert np.allclose(*found, rtol=1e-4, atol=1e-6)
 
 
+def test_members_of_a_fit_are_models_of_their_seeds(tmp_path):
+    tracks, choices = [swing(a) for a in (0.3, 0.2, 0.25)], {"coordinates": ["angle"], "angles": ["angle"], "dt": 0.02, **SMALL}
+    fitted = lnn.fit(tracks, members=2, out=tmp_path, **choices)
+    assert len(fitted.members) == len(fitted.summary["members"]["each"]) == 2
+    # Numbers of several networks agree with those of fits of their seeds.
+    alone = [lnn.fit(tracks, **choices | {"seed": seed}) for seed in (0, 1)]
+    assert [one.to_bytes() for one in fitted.members] == [one.model.to_bytes() for one in alone]
+    assert fitted.model.to_bytes() == fitted.members[0].to_bytes() and len(alone[0].members) == 1
+    assert lnn.load(tmp_path / "member-1.safetensors").to_bytes() == fitted.members[1].to_bytes()
+    with pytest.raises(ValueError, match="members"):
+        lnn.fit(tracks, members=0, **choices)
+
+
 def test_tables_and_files_are_fitted(tmp_path):
     pandas = pytest.importorskip("pandas")
     frames = [

@@ -39,6 +39,8 @@ pub struct FitReport {
     pub history: Vec<Epoch>,
     /// Predictions of motion that was held out.
     pub hold_out: HoldOut,
+    /// Fits of the other [members](FitConfig::members), from the second on; those that an interruption ended are left out.
+    pub others: Vec<FitReport>,
     json: String,
     text: String,
 }
@@ -235,6 +237,7 @@ fn fit_in<S: Scalar>(
         StopReason::Finished => Members::train(prepared, fit_config, (&network, &hold_out), (options, output, watch))?,
         _ => None,
     };
+    let (members, others) = members.unzip();
     let found = Found {
         members: members.as_ref(),
         formula: formula.as_ref(),
@@ -251,7 +254,7 @@ fn fit_in<S: Scalar>(
     };
     let (json, text) = found.write(output, &toml)?;
     let (stop, history, header) = (trained.stop, trained.history, model.header);
-    Ok(FitReport { stop, header, network, history, hold_out, json, text })
+    Ok(FitReport { stop, header, network, history, hold_out, others: others.unwrap_or_default(), json, text })
 }
 
 /// Name and checksum of everything that is learned from.

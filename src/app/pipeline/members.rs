@@ -7,6 +7,7 @@ use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::names::{number, percent, percentage};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::equivalence::{Equivalence, gauge_functions};
+use crate::pipeline::fit::FitReport;
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::prepared_fit::PreparedFit;
@@ -51,8 +52,8 @@ pub struct Members {
 }
 
 impl Members {
-    /// Trains the other members of a fit, whose model is the first, and writes their models beside it; nothing for a fit of one. Members
-    /// that the flag of the watch interrupts are left out.
+    /// Trains the other members of a fit, whose model is the first, and writes their models beside it; returns their fits and what all
+    /// say, nothing for a fit of one. Members that the flag of the watch interrupts are left out.
     ///
     /// # Errors
     /// As of a fit.
@@ -61,7 +62,7 @@ impl Members {
         config: &FitConfig,
         (network, hold_out): (&NetworkLagrangian<f64>, &HoldOut),
         (options, output, watch): (&RunOptions, &dyn Output, &Watch),
-    ) -> Result<Option<Self>, PipelineError> {
+    ) -> Result<Option<(Self, Vec<FitReport>)>, PipelineError> {
         let mut others = Vec::new();
         for k in 1..config.members {
             if watch.is_interrupted() {
@@ -105,7 +106,7 @@ impl Members {
                 }
             }
         }
-        Ok(Some(found))
+        Ok(Some((found, others)))
     }
 
     /// Brings the Lagrangians into the gauge of the first and compares them at held-out states.
