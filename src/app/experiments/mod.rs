@@ -64,6 +64,11 @@ pub enum Picture {
         /// Label of the horizontal axis.
         abscissa: &'static str,
     },
+    /// How many times lower the penalty makes the lowest loss, against the abscissa, a line per group.
+    Gain {
+        /// Label of the horizontal axis.
+        abscissa: &'static str,
+    },
     /// Loss against instability, a point per row.
     TradeOff,
     /// Lowest validation loss so far against seconds of training, a line per run.
@@ -101,6 +106,7 @@ static EXPERIMENTS: &[Experiment] = &[
     network::INITIALIZATION,
     network::TRAINING_RANGE,
     network::OLD_TRICKS,
+    network::BOUNDARY,
     physical::DOUBLE_PENDULUM,
     physical::SPRING_PENDULUM,
     physical::TRIPLE_PENDULUM,

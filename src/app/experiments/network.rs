@@ -1,7 +1,7 @@
 //! The paper's network experiments, all on the double pendulum (its appendix "Training details of network experiments").
 
 use super::{Experiment, Picture, Quantity, Reduction, Reported, Run, slug};
-use crate::configuration::{Config, Regularizer, Scaling};
+use crate::configuration::{Config, Precision, Regularizer, Scaling};
 use crate::lagrangian::configure;
 use crate::network::{ActivationChoice, Initialization, InputLayer};
 use crate::presets::Preset;
@@ -150,6 +150,45 @@ fn spacetime() -> [Run; 3] {
             run(label, label, config)
         })
 }
+
+/// Product of width and learning rate over that of the paper.
+const PRODUCTS: [f64; 3] = [0.25, 1.0, 4.0];
+
+pub(super) const BOUNDARY: Experiment = Experiment {
+    name: "boundary",
+    title: "Where a training needs the penalty",
+    paper: "-",
+    finding: "Without the penalty 2 of 4 models were useless, by the choices that the first row of each group repeats.",
+    pictures: &[Picture::Gain { abscissa: "width times rate" }],
+    reductions: &[],
+    runs: || {
+        let varied = |group: &str, change: fn(&mut Config)| {
+            let mut config = trained_on(baseline(), EXTENDED);
+            change(&mut config);
+            let pairs = PRODUCTS.into_iter().flat_map(|product| [(product, 0.0), (product, 100.0)]);
+            let runs = pairs.map(|(product, lambda)| {
+                let mut config = Config { penalty: Regularizer::Eigenvalue { lambda }, ..config.clone() };
+                config.phases.iter_mut().for_each(|phase| phase.rate *= product);
+                let penalty = if lambda == 0.0 { "no penalty" } else { "penalty" };
+                let label = format!("{group}, rate times {product}, {penalty}");
+                Run { abscissa: Some(product), ..run(group, &label, config) }
+            });
+            runs.collect::<Vec<Run>>()
+        };
+        [
+            varied("the paper's choices", |_| ()),
+            varied("x tanh(kx)", |config| config.network.activation = ActivationChoice::XTanh),
+            varied("softplus", |config| config.network.activation = ActivationChoice::Softplus),
+            varied("without |v|^2", |config| config.network.alpha = 0.0),
+            varied("variance-preserving", |config| {
+                config.network.initialization = Initialization::VariancePreserving;
+            }),
+            varied("[-3 pi, 3 pi]", |config| config.phases.iter_mut().for_each(|phase| phase.position.fill(WIDE))),
+            varied("double precision", |config| config.precision = Precision::F64),
+        ]
+        .concat()
+    },
+};
 
 /// Activations of the paper with both initialisations.
 fn activation_run(label: &str, activation: ActivationChoice, initialization: Initialization) -> Run {

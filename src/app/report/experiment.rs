@@ -1,6 +1,6 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
-use super::{DataTable, Figure, LinePlot, Series, figure, line_plot};
+use super::{DataTable, Figure, Level, LinePlot, Series, figure, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, RunSpread};
 use crate::names::rounded;
 use serde_json::json;
@@ -198,6 +198,22 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
                     level: None,
                 },
             ),
+            Picture::Gain { abscissa } => add(
+                "gain",
+                "How many times lower the penalty makes the loss",
+                format!(
+                    "Lowest validation loss without the penalty over that with it, medians over seeds, against {abscissa}, 1 in the paper."
+                ),
+                LinePlot {
+                    title: "Loss without the penalty over loss with it".into(),
+                    x_label: format!("log2 of {abscissa} over the paper's"),
+                    y_label: "ratio of the lowest losses".into(),
+                    log_y: true,
+                    series: gain(results),
+                    turn: None,
+                    level: Some(Level { value: 1.0, name: "penalty without effect".into() }),
+                },
+            ),
             Picture::TradeOff => add(
                 "trade_off",
                 "Accuracy against stability of the training",
@@ -290,6 +306,24 @@ fn scan(results: &[(Run, Option<Record>)]) -> Vec<Series> {
             Series { name: name.to_string(), points, over: false }
         })
         .collect()
+}
+
+/// A line per group: median loss of the runs without a penalty over that of the runs with one.
+fn gain(results: &[(Run, Option<Record>)]) -> Vec<Series> {
+    let line = |(name, members): (&str, Vec<(&Run, &Record)>)| {
+        let mut abscissae: Vec<f64> = members.iter().filter_map(|(run, _)| run.abscissa).collect();
+        abscissae.sort_by(f64::total_cmp);
+        abscissae.dedup();
+        let median = |x: f64, penalised: bool| {
+            let here = |run: &Run| run.abscissa == Some(x) && (run.config.penalty.lambda() > 0.0) == penalised;
+            let mut losses: Vec<f64> = members.iter().filter(|(run, _)| here(run)).map(|(_, r)| lowest(r)).collect();
+            losses.sort_by(f64::total_cmp);
+            losses.get(losses.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let points = abscissae.into_iter().map(|x| (x.log2(), median(x, false) / median(x, true)));
+        Series { name: name.to_string(), points: points.collect(), over: false }
+    };
+    groups(results, |run| &run.group).into_iter().map(line).collect()
 }
 
 /// A label or group per colour; gaps between the points keep them apart.
