@@ -20,7 +20,8 @@
 //! | [`library`] | using the Rust crate: features, your own Lagrangian, your own states, examples |
 //! | [`python`] | the Python package; models in JAX, PyTorch and numpy |
 //! | [`model_format`] | `model.safetensors`, readable without this crate |
-//! | [`results`] | accuracy on five systems, limits, time to accuracy, what made training exact, the paper's tables and those of others |
+//! | [`results`] | accuracy on five systems, limits, time to accuracy, what made training exact, the tables of others |
+//! | [`paper`] | the paper's tables and ours, what they confirm, where a training needs the penalty, all experiments |
 //! | [`accuracy`] | errors of the numerics, run time against error |
 //! | [`performance`] | times of training steps, evaluations and small matrices, beside PyTorch and JAX |
 //! | [`architecture`] | flow of data, modules, how to add a system, an operation, an integrator |
@@ -68,7 +69,8 @@ macro_rules! page {
             "[python]: crate::docs::python\n",
             "[model-format]: crate::docs::model_format\n",
             "[results]: crate::docs::results\n",
-            "[experiments]: crate::docs::results#experiments\n",
+            "[paper]: crate::docs::paper\n",
+            "[experiments]: crate::docs::paper#experiments\n",
             "[time-to-accuracy]: crate::docs::results#time-to-accuracy\n",
             "[accuracy]: crate::docs::accuracy\n",
             "[performance]: crate::docs::performance\n",
@@ -107,6 +109,7 @@ pages! {
     python "python.md";
     model_format "model-format.md";
     results "results.md";
+    paper "paper.md";
     accuracy "accuracy.md";
     performance "performance.md";
     architecture "architecture.md";

@@ -107,6 +107,7 @@ static EXPERIMENTS: &[Experiment] = &[
     network::TRAINING_RANGE,
     network::OLD_TRICKS,
     network::BOUNDARY,
+    network::ADDED_TERM,
     physical::DOUBLE_PENDULUM,
     physical::SPRING_PENDULUM,
     physical::TRIPLE_PENDULUM,

@@ -22,7 +22,6 @@ use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
-use std::time::Instant;
 
 #[derive(Clone, Debug)]
 struct Case {
@@ -476,29 +475,4 @@ fn friction_is_learned_beside_the_lagrangian() {
     // Measured: 0.90.
     let forced = learn(&model, Some(16), 60, true);
     assert!((forced.factor - 1.0).abs() < 0.2 && forced.mass < 0.15, "{forced:?}");
-}
-
-/// What a longer training separates, chains of one to three pendula: the error of accelerations with and without friction,
-/// of the mass matrix and of the dissipated power.
-///
-/// `cargo test --test suite dissipation -- --ignored --nocapture separation` prints the table, in minutes.
-#[test]
-#[ignore = "prints a table, in minutes"]
-fn separation() {
-    println!("relative errors    acceleration                     mass     power of      mean");
-    println!(" n  epochs  without friction      with    matrix  single states     power    seconds");
-    for n in 1..=3 {
-        let model = damped::chain(n);
-        for epochs in [60, 400] {
-            let start = Instant::now();
-            let (without, with) = (learn(&model, None, epochs, false), learn(&model, Some(16), epochs, false));
-            let seconds = start.elapsed().as_secs_f64();
-            let [plain, own, mass, power] = [without.acceleration, with.acceleration, with.mass, with.power];
-            let mean = (with.mean_power - 1.0).abs();
-            println!("{n:2} {epochs:7} {plain:17.4} {own:9.4} {mass:9.4} {power:14.4} {mean:9.4} {seconds:10.1}");
-            // A second coordinate tells friction from the forces of L.
-            assert!(n == 1 || own < plain, "{n} {epochs}: {with:?} {without:?}");
-            assert!([plain, own, mass, power, mean].iter().all(|x| x.is_finite()), "{with:?} {without:?}");
-        }
-    }
 }
