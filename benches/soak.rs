@@ -27,14 +27,7 @@ fn config(seed: u64) -> Config {
 fn round(seed: u64) {
     let outcome = run::<f64>(&config(seed), 2, &Hooks::default()).expect("a training");
     let starts: Vec<_> = (0..8).map(|k| (vec![0.1 * k as f64, 0.2], vec![0.0, 0.1])).collect();
-    for method in [
-        Integrator::Dopri5,
-        Integrator::Dop853,
-        Integrator::Midpoint,
-        Integrator::Gauss4,
-        Integrator::Gauss6,
-        Integrator::Variational,
-    ] {
+    for method in Integrator::ALL {
         let options = Options { method, step: Some(0.02), max_steps: 2000, ..Options::new(1.0, 0.1) };
         black_box(rollout_many(&outcome.model, &starts, &options, 2));
         black_box(rollout_together(&outcome.model, &starts, &options, 2));

@@ -4,7 +4,7 @@
 #[cfg(test)]
 use crate::counting;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, systems::DoublePendulum};
-use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::network::{ModelFile, NetworkLagrangian};
 use std::path::Path;
 
 #[cfg(not(test))]

@@ -4,8 +4,7 @@
 //! `lnn train kerr-cartesian --out runs/kerr`, then `cargo run --release --example black_holes -- runs/kerr`.
 
 use lnn::lagrangian::{configure_values, find};
-use lnn::network::NetworkLagrangian;
-use lnn::network::file::ModelFile;
+use lnn::network::{ModelFile, NetworkLagrangian};
 use lnn::pipeline::model_file;
 use lnn::relativity::{CentralCoordinates, LearnedHole};
 use std::borrow::Cow;

@@ -1,8 +1,7 @@
 //! Reads the Lagrangian of a recorded double pendulum off its angles alone.
 
 use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
-use lnn::recording::Columns;
-use lnn::recording::read::read_recording;
+use lnn::recording::{Columns, read_recording};
 
 /// Finds the formula and prints it.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {

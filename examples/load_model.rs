@@ -3,7 +3,7 @@
 //! `lnn train double-pendulum --config examples/data/double_pendulum.toml --out DIR` made the file in `examples/data`.
 
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::network::{ModelFile, NetworkLagrangian};
 use std::path::Path;
 
 pub const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/double_pendulum.safetensors");

@@ -4,7 +4,7 @@
 
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
-use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::network::{ModelFile, NetworkLagrangian};
 use std::cell::RefCell;
 use std::path::Path;
 

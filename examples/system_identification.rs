@@ -4,7 +4,7 @@
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
-use lnn::lagrangian::{Lagrangian, system::ClosedForm, systems::DoublePendulum};
+use lnn::lagrangian::{ClosedForm, Lagrangian, systems::DoublePendulum};
 use lnn::linalg::{Workspace, solve};
 use lnn::random::RngStream;
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, STATES};

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! measured motion  recording::Recording ─┐
-//! states with a    data::Dataset  ───┼─► training::train ─► network::NetworkLagrangian ◄─► network::file::ModelFile
+//! states with a    data::Dataset  ───┼─► training::train ─► network::NetworkLagrangian ◄─► network::ModelFile
 //! closed form      data::sample   ───┘                               │
 //! L written down   lagrangian::Lagrangian ─► lagrangian::Mechanics ────┤
 //!                                                                        ▼
@@ -27,8 +27,8 @@
 //! | learn from recorded motion | `pipeline::Fit` (feature `pipeline`) |
 //! | look up a key of a configuration | the page [`docs::configuration`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
-//! | store and load models | [`network::file::ModelFile`] |
-//! | differentiate your own function | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
+//! | store and load models | [`network::ModelFile`] |
+//! | differentiate your own function | [`tape::gradient`], [`tape::hessian`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
@@ -172,15 +172,16 @@ pub use app::report;
 #[cfg(feature = "data")]
 pub use learning::recording;
 #[cfg(feature = "training")]
-pub use learning::{configuration, data, optimizers, presets, shooting, training};
+#[doc(hidden)]
+pub use learning::shooting;
+#[cfg(feature = "training")]
+pub use learning::{configuration, data, optimizers, presets, training};
 #[cfg(feature = "rollout")]
 pub use mechanics::rollout;
 pub use mechanics::{lagrangian, network};
 #[doc(hidden)]
-pub use numerics::ops;
-#[doc(hidden)]
-pub use numerics::random;
-pub use numerics::{forward, linalg, scalar, tape};
+pub use numerics::{forward, ops, random};
+pub use numerics::{linalg, scalar, tape};
 #[cfg(feature = "data")]
 pub use physics::constraints;
 #[cfg(feature = "training")]

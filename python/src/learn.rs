@@ -229,7 +229,7 @@ pub fn learn(
         trainer = trainer.epochs(epochs);
     }
     if let Some(units) = choices.dissipation {
-        trainer = trainer.dissipation(units);
+        trainer = trainer.configure(|config| config.network.dissipation = Some(units));
     }
     let formulas: Vec<(&str, &str)> = match &choices.constraints {
         FitConstraints::None => Vec::new(),

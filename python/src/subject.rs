@@ -14,7 +14,7 @@ use lnn::lagrangian::{
 };
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
-use lnn::pipeline::{EvaluationOptions, HELD, evaluate, trained_on};
+use lnn::pipeline::{EvaluationOptions, CONSTRAINTS_UNSUPPORTED, evaluate, trained_on};
 use lnn::report::page;
 use lnn::rollout::{Integrator, Options, Rollout, RolloutError, rollout_many};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
@@ -82,7 +82,7 @@ impl Subject {
     fn require_free(&self) -> PyResult<()> {
         match self.moving().manifold() {
             None => Ok(()),
-            Some(_) => Err(value(HELD)),
+            Some(_) => Err(value(CONSTRAINTS_UNSUPPORTED)),
         }
     }
 

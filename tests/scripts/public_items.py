@@ -1,7 +1,7 @@
 """Counts what the crate shows: python3 tests/scripts/public_items.py [SRC] [--list]
 
 Counted are modules, items (functions, types, traits, constants) and inherent methods that a path of public modules and re-exports leads to.
-What `#[doc(hidden)]` hides is not: it is there for the program, its tests and its benchmarks.
+What `#[doc(hidden)]` hides is not: it is there for the program, its tests and its benchmarks. Pages of documentation are not items.
 """
 
 import collections
@@ -9,7 +9,10 @@ import os
 import re
 import sys
 
-ITEM = re.compile(r"(?<!#\[doc\(hidden\)\]\n)^pub (?:const |unsafe |async )*(fn|struct|enum|trait|type|const|static|union)\s+(\w+)", re.M)
+KINDS = r"pub (?:const |unsafe |async )*(fn|struct|enum|trait|type|const|static|union)\s+(\w+)"
+# Items, and types that stand indented in the body or the call of a macro.
+ITEM = re.compile(r"((?:^ *#\[[^\n]*\]\n)*)^(?:" + KINDS + r"| +pub (struct|enum|trait|type|union)\s+(\w+))", re.M)
+METHOD = re.compile(r"((?:^    #\[[^\n]*\]\n)*)^    pub (?:const |unsafe |async )*fn (\w+)", re.M)
 IMPL = re.compile(r"^impl(?:<(?:[^<>]|<[^<>]*>)*>)?\s+(\w+)(?:<[^{]*>)?\s*(?:where[^{]*)?\{", re.M)
 ATTRIBUTES = r"((?:^#\[[^\n]*\]\n)*)"
 
@@ -55,7 +58,11 @@ def leaves(prefix, tree):
 class Surface:
     def __init__(self, files):
         self.files, self.modules, self.items = files, set(), set()
-        self.own = {module: {name: kind for kind, name in ITEM.findall(text)} for module, text in files.items()}
+        self.own, self.hidden = {}, {}
+        for module, text in files.items():
+            found = [(attributes, kind or indented, name or type_) for attributes, kind, name, indented, type_ in ITEM.findall(text)]
+            self.own[module] = {name: kind for attributes, kind, name in found if "doc(hidden)" not in attributes}
+            self.hidden[module] = {name for attributes, _, name in found if "doc(hidden)" in attributes}
         self.show("")
 
     def below(self, module, name):
@@ -74,17 +81,26 @@ class Surface:
             path = path[1:]
         while path and self.below(module, path[0]) in self.files:
             module, path = self.below(module, path[0]), path[1:]
+        if module == "" and path:
+            # A name of the facade stands for the module behind it.
+            for origin, known in self.uses("", True):
+                if known == path[0] and origin[0] != known:
+                    return self.resolve(origin + path[1:], "")
         return module, path
 
-    def export(self, module, name, depth=0):
+    def export(self, module, path, depth=0):
+        name = path[0]
         if name in self.own.get(module, ()):
             self.items.add((module, name))
-        elif depth < 8 and module in self.files:
-            for path, known in self.uses(module, True):
-                if known == name:
-                    origin, rest = self.resolve(path, module)
-                    if rest:
-                        self.export(origin, rest[0], depth + 1)
+        elif depth < 8 and module in self.files and name not in self.hidden[module]:
+            origins = [self.resolve(path, module) for path, known in self.uses(module, True) if known == name]
+            for origin, rest in origins:
+                if rest:
+                    self.export(origin, rest, depth + 1)
+            if not origins and len(path) == 1:
+                # The macro of another module made it.
+                self.own[module][name] = "type"
+                self.items.add((module, name))
 
     def show(self, module):
         if module in self.modules:
@@ -97,7 +113,7 @@ class Surface:
         for path, _ in self.uses(module, False):
             origin, rest = self.resolve(path, module)
             if rest:
-                self.export(origin, rest[0])
+                self.export(origin, rest)
             else:
                 self.show(origin)
 
@@ -106,10 +122,10 @@ class Surface:
         return "::".join(module.split("::")[:2])
 
     def methods(self):
-        """Public methods of the types shown, by room; a type's methods stand in its own room."""
+        """Public methods of the types shown, by room, as paths; a type's methods stand in its own room."""
         kinds = ("struct", "enum", "type", "trait")
         types = {(self.room(module), name) for module, name in self.items if self.own[module][name] in kinds}
-        count = collections.Counter()
+        shown = []
         for module, text in self.files.items():
             room = self.room(module)
             for found in IMPL.finditer(text):
@@ -120,20 +136,22 @@ class Surface:
                         end += 1
                         if depth == 0:
                             break
-                    count[room] += len(re.findall(r"^    pub (?:const |unsafe )*fn ", text[found.end() : end], re.M))
-        return count
+                    methods = METHOD.findall(text[found.end() : end])
+                    names = [name for attributes, name in methods if "doc(hidden)" not in attributes]
+                    shown += [(room, f"{module}::{found.group(1)}::{name}") for name in names]
+        return shown
 
 
 def main():
     arguments = [argument for argument in sys.argv[1:] if argument != "--list"]
     surface = Surface(read(arguments[0] if arguments else os.path.join(os.path.dirname(__file__), "../../src")))
     modules, items, methods = len(surface.modules) - 1, len(surface.items), surface.methods()
-    count = methods.total()
-    print(f"{modules + items + count} public: {modules} modules, {items} items, {count} methods")
+    print(f"{modules + items + len(methods)} public: {modules} modules, {items} items, {len(methods)} methods")
+    per_room = collections.Counter(room for room, _ in methods)
     rooms = collections.Counter(surface.room(module) for module, _ in surface.items)
-    print(", ".join(f"{room or 'crate'} {count} + {methods[room]}" for room, count in rooms.most_common()))
+    print(", ".join(f"{room or 'crate'} {count} + {per_room[room]}" for room, count in rooms.most_common()))
     if "--list" in sys.argv:
-        print("\n".join(f"{module}::{name}" for module, name in sorted(surface.items)))
+        print("\n".join(sorted([f"{module}::{name}" for module, name in surface.items] + [path for _, path in methods])))
 
 
 main()

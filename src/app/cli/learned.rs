@@ -32,7 +32,7 @@ pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
 
 /// What a command that knows no constraints says of a motion that is held by some.
 pub fn held(name: &dyn std::fmt::Display) -> CliError {
-    CliError::usage(format_args!("{name}: {}", pipeline::HELD))
+    CliError::usage(format_args!("{name}: {}", pipeline::CONSTRAINTS_UNSUPPORTED))
 }
 
 impl<S: Scalar> Learned<S> {

@@ -15,6 +15,7 @@ use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Re
 use crate::names::{pluralize, rounded};
 use crate::rollout::{Balances, Driven, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
+use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -49,7 +50,7 @@ pub struct Args {
     forces: ForceArgs,
     /// Integrator. If unsure, keep the default; take gauss6 for long times. variational refuses models with friction.
     #[arg(long, value_enum, value_name = "NAME", default_value = "dopri5")]
-    method: MethodName,
+    method: Integrator,
     /// Relative tolerance of a step, at least 2e-15.
     #[arg(long, value_name = "R", default_value = "1e-6", allow_hyphen_values = true, value_parser = tolerance)]
     rtol: f64,
@@ -91,32 +92,20 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum MethodName {
-    /// Dormand and Prince, order 5, error control.
-    Dopri5,
-    /// Dormand and Prince, order 8, error control.
-    Dop853,
-    /// Implicit midpoint rule, order 2, symplectic.
-    Midpoint,
-    /// Gauss collocation, order 4, symplectic.
-    Gauss4,
-    /// Gauss collocation, order 6, symplectic.
-    Gauss6,
-    /// Discrete Euler-Lagrange equations, order 2, symplectic.
-    Variational,
-}
-
-impl From<MethodName> for Integrator {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Dopri5 => Self::Dopri5,
-            MethodName::Dop853 => Self::Dop853,
-            MethodName::Midpoint => Self::Midpoint,
-            MethodName::Gauss4 => Self::Gauss4,
-            MethodName::Gauss6 => Self::Gauss6,
-            MethodName::Variational => Self::Variational,
-        }
+impl clap::ValueEnum for Integrator {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            Self::Dopri5 => "Dormand and Prince, order 5, error control",
+            Self::Dop853 => "Dormand and Prince, order 8, error control",
+            Self::Midpoint => "Implicit midpoint rule, order 2, symplectic",
+            Self::Gauss4 => "Gauss collocation, order 4, symplectic",
+            Self::Gauss6 => "Gauss collocation, order 6, symplectic",
+            Self::Variational => "Discrete Euler-Lagrange equations, order 2, symplectic",
+        };
+        Some(PossibleValue::new(self.name()).help(help))
     }
 }
 
@@ -146,7 +135,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(file) = &args.constraints {
         subject.model = constrained(subject.model, columns, file, (q, v))?;
     }
-    let method = Integrator::from(args.method);
+    let method = args.method;
     if args.step.is_some() && !method.is_structure_preserving() {
         return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
     }

@@ -44,7 +44,7 @@ impl fmt::Debug for Checkpoints {
 
 impl Checkpoints {
     /// Checkpoints in a directory, of a training that begins anew.
-    pub fn new(directory: &Path, every: CheckpointInterval) -> Self {
+    pub(crate) fn new(directory: &Path, every: CheckpointInterval) -> Self {
         let (files, directory) = (Arc::new(Disk), directory.to_path_buf());
         Self { files, directory, every, begin: Begin::Anew, identity: None }
     }
@@ -64,7 +64,7 @@ impl Checkpoints {
     ///
     /// # Errors
     /// [`PipelineError::Output`] naming the directory.
-    pub fn remove(&self) -> Result<(), PipelineError> {
+    pub(crate) fn remove(&self) -> Result<(), PipelineError> {
         let cannot = |e| PipelineError::output(&self.directory, format_args!("cannot remove checkpoints: {e}"));
         remove_checkpoints(self.files.as_ref(), &self.directory).map_err(cannot)
     }

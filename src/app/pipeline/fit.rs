@@ -55,6 +55,7 @@ impl FitReport {
         self.header.constrain(Box::new(&self.network as &dyn EulerLagrange<f64>)).map_err(wrong)
     }
     /// Text of `summary.json`.
+    #[doc(hidden)]
     pub fn json(&self) -> &str {
         &self.json
     }

@@ -3,7 +3,7 @@
 use crate::configuration::{FRICTION_UNITS, Precision};
 use crate::network::Structure;
 use crate::pipeline::fit::{FitReport, fit};
-use crate::pipeline::fit_config::{FitColumns, FitConfig, FitConstraints, FitOptions};
+use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{Directory, InMemory, Output, PipelineError, Watch};
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// A fit of recorded motion.
 ///
-/// Every choice has the default of `lnn fit`: if unsure, leave it. [`PreparedFit`] and [`fit`] are the two steps behind it.
+/// Every choice has the default of `lnn fit`: if unsure, leave it.
 ///
 /// ```
 /// use lnn::prelude::*;
@@ -94,12 +94,6 @@ impl Fit {
         self
     }
 
-    /// Columns of known forces, one per coordinate, in N or N m.
-    pub fn forces<const N: usize>(mut self, names: [&str; N]) -> Self {
-        self.columns.force = names.map(String::from).to_vec();
-        self
-    }
-
     /// Column whose value tells the trajectories of a file apart.
     pub fn trajectory(mut self, column: &str) -> Self {
         self.columns.trajectory = Some(column.to_string());
@@ -128,13 +122,8 @@ impl Fit {
         self
     }
 
-    /// Constraints between the coordinates: found in the motion, or given as formulas; they are kept in the model's file.
-    pub fn constraints(mut self, constraints: FitConstraints) -> Self {
-        self.options.constraints = constraints;
-        self
-    }
-
     /// Quantities to learn from, in place of those that the data advise.
+    #[doc(hidden)]
     pub fn targets(mut self, targets: Targets) -> Self {
         self.options.targets = Some(targets);
         self
@@ -174,7 +163,7 @@ impl Fit {
     /// Reads, learns, and judges by held-out motion.
     ///
     /// # Errors
-    /// [`PipelineError::Data`] for files that do not fit their description; as of [`PreparedFit::new`] and [`fit`].
+    /// [`PipelineError`]: [`PipelineError::Data`] for files that do not fit their description, [`PipelineError::Training`] if nothing was learned.
     pub fn run(self) -> Result<FitReport, PipelineError> {
         let Self { source, columns, options, change, friction, structure, precision, threads, out, watch } = self;
         let (loaded, files) = match source {

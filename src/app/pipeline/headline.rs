@@ -265,6 +265,7 @@ mod tests {
                 force_errors: Vec::new(),
                 figures: Vec::new(),
                 predicted: Default::default(),
+                error_scales: Default::default(),
             };
             of_hold_out("swing", &found).sentence
         };

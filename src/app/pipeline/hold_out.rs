@@ -96,20 +96,10 @@ pub struct HoldOut {
     pub figures: Vec<Figure>,
     /// What was predicted.
     #[serde(skip)]
-    pub(crate) predicted: Predicted,
-}
-
-/// Windows with the model's predictions of them, and how errors are counted.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Predicted {
-    /// The windows.
-    pub windows: Vec<Window>,
-    /// The model's motion.
-    pub predictions: Predictions,
-    /// Coordinates that are angles.
-    pub periodic: Vec<bool>,
-    /// Scales of the coordinates' errors.
-    pub scales: Vec<f64>,
+    pub(crate) predicted: HeldOutPredictions,
+    /// Coordinates that are angles, and scales of the coordinates' errors.
+    #[serde(skip)]
+    pub(crate) error_scales: (Vec<bool>, Vec<f64>),
 }
 
 /// Predicts held-out motion in up to 500 windows and compares it with what was measured.
@@ -151,8 +141,8 @@ pub fn evaluate_hold_out(
     }
     let watched = cancellation.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
-    let foretold = HeldOutPredictions::new(model, windows, plan.threads, cancellation)?;
-    let (windows, motion) = (&foretold.windows, &foretold.predictions);
+    let predicted = HeldOutPredictions::new(model, windows, plan.threads, cancellation)?;
+    let (windows, motion) = (&predicted.windows, &predicted.predictions);
     let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
         let times = (1..=count).map(|k| horizon * k as f64 / count as f64);
@@ -200,9 +190,6 @@ pub fn evaluate_hold_out(
         let (name, model, constant_velocity) = (name.clone(), column(&by_model, i), column(&by_velocity, i));
         CoordinatePredictions { name, unit, model, constant_velocity }
     });
-    let given_up = foretold.remarks();
-    let HeldOutPredictions { windows, predictions, .. } = foretold;
-    let predicted = Predicted { windows, predictions, periodic: periodic.clone(), scales };
     Ok(HoldOut {
         error_unit: unit,
         model,
@@ -210,11 +197,12 @@ pub fn evaluate_hold_out(
         useful_time,
         by_coordinate: coordinates.collect(),
         constant_velocity,
-        given_up,
+        given_up: predicted.remarks(),
         wrong_signature,
         energy,
         force_errors: Vec::new(),
         figures,
+        error_scales: (periodic.clone(), scales),
         predicted,
     })
 }
@@ -423,7 +411,8 @@ impl HoldOut {
             energy: None,
             force_errors: Vec::new(),
             figures: Vec::new(),
-            predicted: Predicted::default(),
+            predicted: HeldOutPredictions::default(),
+            error_scales: Default::default(),
         }
     }
 

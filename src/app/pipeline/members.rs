@@ -217,7 +217,8 @@ fn of_the_mean(members: &[&HoldOut]) -> Vec<PredictionError> {
         (0..first.predictions[window].len()).map(|k| all().map(|one| one[k]).sum::<f64>() / count).collect()
     };
     let means = (0..first.windows.len()).map(mean).collect();
-    let scales = (&first.periodic[..], &first.scales[..]);
+    let (periodic, scales) = &members[0].error_scales;
+    let scales = (&periodic[..], &scales[..]);
     members[0].model.iter().map(|error| prediction_error(&first.windows, &means, scales, error.seconds)).collect()
 }
 

@@ -1,16 +1,13 @@
-//! Pipelines: a training, a fit of recorded motion, an evaluation, an experiment, each from its configuration to model, tables,
-//! pictures and report.
+//! Pipelines: a training, a fit of recorded motion, an evaluation, each from its configuration to model, tables, pictures and
+//! report.
 //!
-//! The command line and every other door call the same functions:
+//! The command line and the Python package call the same functions:
 //!
 //! | function | from | to |
 //! |---|---|---|
 //! | [`train`] | a [`Config`](crate::configuration::Config) | a model of a known system and its [`Evaluation`] |
-//! | [`fit`] | recorded motion and a [`FitConfig`] | a model, judged by motion that was held out ([`HoldOut`]) |
+//! | [`Fit`] | recorded motion | a model, judged by motion that was held out ([`HoldOut`]) |
 //! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
-//! | [`run_experiment`] | an [`Experiment`](crate::experiments::Experiment) | the records of its runs, a table, a report |
-//! | [`finish_runs`] | some of its runs, a machine's share | their records |
-//! | [`merge_experiment`] | the records that several machines made | table and report |
 //!
 //! Files go into an [`Output`], of which a [`Directory`] and [`InMemory`] are two; what happens meanwhile comes as an [`Event`] to
 //! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked (those of experiments are), and files that
@@ -19,9 +16,8 @@
 //! # A fit of recorded motion, judged
 //!
 //! ```
-//! use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
-//! use lnn::recording::{LoadedRecording, Recording, RecordedTrajectory};
-//! use lnn::configuration::Precision;
+//! use lnn::pipeline::Fit;
+//! use lnn::recording::{RecordedTrajectory, Recording};
 //!
 //! // Two swings of a pendulum: an angle every 20 ms.
 //! let swing = |amplitude: f64| -> Vec<f64> { (0..400).map(|k| amplitude * (0.06 * f64::from(k)).sin()).collect() };
@@ -35,17 +31,16 @@
 //!     tracks: vec![trajectory("first", 0.3), trajectory("second", 0.2), trajectory("third", 0.25)],
 //! };
 //!
-//! let loaded = LoadedRecording::from(recording);
-//! let prepared = PreparedFit::new(&loaded, &FitOptions { held_out: 0.3, ..FitOptions::default() })?;
-//! let mut config = prepared.suggest("pendulum", Precision::F32)?;
-//! config.training.network.hidden = vec![8]; // as small as can be: this runs in a moment
-//! (config.training.phases[0].epochs, config.training.phases[0].t_max) = (2, 2.0);
-//!
-//! let files = InMemory::default();
-//! let fitted = fit(&prepared, &config, &RunOptions::default(), &files, &Watch::default())?;
+//! let fit = Fit::recording(recording).options(|options| options.held_out = 0.3).configure(|config| {
+//!     config.training.network.hidden = vec![8]; // as small as can be: this runs in a moment
+//!     (config.training.phases[0].epochs, config.training.phases[0].t_max) = (2, 2.0);
+//! });
+//! # let directory = tempfile::tempdir().unwrap();
+//! # let out = directory.path();
+//! let fitted = fit.out(out).run()?;
 //! assert_eq!(fitted.history.len(), 2);
 //! assert!(fitted.hold_out.model[0].median.is_finite()); // rad, a quarter of the horizon ahead
-//! assert!(files.get("report.html").is_some() && files.get("model.safetensors").is_some());
+//! assert!(out.join("report.html").exists() && out.join("model.safetensors").exists());
 //! # Ok::<(), lnn::pipeline::PipelineError>(())
 //! ```
 
@@ -91,8 +86,7 @@ mod train;
 mod watch;
 
 #[doc(hidden)]
-pub use checkpoints::Begin;
-pub use checkpoints::Checkpoints;
+pub use checkpoints::{Begin, Checkpoints};
 #[doc(hidden)]
 pub use determination::Determined;
 #[doc(hidden)]
@@ -114,6 +108,7 @@ pub use experiment_report::{ExperimentReport, Results};
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, PLAY, RECORD, SUMMARY};
 pub use fit::FitReport;
+#[doc(hidden)]
 pub use fit::fit;
 pub use fit_builder::Fit;
 pub(crate) use fit_config::unit;
@@ -128,7 +123,7 @@ pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_h
 #[doc(hidden)]
 pub use members::{Member, Members};
 #[doc(hidden)]
-pub use model::{HELD, model_file, trained_on};
+pub use model::{CONSTRAINTS_UNSUPPORTED, model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
 #[doc(hidden)]
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
@@ -137,9 +132,9 @@ pub use prepared_fit::PreparedFit;
 #[doc(hidden)]
 pub use start::StartModel;
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
-pub use watch::Watch;
 #[doc(hidden)]
-pub use watch::{Event, EventSink};
+pub use watch::EventSink;
+pub use watch::{Event, Watch};
 
 pub(crate) use fit::usual_force;
 pub(crate) use model::all_parameters;

@@ -9,8 +9,9 @@ use crate::scalar::Scalar;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What is said of a motion that constraints hold where free coordinates alone are known.
-pub const HELD: &str = "the motion has constraints, which this command does not support; see `lnn constraints`";
+/// Message of commands that know free coordinates alone, about a motion under constraints.
+pub const CONSTRAINTS_UNSUPPORTED: &str =
+    "the motion has constraints, which this command does not support; see `lnn constraints`";
 
 /// The file of a model that is given by its file or by the directory of its run.
 ///

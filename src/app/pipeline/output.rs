@@ -33,11 +33,6 @@ impl Directory {
         Ok(Self { path: path.to_path_buf() })
     }
 
-    /// The directory of a path, which must be there when something is written.
-    pub fn at(path: &Path) -> Self {
-        Self { path: path.to_path_buf() }
-    }
-
     /// The path.
     pub(crate) fn path(&self) -> &Path {
         &self.path

@@ -14,6 +14,7 @@ const PILOT: usize = 40;
 const PART: usize = 32;
 
 /// Windows with what a model makes of them.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct HeldOutPredictions {
     /// The windows that were predicted.
     pub windows: Vec<Window>,

@@ -76,6 +76,7 @@ pub struct RunOptions {
     /// Fraction of the time span of the trajectory test.
     pub span: f64,
     /// Checkpoints, if they are wanted.
+    #[doc(hidden)]
     pub checkpoints: Option<Checkpoints>,
 }
 
@@ -110,6 +111,7 @@ impl TrainReport {
     ///
     /// # Errors
     /// [`PipelineError::Format`].
+    #[doc(hidden)]
     pub fn json(&self) -> Result<String, PipelineError> {
         let summary = Summary { figures: &self.figures, evaluation: &self.evaluation };
         Ok(serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n")

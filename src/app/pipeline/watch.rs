@@ -102,6 +102,7 @@ impl Watch {
     }
 
     /// The same for a training.
+    #[doc(hidden)]
     pub fn hooks(&self) -> Hooks {
         let watcher = self.events.clone().map(|events| {
             let watcher: crate::training::Watcher = Arc::new(move |progress: Progress<'_>| match progress {

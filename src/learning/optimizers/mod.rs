@@ -43,6 +43,7 @@ macro_rules! methods {
             pub const NAMES: &'static str = methods!(@names $($text)*);
 
             /// Its name in the literature.
+            #[doc(hidden)]
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $title,)*
@@ -121,6 +122,7 @@ pub struct Moments<S> {
 
 impl<S: Scalar> Moments<S> {
     /// Zero moments for this many parameters.
+    #[doc(hidden)]
     pub fn new(parameters: usize) -> Self {
         let zeros = vec![<S as Real>::zero(); parameters];
         Self { first: zeros.clone(), second: zeros, step: 0, bases: Vec::new() }
@@ -130,6 +132,7 @@ impl<S: Scalar> Moments<S> {
     ///
     /// # Panics
     /// If the matrices overlap or end past the parameters.
+    #[doc(hidden)]
     pub fn for_method(
         method: Method,
         parameters: usize,
@@ -341,7 +344,7 @@ impl Schedule {
     /// Learning rate after a fraction of the phase.
     ///
     /// `epoch` counts from 0 and may be fractional; `epochs` is the length of the phase.
-    pub fn rate(self, rate: f64, eta_min: f64, t_max: f64, epoch: f64, epochs: f64) -> f64 {
+    pub(crate) fn rate(self, rate: f64, eta_min: f64, t_max: f64, epoch: f64, epochs: f64) -> f64 {
         let cosine = |phase: f64| eta_min + 0.5 * (rate - eta_min) * (1.0 + (std::f64::consts::PI * phase).cos());
         match self {
             Self::Constant => rate,

@@ -15,6 +15,7 @@ mod trainer;
 
 #[doc(hidden)]
 pub(crate) use measured::restructure;
+#[doc(hidden)]
 pub use measured::suggested;
 pub use preset::Preset;
 pub use trainer::{Learned, Trainer, TrainerError};

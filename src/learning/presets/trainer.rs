@@ -1,6 +1,6 @@
 //! Learning from arrays of states: the quick preset's choices, changed by a builder.
 
-use crate::configuration::{Config, ConfigError, Precision, Regularizer};
+use crate::configuration::{Config, ConfigError, Precision};
 use crate::data::{Dataset, DatasetError, Datasets};
 use crate::lagrangian::{EulerLagrange, FormulaConstraints, FormulaError};
 use crate::network::file::{Header, ModelFile, ModelFileError};
@@ -153,18 +153,6 @@ impl<'a> Trainer<'a> {
         self
     }
 
-    /// Penalty on mass matrices of a wrong signature.
-    pub fn penalty(mut self, penalty: Regularizer) -> Self {
-        self.config.penalty = penalty;
-        self
-    }
-
-    /// Learns a Rayleigh dissipation with this many units beside the Lagrangian.
-    pub fn dissipation(mut self, units: usize) -> Self {
-        self.config.network.dissipation = Some(units);
-        self
-    }
-
     /// Precision of weights and arithmetic in training.
     pub fn precision(mut self, precision: Precision) -> Self {
         self.config.precision = precision;
@@ -200,6 +188,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     /// [`TrainerError`].
+    #[doc(hidden)]
     pub fn train_watched(self, hooks: &Hooks) -> Result<Learned, TrainerError> {
         match self.config.precision {
             Precision::F32 => self.train_in::<f32>(hooks),
@@ -285,6 +274,7 @@ impl Learned {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::configuration::Regularizer;
     use crate::lagrangian::EulerLagrange;
 
     /// Two uncoupled oscillators, `a_i = -(i + 1) q_i`.
@@ -325,7 +315,9 @@ mod tests {
         assert!(matches!(refusal(new().coordinates(&["x"])), TrainerError::Config(e) if e.field == "coordinates"));
         assert!(matches!(refusal(new().angles(&[2])), TrainerError::Config(e) if e.field == "angles"));
         let penalty = Regularizer::LorentzianSylvester { lambda: 1.0, time: "t".to_string() };
-        assert!(matches!(refusal(new().penalty(penalty)), TrainerError::Config(e) if e.field == "penalty.time"));
+        assert!(
+            matches!(refusal(new().configure(|config| config.penalty = penalty)), TrainerError::Config(e) if e.field == "penalty.time")
+        );
         assert!(matches!(refusal(new().epochs(0)), TrainerError::Training(TrainingError::Config(_))));
         let few = states(2);
         assert!(matches!(refusal(Trainer::new(&few)), TrainerError::TooFew { found: 2 }));

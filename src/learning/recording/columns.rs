@@ -37,7 +37,7 @@ pub struct ColumnsError(pub String);
 
 impl Columns {
     /// SI units of the coordinates as far as they are given, empty texts otherwise.
-    pub fn coordinate_units(&self) -> Vec<String> {
+    pub(crate) fn coordinate_units(&self) -> Vec<String> {
         let unit = |name: &String| self.units.iter().find(|(column, _)| column == name).and_then(|(_, unit)| si(unit));
         self.coords.iter().map(|name| unit(name).unwrap_or_default()).collect()
     }

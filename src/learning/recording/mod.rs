@@ -1,9 +1,7 @@
 //! Recorded motion, estimates of its derivatives, and a survey of its quality.
 //!
 //! ```
-//! use lnn::recording::Columns;
-//! use lnn::recording::read::read_recording;
-//! use lnn::recording::smooth::{SmoothOptions, Smoothing};
+//! use lnn::recording::{Columns, SmoothOptions, Smoothing, read_recording};
 //!
 //! // Angles of a double pendulum every 10 ms, several runs in one file.
 //! let angles = ["theta1", "theta2"].map(String::from).to_vec();
@@ -22,10 +20,13 @@ mod columns;
 mod hermite;
 mod hold_out;
 #[cfg(feature = "data")]
+#[doc(hidden)]
 pub mod read;
 mod reading;
+#[doc(hidden)]
 pub mod smooth;
 mod statistics;
+#[doc(hidden)]
 pub mod survey;
 mod track;
 mod units;
@@ -38,11 +39,13 @@ pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
 #[doc(hidden)]
 pub use hold_out::HoldOutError;
+pub use read::{DataError, Problem, read_recording};
 pub use reading::LoadedRecording;
 #[doc(hidden)]
 pub use reading::Targets;
 #[doc(hidden)]
 pub use reading::{Bridged, Cut, Dropped, Rows};
 pub(crate) use reading::{INERTIAL, LARGE_ERROR};
+pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub(crate) use units::factor;

@@ -81,6 +81,7 @@ impl RecordedTrajectory {
     ///
     /// # Errors
     /// The first [`TrajectoryError`].
+    #[doc(hidden)]
     pub fn validate(&self, n: usize) -> Result<(), TrajectoryError> {
         let track = || self.name.clone();
         let expected = self.len() * n;
@@ -135,6 +136,7 @@ impl Recording {
     }
 
     /// Samples of all trajectories.
+    #[doc(hidden)]
     pub fn samples(&self) -> usize {
         self.tracks.iter().map(RecordedTrajectory::len).sum()
     }

@@ -15,10 +15,10 @@ pub(crate) mod solver;
 pub(crate) mod trainer;
 pub(crate) mod violations;
 
-pub use checkpoint::{CheckpointError, CheckpointInterval};
 #[doc(hidden)]
 pub use checkpoint::{
-    CheckpointManager, Fingerprint, LATEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
+    CheckpointError, CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Restored, Saved, Snapshot,
+    remove_checkpoints, saved,
 };
 pub use epoch::Epoch;
 #[doc(hidden)]

@@ -43,6 +43,7 @@ pub struct Trained<S> {
 impl<S: Scalar> Trained<S> {
     /// The end of this training as a checkpoint holds it, for what goes on from there, such as
     /// [`shooting::resume`](crate::shooting::resume).
+    #[doc(hidden)]
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
         let outcome = Outcome {
             phases: config.phases.len(),

@@ -142,7 +142,7 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion, or a model of other coordinates.
-    pub fn constrain<'a>(
+    pub(crate) fn constrain<'a>(
         &self,
         model: Box<dyn EulerLagrange<S> + 'a>,
     ) -> Result<Box<dyn EulerLagrange<S> + 'a>, SystemError> {
@@ -156,11 +156,11 @@ impl<S: Scalar> SystemInstance<S> {
         Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
     }
     /// The constraints of a system by its description.
-    pub fn constraints(&self) -> Option<&ExpressionConstraints> {
+    pub(crate) fn constraints(&self) -> Option<&ExpressionConstraints> {
         self.system.described.as_ref()?.constraints.as_ref()
     }
     /// The dissipation function of a system by its description; its parameters are the Lagrangian's.
-    pub fn dissipation(&self) -> Option<&ExpressionLagrangian> {
+    pub(crate) fn dissipation(&self) -> Option<&ExpressionLagrangian> {
         self.system.described.as_ref()?.dissipation.as_ref()
     }
     /// The same with the values of the parameters.
@@ -193,6 +193,7 @@ impl<S: Scalar> SystemInstance<S> {
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
     /// [`SystemInstance::build`] gives.
+    #[doc(hidden)]
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
         if self.constraints().is_some() {
@@ -206,6 +207,7 @@ impl<S: Scalar> SystemInstance<S> {
         })
     }
     /// Index of the coordinate whose velocity the mass shell fixes.
+    #[doc(hidden)]
     pub fn constrained_coordinate(&self) -> Option<usize> {
         self.system.time_like.filter(|_| self.system.constraint.is_some())
     }
@@ -216,6 +218,7 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length.
+    #[doc(hidden)]
     pub fn impose_constraint(&self, q: &[S], v: &mut [S]) -> Result<(), SystemError> {
         self.check_lengths(q, v)?;
         let velocity = match &self.system.described {
@@ -238,6 +241,7 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// The condition that the coordinates violate.
+    #[doc(hidden)]
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
         self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }

@@ -8,6 +8,7 @@ use crate::scalar::{Real, Scalar, update};
 
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
+    #[doc(hidden)]
     pub fn clear(&mut self) {
         let Self {
             lagrangian,
@@ -81,6 +82,7 @@ impl<S: Scalar> Terms<S> {
     /// # Errors
     /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite, every such row in
     /// [`Terms::failures`]; accelerations that cannot be solved for are `NaN`, everything else is filled.
+    #[doc(hidden)]
     pub fn complete(
         &mut self,
         n: usize,

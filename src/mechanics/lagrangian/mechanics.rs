@@ -116,10 +116,6 @@ impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
         };
         Self { system, evaluator }
     }
-    /// The values of the parameters.
-    pub fn parameters(&self) -> &[S] {
-        &self.evaluator.parameters
-    }
 }
 
 impl<S: Scalar> Evaluator<S> {

@@ -13,6 +13,7 @@ mod error;
 mod euler_lagrange;
 mod expression;
 mod mechanics;
+#[doc(hidden)]
 pub mod system;
 #[doc(hidden)]
 pub mod systems;
@@ -21,21 +22,20 @@ mod terms;
 mod wrappers;
 
 pub(crate) use configure::{LagrangianVisitor, resolve};
-pub use configure::{SystemError, SystemInstance, configure, find, systems};
+pub use configure::{SystemError, SystemInstance, configure, systems};
 #[doc(hidden)]
-pub use configure::{build, configure_system, configure_values};
+pub use configure::{build, configure_system, configure_values, find};
+#[doc(hidden)]
 pub use constrained_systems::constrained_systems;
 #[cfg(feature = "data")]
 pub(crate) use constraints::take_out;
 #[cfg(feature = "training")]
 pub(crate) use constraints::{Bordered, independent_rows};
-pub use constraints::{
-    Constrained, ConstraintError, Constraints, ExpressionConstraints, FormulaConstraints, FormulaError,
-};
+pub use constraints::{Constrained, ConstraintError, Constraints, FormulaError};
 #[doc(hidden)]
 pub use constraints::{
-    LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, RowAdjoint, project,
-    project_acceleration,
+    ExpressionConstraints, FormulaConstraints, LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold,
+    ReducedMass, RowAdjoint, project, project_acceleration,
 };
 #[doc(hidden)]
 pub use derivatives::MetricJet;
@@ -53,6 +53,7 @@ pub use expression::ExpressionLagrangian;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
 pub use mechanics::Mechanics;
+pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
 #[doc(hidden)]

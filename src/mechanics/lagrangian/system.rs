@@ -72,6 +72,7 @@ pub enum Size {
 
 impl Size {
     /// The number of coordinates unless chosen otherwise.
+    #[doc(hidden)]
     pub const fn default(self) -> usize {
         match self {
             Self::Fixed(n) => n,
@@ -91,13 +92,14 @@ pub struct Bounds {
 
 impl Bounds {
     /// The same for each of `n` coordinates.
-    pub fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
+    pub(crate) fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
         Self { positions: vec![position; n], velocities: vec![velocity; n] }
     }
 }
 
 /// The paper's trajectory test of a system.
 #[derive(Clone, Debug, PartialEq)]
+#[doc(hidden)]
 pub struct TrajectoryTest {
     /// Box of the random starts.
     pub start: Bounds,
@@ -255,6 +257,7 @@ pub struct System {
 
 impl System {
     /// The description that the system was made from; none for a system of the catalogue.
+    #[doc(hidden)]
     pub fn description(&self) -> Option<&Description> {
         self.described.as_deref().map(|described| &described.description)
     }
@@ -263,22 +266,22 @@ impl System {
         self.coordinates.of(n)
     }
     /// Box of the training states of `n` coordinates.
+    #[doc(hidden)]
     pub fn training(&self, n: usize) -> Bounds {
         self.training.of(n)
     }
     /// Box of the states of `n` coordinates on which errors are stated.
+    #[doc(hidden)]
     pub fn validation(&self, n: usize) -> Bounds {
         self.validation.of(n)
     }
     /// Trajectory test of `n` coordinates.
+    #[doc(hidden)]
     pub fn trajectory(&self, n: usize) -> TrajectoryTest {
         self.trajectory.of(n)
     }
-    /// For every parameter whether its value is to be found by the training.
-    pub fn learned_parameters(&self) -> Vec<bool> {
-        self.parameters.iter().map(|parameter| parameter.learn).collect()
-    }
     /// Names of the columns of a state of `n` coordinates: coordinates, then velocities (`theta1_dot`).
+    #[doc(hidden)]
     pub fn columns(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.name.to_string());

@@ -98,6 +98,7 @@ macro_rules! choices {
             pub const NAMES: &'static str = concat!($($text, ", ",)* "quadratic-softplus");
 
             /// Activation of each branch; the branches share the widths equally.
+            #[doc(hidden)]
             pub fn branches(self) -> &'static [Activation] {
                 match self {
                     $(Self::$name => &[Activation::$name],)*
@@ -112,6 +113,7 @@ crate::ops::activations! { choices }
 
 impl ActivationChoice {
     /// The name in configuration files.
+    #[doc(hidden)]
     pub fn name(self) -> &'static str {
         match self.branches() {
             [single] => single.name(),

@@ -73,6 +73,7 @@ impl Architecture {
     ///
     /// # Panics
     /// If the architecture contradicts itself (see [`Architecture::validate`]).
+    #[doc(hidden)]
     pub fn model<S: Scalar>(&self) -> Model<S> {
         let scale = || self.scale.iter().map(|&s| S::of_f64(s)).collect();
         let layout = Layout::new(self);

@@ -20,6 +20,7 @@
 mod config;
 mod dynamics;
 #[cfg(feature = "model-files")]
+#[doc(hidden)]
 pub mod file;
 mod joint_friction;
 mod layout;
@@ -33,6 +34,8 @@ pub use config::UnknownActivation;
 pub use config::{ActivationChoice, Architecture, Initialization, InputLayer};
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Model};
+#[cfg(feature = "model-files")]
+pub use file::{Header, ModelFile, ModelFileError};
 #[doc(hidden)]
 pub use joint_friction::JointFriction;
 #[doc(hidden)]

@@ -51,6 +51,7 @@ impl Architecture {
     ///
     /// # Errors
     /// The first thing that does not fit, in words.
+    #[doc(hidden)]
     pub fn validate(&self) -> Result<(), NetworkError> {
         let n = self.coordinates;
         let fault = |text: String| Err(NetworkError::Architecture(text));
@@ -141,6 +142,7 @@ impl<S: Scalar> NetworkLagrangian<S> {
     }
 
     /// Shape of the network.
+    #[doc(hidden)]
     pub fn architecture(&self) -> &Architecture {
         &self.architecture
     }
@@ -149,6 +151,7 @@ impl<S: Scalar> NetworkLagrangian<S> {
         &self.weights
     }
     /// The same network in another precision.
+    #[doc(hidden)]
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
         let model = self.architecture.model();

@@ -28,6 +28,10 @@ pub enum Integrator {
 }
 
 impl Integrator {
+    /// Every integrator.
+    pub const ALL: [Self; 6] =
+        [Self::Dopri5, Self::Dop853, Self::Midpoint, Self::Gauss4, Self::Gauss6, Self::Variational];
+
     /// Its name, as in a configuration.
     pub(crate) const fn name(self) -> &'static str {
         match self {
@@ -41,6 +45,7 @@ impl Integrator {
     }
 
     /// `true` if steps are fixed and the motion is symplectic.
+    #[doc(hidden)]
     pub const fn is_structure_preserving(self) -> bool {
         !matches!(self, Self::Dopri5 | Self::Dop853)
     }

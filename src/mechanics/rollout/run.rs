@@ -20,6 +20,7 @@ pub struct Rollout<S> {
 
 impl<S: Scalar> Rollout<S> {
     /// `true` if `t_end` was reached.
+    #[doc(hidden)]
     pub fn is_complete(&self) -> bool {
         self.stop.is_none()
     }

@@ -50,6 +50,7 @@ pub(super) const CHUNK: usize = 256;
 
 impl<S: Scalar> Trajectory<S> {
     /// No states of `n` coordinates.
+    #[doc(hidden)]
     pub fn empty(coordinates: usize) -> Self {
         Self { coordinates, t: Vec::new(), q: Vec::new(), v: Vec::new(), energy: None }
     }
@@ -81,6 +82,7 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot say.
+    #[doc(hidden)]
     pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
         let size = CHUNK * self.coordinates.max(1);
         let mut energy = Vec::with_capacity(self.len());
@@ -101,6 +103,7 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// The same states in another precision.
+    #[doc(hidden)]
     pub fn cast<T: Scalar>(&self) -> Trajectory<T> {
         let cast = |values: &[S]| values.iter().map(|&x| x.cast()).collect::<Vec<T>>();
         Trajectory {
@@ -146,6 +149,7 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// The lines of [`Trajectory::to_csv`] below its header.
+    #[doc(hidden)]
     pub fn csv_rows(&self) -> String {
         let mut text = String::new();
         for (k, t) in self.t.iter().enumerate() {

@@ -31,11 +31,12 @@ mod solve;
 
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
+#[doc(hidden)]
 pub use condition::condition_number;
 pub use eigen::{eigenvalues, eigh};
-pub use inertia::{Inertia, inertia, is_positive_definite};
+pub use inertia::Inertia;
 #[doc(hidden)]
-pub use inertia::{Scaled, adjugate, leading_minors};
+pub use inertia::{Scaled, adjugate, inertia, is_positive_definite, leading_minors};
 #[doc(hidden)]
 pub use matmul::{MatMut, MatRef, gemm};
 #[doc(hidden)]
@@ -46,7 +47,9 @@ pub use signature::{
 pub(crate) use singular::singular;
 #[doc(hidden)]
 pub use singular::{MinimumNorm, minimum_norm};
-pub use solve::{inverse, solve};
+#[doc(hidden)]
+pub use solve::inverse;
+pub use solve::solve;
 
 use serde::{Deserialize, Serialize};
 

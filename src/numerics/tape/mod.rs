@@ -45,13 +45,13 @@ mod program;
 mod var;
 
 #[doc(hidden)]
-pub use eager::TapeSize;
-pub use eager::{Adjoints, Tape};
+pub use eager::{Adjoints, Tape, TapeSize};
 pub use engine::{Depth, Evaluation, Recorded};
 #[doc(hidden)]
 pub use engine::{MixedDirections, STATES};
 #[doc(hidden)]
 pub use program::{Listing, Operation, Program, Replay, Tracer};
+#[doc(hidden)]
 pub use var::Var;
 
 use crate::forward::Dual;
@@ -147,6 +147,7 @@ pub fn gradient_on<T: Real>(
 ///
 /// # Errors
 /// [`TapeError::Shape`] if `direction` is not as long as `x`.
+#[doc(hidden)]
 pub fn derivative<T: Real>(f: &impl ScalarFunction, x: &[T], direction: &[T]) -> Result<(T, T), TapeError> {
     check_length("direction", x.len(), direction.len())?;
     let y = f.eval(&seeded(x, direction));
@@ -159,6 +160,7 @@ pub fn derivative<T: Real>(f: &impl ScalarFunction, x: &[T], direction: &[T]) ->
 ///
 /// # Errors
 /// The tape's: see [`TapeError`].
+#[doc(hidden)]
 pub fn jacobian<T: Real>(f: &impl VectorFunction, x: &[T]) -> Result<(Vec<T>, Vec<T>), TapeError> {
     let (n, m) = (x.len(), f.outputs());
     let mut matrix = vec![T::zero(); m * n];
@@ -194,6 +196,7 @@ pub fn jacobian<T: Real>(f: &impl VectorFunction, x: &[T]) -> Result<(Vec<T>, Ve
 ///
 /// # Errors
 /// The tape's, and [`TapeError::Shape`] if `direction` is not as long as `x`.
+#[doc(hidden)]
 pub fn hessian_vector<T: Real>(
     f: &impl ScalarFunction,
     x: &[T],

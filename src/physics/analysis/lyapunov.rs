@@ -22,18 +22,13 @@ pub struct Lyapunov {
 
 impl Lyapunov {
     /// `1 / exponent`: infinite unless the exponent is positive.
-    pub fn lyapunov_time(&self) -> f64 {
+    pub(crate) fn lyapunov_time(&self) -> f64 {
         if self.exponent > 0.0 { 1.0 / self.exponent } else { f64::INFINITY }
     }
 
     /// `true` if neighbouring motions part faster than those of regular motion do.
-    pub fn is_chaotic(&self) -> bool {
+    pub(crate) fn is_chaotic(&self) -> bool {
         self.exponent * self.time >= REGULAR + (self.time / LONG).ln().max(0.0)
-    }
-
-    /// Time after which an error `initial` has grown to `allowed` by chaos alone: `ln(allowed / initial) / exponent`.
-    pub fn horizon(&self, initial: f64, allowed: f64) -> f64 {
-        (allowed / initial).ln().max(0.0) * self.lyapunov_time()
     }
 }
 
@@ -117,7 +112,6 @@ mod tests {
         let hill = lyapunov(&Hill, &[0.0], &[0.0], &options).unwrap();
         assert!((hill.exponent - 1.0).abs() < 0.05, "{hill:?}");
         assert!((hill.lyapunov_time() - 1.0).abs() < 0.05);
-        assert!((hill.horizon(1e-6, 1e-3) - 1000.0_f64.ln()).abs() < 0.5);
         let calm = lyapunov(&OSCILLATOR, &[1.0], &[0.0], &Options::<f64>::reference(20.0, 0.5)).unwrap();
         assert!(calm.exponent.abs() < 1e-3, "{calm:?}");
         assert!(hill.is_chaotic() && !calm.is_chaotic());

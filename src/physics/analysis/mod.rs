@@ -40,9 +40,9 @@ pub use distance::{
 pub(crate) use distance::{angle_difference, relative_error};
 #[doc(hidden)]
 pub(crate) use energy::conserved_change;
-pub use energy::{EnergyError, conserved_error, energy_error};
+pub use energy::{EnergyError, energy_error};
 #[doc(hidden)]
-pub use energy::{EnergyLoss, energy_drift, energy_loss};
+pub use energy::{EnergyLoss, conserved_error, energy_drift, energy_loss};
 #[doc(hidden)]
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub(crate) use grid::{
@@ -59,8 +59,12 @@ pub(crate) use prediction::{coordinate_errors, window_valid_times};
 pub(crate) use statistics::training_instability;
 #[doc(hidden)]
 pub use statistics::{ErrorDistribution, Statistics, statistics, stretches};
+pub(crate) use terms::wrong_signatures;
 pub(crate) use terms::{AffineFit, affine_fit, factor_fit, matrices_at_rest, nearest_factor};
-pub use terms::{MassMatrixError, acceleration_errors, mass_matrix_error, mass_matrix_error_within, wrong_signatures};
+pub use terms::{MassMatrixError, mass_matrix_error};
+#[doc(hidden)]
+pub use terms::{acceleration_errors, mass_matrix_error_within};
 #[doc(hidden)]
 pub use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
+#[doc(hidden)]
 pub use tube::{Tube, TubeError};

@@ -82,7 +82,7 @@ fn score(window: &Window, predicted: &[f64], n: usize, size: impl Fn(f64) -> Vec
 
 impl Tube {
     /// Whole motions that a tube of this share takes at least.
-    pub fn needed(share: f64) -> usize {
+    pub(crate) fn needed(share: f64) -> usize {
         2 * calibrating(share)
     }
 

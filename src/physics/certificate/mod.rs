@@ -22,7 +22,7 @@
 //! ```
 //! use lnn::certificate::{Options, Signature, Verdict, certify_system};
 //! use lnn::lagrangian::configure;
-//! use lnn::lagrangian::system::Bounds;
+//! use lnn::lagrangian::Bounds;
 //!
 //! let pendulum = configure::<f64>("double-pendulum", &[])?;
 //! let region = Bounds::uniform(2, (-3.2, 3.2), (-9.0, 9.0)); // rad, rad/s
@@ -74,6 +74,7 @@ pub struct Signature {
 
 impl Signature {
     /// Of `n` coordinates, one of which may be a time: all positive but one for the time.
+    #[doc(hidden)]
     pub fn of(n: usize, time_like: bool) -> Self {
         let negative = usize::from(time_like && n > 0);
         Self { positive: n - negative, negative }

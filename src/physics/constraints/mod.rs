@@ -14,6 +14,7 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
+#[doc(hidden)]
 pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
 pub use samples::MotionSamples;
 
@@ -25,10 +26,12 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Most terms that are looked at together.
-pub const MOST_TERMS: usize = 1000;
+const MOST_TERMS: usize = 1000;
 /// Largest degree of terms that is looked at.
+#[doc(hidden)]
 pub const MOST_DEGREE: usize = 8;
 /// States at which a Lagrangian is examined, usually.
+#[doc(hidden)]
 pub const EXAMINED_STATES: usize = 64;
 /// A row beside others whose part outside of them is, root mean square, below this share follows from them.
 const OUTSIDE: f64 = 0.15;

@@ -70,6 +70,7 @@ impl MotionSamples {
     ///
     /// # Errors
     /// [`SmoothError::Shape`] of a trajectory without velocities.
+    #[doc(hidden)]
     pub fn exact(recording: &Recording) -> Result<Self, SmoothError> {
         let n = recording.n();
         let mut samples = Self {
@@ -93,19 +94,15 @@ impl MotionSamples {
     }
 
     /// Number of coordinates.
-    pub fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.names.len()
     }
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.states.len() / (2 * self.n()).max(1)
     }
-    /// `true` without samples.
-    pub fn is_empty(&self) -> bool {
-        self.states.is_empty()
-    }
     /// Number of trajectories.
-    pub fn trajectories(&self) -> usize {
+    pub(crate) fn trajectories(&self) -> usize {
         self.starts.len()
     }
     /// Samples that count as one where errors are shared.

@@ -290,7 +290,7 @@ impl FoundFormula {
     }
 
     /// What there is to say of it, the dissipation if one was looked for.
-    pub fn summary(&self, friction: bool, seed: u64) -> FormulaSummary<'_> {
+    pub(crate) fn summary(&self, friction: bool, seed: u64) -> FormulaSummary<'_> {
         FormulaSummary {
             verdict: self.verdict,
             lagrangian: self.text(false),

@@ -41,7 +41,12 @@ mod wald;
 mod weak;
 
 pub use error::FormulaError;
-pub use find::{FormulaOptions, MOST_BOOTSTRAPS, formula_of_motion};
-pub use found::{FormulaSummary, FoundFormula, FoundTerm, Left, Near, Verdict};
+#[doc(hidden)]
+pub use find::MOST_BOOTSTRAPS;
+pub use find::{FormulaOptions, formula_of_motion};
+pub(crate) use found::FormulaSummary;
+pub use found::{FoundFormula, FoundTerm, Left, Near, Verdict};
 pub use library::Families;
-pub use regress::{MODEL_STATES, formula_of_model};
+#[doc(hidden)]
+pub use regress::MODEL_STATES;
+pub use regress::formula_of_model;

@@ -33,12 +33,11 @@ mod orbits;
 mod surfaces;
 mod tensors;
 
-pub use orbits::CircularOrbit;
 #[doc(hidden)]
-pub use orbits::{Equator, Sense, Symmetric, Turn, TurningPoint};
+pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn, TurningPoint};
 #[doc(hidden)]
-pub use surfaces::{Change, grid};
-pub use surfaces::{Character, Surface, characters, surfaces};
+pub use surfaces::{Change, characters, grid};
+pub use surfaces::{Character, Surface, surfaces};
 pub use tensors::{Connection, Curvature, Metric};
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};

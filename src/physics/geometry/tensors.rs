@@ -35,6 +35,7 @@ impl<S: Scalar> Metric<S> {
     /// # Errors
     /// [`GeometryError::Shape`], [`GeometryError::NotFinite`]; [`GeometryError::Degenerate`] where it is singular to working
     /// precision in any units of the coordinates.
+    #[doc(hidden)]
     pub fn new(n: usize, components: &[S]) -> Result<Self, GeometryError> {
         super::expect_length("metric", n * n, components.len())?;
         let mut found = vec![S::nan(); n * n];
@@ -118,13 +119,6 @@ impl<S: Scalar> Connection<S> {
     /// The same in other numbers.
     pub(super) fn rounded<T: Scalar>(&self) -> Connection<T> {
         Connection { n: self.n, lowered: rounded(&self.lowered), symbols: rounded(&self.symbols) }
-    }
-
-    /// `G^k_ij u^i w^j`, `(n)`; `-G^k_ij v^i v^j` is the acceleration of a geodesic.
-    pub fn contracted(&self, u: &[S], w: &[S]) -> Vec<S> {
-        let n = self.n;
-        let row = |row: &[S]| dot(row.iter().copied(), w.iter().copied());
-        self.symbols.chunks_exact(n * n).map(|k| dot(k.chunks_exact(n).map(row), u.iter().copied())).collect()
     }
 
     /// Covariant derivative `V^a_;b = d_b V^a + G^a_bc V^c` at `[a][b]`, `(n, n)`, of a vector field with the components

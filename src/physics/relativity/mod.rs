@@ -39,19 +39,18 @@ pub use camera::{MOST_PIXELS, Tetrad};
 pub use coordinates::CentralCoordinates;
 pub use coordinates::Chart;
 pub(crate) use coordinates::depends_on_time;
-pub use orbits::{Infall, Orbit, RadialPeriod, infall, orbits, radial_period};
-pub use rays::{Ray, RayOutcome, trace};
+pub(crate) use orbits::{Orbit, orbits};
+pub use rays::{Ray, RayOutcome};
 #[doc(hidden)]
-pub use rays::{TOLERANCES, Tracing};
+pub use rays::{TOLERANCES, Tracing, trace};
 #[cfg(feature = "training")]
 #[doc(hidden)]
 pub use readings::{LearnedHole, Reading, nearest_parameters};
 #[doc(hidden)]
 pub use shadow::Difference;
 pub use shadow::{Edge, Outline, Shadow, outline, shadow};
-pub use sky::Image;
 #[doc(hidden)]
-pub use sky::{Sky, difference_image};
+pub use sky::{Image, Sky, difference_image};
 
 use crate::geometry::GeometryError;
 use crate::lagrangian::MechanicsError;

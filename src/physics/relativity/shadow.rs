@@ -147,19 +147,19 @@ impl Outline {
     }
 
     /// The edge right of the centre.
-    pub fn right(&self) -> Edge {
+    pub(crate) fn right(&self) -> Edge {
         self.quarter(0)
     }
     /// The edge above the centre.
-    pub fn top(&self) -> Edge {
+    pub(crate) fn top(&self) -> Edge {
         self.quarter(1)
     }
     /// The edge left of the centre.
-    pub fn left(&self) -> Edge {
+    pub(crate) fn left(&self) -> Edge {
         self.quarter(2)
     }
     /// The edge below the centre.
-    pub fn bottom(&self) -> Edge {
+    pub(crate) fn bottom(&self) -> Edge {
         self.quarter(3)
     }
 }

@@ -9,15 +9,6 @@ use lnn::rollout::{
 };
 use lnn::scalar::{Dd, Real, Scalar};
 
-const METHODS: [Integrator; 6] = [
-    Integrator::Dopri5,
-    Integrator::Dop853,
-    Integrator::Midpoint,
-    Integrator::Gauss4,
-    Integrator::Gauss6,
-    Integrator::Variational,
-];
-
 /// A free mass of 1 kg.
 struct Mass;
 impl Lagrangian for Mass {
@@ -84,7 +75,7 @@ fn a_force_in_time_by_every_method_and_in_both_directions() {
         [factor * ((w * t).cos() - t.cos()), factor * (t.sin() - w * (w * t).sin())]
     };
     let driven = Driven::new(&model, &push);
-    for method in METHODS {
+    for method in Integrator::ALL {
         for (t0, t_end) in [(0.0, 6.05), (1.5, -2.0)] {
             let start = exact(t0);
             let options = Options { t0, ..options(method, t_end, STEP) };
@@ -109,7 +100,7 @@ fn a_force_of_the_state_is_the_same_as_in_the_lagrangian() {
     fn check<S: Integrable>(bound: impl Fn(Integrator) -> f64) {
         let (heavy, light) = (pendulum::<S>(9.81), pendulum::<S>(0.0));
         let (q, v) = ([0.7, -0.4].map(S::of_f64), [0.5, 1.0].map(S::of_f64));
-        for method in METHODS {
+        for method in Integrator::ALL {
             let by_lagrangian = rollout(&heavy, &q, &v, &options(method, 1.0, STEP));
             let by_force = Driven::new(&light, &weight::<S>).rollout(&q, &v, &options(method, 1.0, STEP));
             let (a, b) = (end(&by_lagrangian), end(&by_force));
@@ -136,7 +127,7 @@ fn a_force_of_the_state_is_the_same_as_in_the_lagrangian() {
 fn a_brake_is_a_damped_oscillator() {
     let model = oscillator::<f64>();
     let brake = |_: f64, _: &[f64], v: &[f64], force: &mut [f64]| force[0] = -0.4 * v[0];
-    for method in METHODS {
+    for method in Integrator::ALL {
         let [q, _] = end(&Driven::new(&model, &brake).rollout(&[1.0], &[0.0], &options(method, 5.0, STEP)));
         let w = 0.96_f64.sqrt();
         let exact = (-1.0_f64).exp() * ((5.0 * w).cos() + 0.2 / w * (5.0 * w).sin());
@@ -160,7 +151,7 @@ fn jumps_and_kinks_cost_nothing_where_they_are_known() {
     let (known, unknown) = (Switched(vec![0.333]), Switched(Vec::new()));
     // At 0.333 it is at 0.333^2 with 0.666 m/s; 0.667 s follow.
     let exact = [0.333 * 0.333 + 0.666 * 0.667 - 0.5 * 0.667 * 0.667, 0.666 - 0.667];
-    for method in METHODS {
+    for method in Integrator::ALL {
         let options = Options { dt: 0.25, ..options(method, 1.0, 0.25) };
         let there = end(&Driven::new(&model, &known).rollout(&[0.0], &[0.0], &options));
         assert!((there[0] - exact[0]).abs() < 1e-13 && (there[1] - exact[1]).abs() < 1e-13, "{method:?}: {there:?}");
@@ -176,7 +167,7 @@ fn jumps_and_kinks_cost_nothing_where_they_are_known() {
     let ramp = SampledForce::new(1, vec![0.0, 0.3, 0.7, 1.0], vec![0.0, 3.0, -1.0, 0.5]).unwrap();
     // Velocities are areas of trapezia.
     let velocity = 0.5 * 0.3 * 3.0 + 0.5 * 0.4 * 2.0 + 0.5 * 0.3 * -0.5;
-    for method in METHODS {
+    for method in Integrator::ALL {
         let options = Options { dt: 0.5, ..options(method, 1.0, 0.5) };
         let [_, v] = end(&Driven::new(&model, &ramp).rollout(&[0.0], &[0.0], &options));
         assert!((v - velocity).abs() < 1e-13, "{method:?}: {v} {velocity}");
@@ -268,7 +259,7 @@ fn ensembles_take_a_force_each() {
 fn a_force_that_fails_is_named() {
     let model = mass::<f64>();
     let late = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = if t < 0.55 { 1.0 } else { f64::NAN };
-    for method in METHODS {
+    for method in Integrator::ALL {
         let rolled = Driven::new(&model, &late).rollout(&[0.0], &[0.0], &options(method, 1.0, 0.05));
         let Some(RolloutError::NotFinite { t, what, .. }) = rolled.stop else { panic!("{method:?} {:?}", rolled.stop) };
         assert!(what == "external force" && (0.45..0.56).contains(&t), "{method:?}: {what} {t}");

@@ -94,6 +94,7 @@ pub struct Smoothing {
     /// Degree of the polynomials.
     pub degree: usize,
     /// Every coordinate.
+    #[doc(hidden)]
     pub coordinates: Vec<Chosen>,
     /// Windows in samples of every coordinate on every trajectory of the recording, `(coordinates)(trajectories)`: the usual one but
     /// where another is plainly better. Qualities are means over these.
@@ -139,6 +140,7 @@ pub struct Smoothed {
 
 impl Smoothed {
     /// Samples with full windows.
+    #[doc(hidden)]
     pub fn interior(&self) -> std::ops::Range<usize> {
         let [before, after] = self.margins;
         let end = self.times.len().saturating_sub(after);
@@ -146,6 +148,7 @@ impl Smoothed {
     }
 
     /// `true` for a sample with a full window that no gap spoils.
+    #[doc(hidden)]
     pub fn is_full(&self, sample: usize) -> bool {
         self.interior().contains(&sample) && self.lacking.binary_search(&sample).is_err()
     }

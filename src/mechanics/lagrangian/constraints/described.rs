@@ -43,7 +43,7 @@ impl ExpressionConstraints {
     }
 
     /// What vanishes of one row.
-    pub fn value<R: Real>(&self, row: usize, parameters: &[R], q: &[R], v: &[R]) -> R {
+    pub(crate) fn value<R: Real>(&self, row: usize, parameters: &[R], q: &[R], v: &[R]) -> R {
         self.rows[row].value.evaluate(parameters, q, v)
     }
 

@@ -61,6 +61,7 @@ impl FormulaConstraints {
     ///
     /// # Errors
     /// [`FormulaError`].
+    #[doc(hidden)]
     pub fn new(coordinates: &[impl AsRef<str>], formulas: BTreeMap<String, String>) -> Result<Self, FormulaError> {
         if formulas.is_empty() || formulas.len() > MOST {
             return Err(FormulaError::Number(formulas.len()));
@@ -83,12 +84,12 @@ impl FormulaConstraints {
     }
 
     /// The formulas by name.
-    pub fn formulas(&self) -> &BTreeMap<String, String> {
+    pub(crate) fn formulas(&self) -> &BTreeMap<String, String> {
         &self.formulas
     }
 
     /// The formulas as functions of states.
-    pub fn compiled(&self) -> &ExpressionConstraints {
+    pub(crate) fn compiled(&self) -> &ExpressionConstraints {
         &self.compiled
     }
 
@@ -96,7 +97,7 @@ impl FormulaConstraints {
     ///
     /// # Errors
     /// [`ConstraintError::Shape`] for a model of other coordinates.
-    pub fn constrain<'a, S: Scalar>(
+    pub(crate) fn constrain<'a, S: Scalar>(
         &self,
         model: Box<dyn EulerLagrange<S> + 'a>,
     ) -> Result<Box<dyn EulerLagrange<S> + 'a>, ConstraintError> {
@@ -107,6 +108,7 @@ impl FormulaConstraints {
     ///
     /// # Errors
     /// None, since the coordinates are their own.
+    #[doc(hidden)]
     pub fn manifold<S: Scalar>(&self) -> Result<impl Manifold<S> + use<S>, ConstraintError> {
         self.alone()
     }
@@ -115,7 +117,7 @@ impl FormulaConstraints {
     ///
     /// # Errors
     /// [`FormulaError::Constraints`] for constraints that contradict each other or leave no motion.
-    pub fn independent(mut self, q: &[f64], v: &[f64]) -> Result<(Self, Vec<String>), FormulaError> {
+    pub(crate) fn independent(mut self, q: &[f64], v: &[f64]) -> Result<(Self, Vec<String>), FormulaError> {
         let kept = self.alone()?.independent(q, v)?;
         let redundant = kept.redundant().to_vec();
         if redundant.is_empty() {

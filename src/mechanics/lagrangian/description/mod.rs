@@ -137,7 +137,7 @@ impl TrajectoryDescription {
 
 impl Description {
     /// The same with other values of parameters, by name.
-    pub fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
+    pub(crate) fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
         let mut changed = self.clone();
         for (name, value) in values {
             if let Some(parameter) = changed.parameters.get_mut(*name) {

@@ -30,6 +30,7 @@ impl Description {
     ///
     /// # Errors
     /// The first key that is wrong, and how.
+    #[doc(hidden)]
     pub fn system(&self) -> Outcome<System> {
         let taken = constrained_descriptions().find(|description| description.name == self.name);
         if systems().iter().any(|system| system.name == self.name)

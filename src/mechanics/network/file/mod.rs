@@ -52,6 +52,7 @@ impl<S: Scalar> ModelFile<S> {
     ///
     /// # Errors
     /// A header that contradicts itself, a wrong number of weights, a weight that is not finite.
+    #[doc(hidden)]
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelFileError> {
         self.header.validate()?;
         let slots = slots(&self.header.architecture)?;
@@ -81,6 +82,7 @@ impl<S: Scalar> ModelFile<S> {
     ///
     /// # Errors
     /// [`ModelFileError`] for anything but a whole, undamaged model file of this format.
+    #[doc(hidden)]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelFileError> {
         let (header, file) = unpack::<Header>(&MODEL, bytes)?;
         header.validate()?;
@@ -110,6 +112,7 @@ impl<S: Scalar> ModelFile<S> {
     ///
     /// # Errors
     /// As there.
+    #[doc(hidden)]
     pub fn save_to(&self, files: &dyn Files, path: &Path) -> Result<(), ModelFileError> {
         write_whole(files, path, &self.to_bytes()?).map_err(ModelFileError::Write)
     }
@@ -184,6 +187,7 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
 }
 
 /// Format that this version writes and reads.
+#[doc(hidden)]
 pub const FORMAT: u32 = 1;
 
 /// Most coordinates of a model: the memory of an evaluation grows with their square, that of a file does not.
@@ -276,12 +280,12 @@ impl Header {
     }
 
     /// `true` if constraints hold the motion.
-    pub fn is_constrained(&self) -> bool {
+    pub(crate) fn is_constrained(&self) -> bool {
         !self.held_by().is_empty()
     }
 
     /// The constraints that hold the motion, formulas by name; those of a description have its parameters and definitions in them.
-    pub fn held_by(&self) -> &BTreeMap<String, String> {
+    pub(crate) fn held_by(&self) -> &BTreeMap<String, String> {
         match &self.description {
             Some(description) if self.constraints.is_empty() => &description.constraints,
             _ => &self.constraints,
@@ -292,6 +296,7 @@ impl Header {
     ///
     /// # Errors
     /// [`ContainerError::Header`] for constraints that contradict each other or leave no motion, or a network of other coordinates.
+    #[doc(hidden)]
     pub fn constrain<'a, S: Scalar>(
         &self,
         network: Box<dyn EulerLagrange<S> + 'a>,
@@ -318,7 +323,7 @@ impl Header {
     ///
     /// # Errors
     /// [`ContainerError::Header`] for formulas or parameters that do not fit.
-    pub fn constraints(&self) -> Result<Option<(ExpressionConstraints, Vec<f64>)>, ContainerError> {
+    pub(crate) fn constraints(&self) -> Result<Option<(ExpressionConstraints, Vec<f64>)>, ContainerError> {
         if let Some(formulas) = self.formulas()? {
             return Ok(Some((formulas.compiled().clone(), Vec::new())));
         }

@@ -24,17 +24,18 @@ impl Dd {
 
     /// The sum `high + low`, renormalised so that `high` is its nearest `f64`.
     #[inline]
+    #[doc(hidden)]
     pub fn new(high: f64, low: f64) -> Self {
         Self::sum(high, low)
     }
     /// Leading part: the nearest `f64`.
     #[inline]
-    pub fn high(self) -> f64 {
+    pub(crate) fn high(self) -> f64 {
         self.high
     }
     /// Trailing part: what the leading part leaves.
     #[inline]
-    pub fn low(self) -> f64 {
+    pub(crate) fn low(self) -> f64 {
         self.low
     }
     const fn leading(high: f64) -> Self {

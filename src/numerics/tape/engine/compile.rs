@@ -57,11 +57,11 @@ impl<S: Scalar> Recorded<S> {
     }
 
     /// Number of coordinates `n`.
-    pub fn coordinates(&self) -> usize {
+    pub(crate) fn coordinates(&self) -> usize {
         self.scale.len()
     }
     /// Number of parameters.
-    pub fn parameters(&self) -> usize {
+    pub(crate) fn parameters(&self) -> usize {
         self.parameters
     }
     /// Scales `s_i` of the coordinates.
