@@ -199,6 +199,7 @@ impl<S: Scalar> Dataset<S> {
         self.q.len() / self.coordinates
     }
     /// `true` if there is no state; never, once built.
+    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.q.is_empty()
     }

@@ -73,6 +73,7 @@ impl RecordedTrajectory {
     }
 
     /// `true` if there is no sample.
+    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }

@@ -22,9 +22,9 @@ mod terms;
 mod wrappers;
 
 pub(crate) use configure::{LagrangianVisitor, resolve};
-pub use configure::{SystemError, SystemInstance, configure, systems};
+pub use configure::{SystemError, SystemInstance, build, configure, systems};
 #[doc(hidden)]
-pub use configure::{build, configure_system, configure_values, find};
+pub use configure::{configure_system, configure_values, find};
 #[doc(hidden)]
 pub use constrained_systems::constrained_systems;
 #[cfg(feature = "data")]

@@ -68,6 +68,7 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// `true` if there are no states.
+    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }

@@ -147,7 +147,6 @@ pub fn gradient_on<T: Real>(
 ///
 /// # Errors
 /// [`TapeError::Shape`] if `direction` is not as long as `x`.
-#[doc(hidden)]
 pub fn derivative<T: Real>(f: &impl ScalarFunction, x: &[T], direction: &[T]) -> Result<(T, T), TapeError> {
     check_length("direction", x.len(), direction.len())?;
     let y = f.eval(&seeded(x, direction));
@@ -160,7 +159,6 @@ pub fn derivative<T: Real>(f: &impl ScalarFunction, x: &[T], direction: &[T]) ->
 ///
 /// # Errors
 /// The tape's: see [`TapeError`].
-#[doc(hidden)]
 pub fn jacobian<T: Real>(f: &impl VectorFunction, x: &[T]) -> Result<(Vec<T>, Vec<T>), TapeError> {
     let (n, m) = (x.len(), f.outputs());
     let mut matrix = vec![T::zero(); m * n];
@@ -196,7 +194,6 @@ pub fn jacobian<T: Real>(f: &impl VectorFunction, x: &[T]) -> Result<(Vec<T>, Ve
 ///
 /// # Errors
 /// The tape's, and [`TapeError::Shape`] if `direction` is not as long as `x`.
-#[doc(hidden)]
 pub fn hessian_vector<T: Real>(
     f: &impl ScalarFunction,
     x: &[T],

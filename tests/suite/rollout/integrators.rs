@@ -438,10 +438,8 @@ fn failures_are_typed_and_keep_what_was_reached() {
 /// The figures of the head of `gauss.rs`, over a tenth of their time.
 #[test]
 fn collocation_on_momenta_is_no_worse_than_on_velocities() {
-    let models: [(Boxed<f64>, [f64; 4], f64); 2] = [
-        (system("double pendulum"), [0.5, 0.3, 1.0, -0.4], 2.0),
-        (system("magnetic"), [0.5, -0.3, 0.2, 0.7], 1.0),
-    ];
+    let models: [(Boxed<f64>, [f64; 4], f64); 2] =
+        [(system("double pendulum"), [0.5, 0.3, 1.0, -0.4], 2.0), (system("magnetic"), [0.5, -0.3, 0.2, 0.7], 1.0)];
     for (model, start, ratio) in models {
         let h = 0.05;
         let (first, last) = gauss4_on_velocities(&*model, &start, h, (1000.0 / h) as usize);
