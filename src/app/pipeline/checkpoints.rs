@@ -22,7 +22,7 @@ pub enum Begin {
     Either,
 }
 
-/// Checkpoints of a training. They stay until [`Checkpoints::remove`].
+/// Checkpoints of a training. They stay until they are removed.
 #[derive(Clone)]
 pub struct Checkpoints {
     files: Arc<dyn Files>,

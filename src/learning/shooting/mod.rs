@@ -19,7 +19,7 @@
 //! Under constraints the network's motion is that with their multipliers, and starts stay where the constraints allow: each Gauss-Newton
 //! step is taken along them, and brought back to them.
 //!
-//! [`fit`] does it all; [`Segments`] and [`ShootingObjective`] are its parts.
+//! [`fit`](fit()) does it all; [`Segments`] and [`ShootingObjective`] are its parts.
 
 mod fit;
 mod integrator;

@@ -100,7 +100,7 @@ pub trait LagrangianVisitor {
     fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output;
 }
 
-/// All systems whose coordinates are free; [`constrained_systems`](super::constrained_systems) are the others.
+/// All systems whose coordinates are free; `constrained_systems` are the others.
 pub fn systems() -> &'static [System] {
     SYSTEMS
 }
