@@ -4,7 +4,8 @@ use crate::certificate::{Certificate, CertificateError, Options, Signature, cert
 use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, seconds, thread_count, threads, whole};
-use crate::cli::source::parameter;
+use crate::cli::source::SystemOrModel;
+use crate::cli::symmetries::Format;
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
@@ -12,21 +13,13 @@ use crate::names::{pluralize, unknown};
 use crate::network::file::Header;
 use serde_json::{Map, Value, json};
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them), or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
-    system: Option<String>,
-    /// A trained model, a file or the directory of a run.
-    #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
-    /// A parameter of the system; may be repeated.
-    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
-    param: Vec<(String, String)>,
+    #[command(flatten)]
+    subject: SystemOrModel,
     /// Region of states: bounds of columns, such as theta1=-1..1,theta1_dot=-3..3. Columns that are not named keep the
     /// validation bounds of the system, of a model those of its training, and of an angle of a model one turn.
     #[arg(long = "box", value_name = "COLUMN=LOW..HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = side)]
@@ -53,14 +46,6 @@ pub struct Args {
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    /// One object.
-    Json,
-    /// Text.
-    Table,
 }
 
 /// `column=low..high`.
@@ -93,7 +78,7 @@ fn signature(text: &str) -> Result<Signature, String> {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let stop = interrupt::flag().map_err(CliError::signals)?;
     let refused = |error: CertificateError| CliError::usage(error);
-    let (name, columns, options, found) = match &args.model {
+    let (name, columns, options, found) = match &args.subject.model {
         Some(path) => {
             let Learned { header, network } = Learned::<f64>::load_free(path)?;
             let time = learned_system(&header).ok().and_then(|system| system.time_like);
@@ -104,8 +89,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             (header.system, header.columns, options, found)
         }
         None => {
-            let system = chosen::system(args.system.as_deref().unwrap_or_default())?;
-            let configured = configure_system::<f64>(system, &args.param).map_err(CliError::usage)?;
+            let system = chosen::system(args.subject.system.as_deref().unwrap_or_default())?;
+            let configured = configure_system::<f64>(system, &args.subject.param).map_err(CliError::usage)?;
             let n = configured.coordinates;
             let columns = configured.system.columns(n);
             let options = args.options(n, configured.system.time_like.is_some(), &stop);

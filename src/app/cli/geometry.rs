@@ -2,9 +2,10 @@
 
 use crate::cli::number::{Precision, count, list};
 use crate::cli::shown::{CHUNK, report_failures};
-use crate::cli::source::{Source, parameter};
+use crate::cli::source::{Source, SystemOrModel};
 use crate::cli::states::parse_table;
 use crate::cli::surfaces::Line;
+use crate::cli::symmetries::Format;
 use crate::cli::{CliError, input, output, states, tensors};
 use crate::geometry::{GeometryError, MOST_COORDINATES, at_once, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -14,15 +15,8 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them), or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
-    system: Option<String>,
-    /// A trained model, a file or the directory of a run.
-    #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
-    /// A parameter of the system, decimal text read in the working precision; may be repeated.
-    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
-    param: Vec<(String, String)>,
+    #[command(flatten)]
+    subject: SystemOrModel,
     /// CSV of points, or - for standard input. Its header has the coordinates, in any order; other columns are ignored.
     #[arg(long, value_name = "FILE.csv", required_unless_present = "surface", conflicts_with = "surface")]
     points: Option<PathBuf>,
@@ -55,14 +49,6 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    /// One object per line.
-    Json,
-    /// Text.
-    Table,
-}
-
 /// Pieces of a line, at most: seconds of a metric that is written down.
 const PIECES: usize = 1_000_000;
 
@@ -85,10 +71,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
-    let source = match &args.model {
-        Some(path) => Source::<S>::model(path)?,
-        None => Source::<S>::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
-    };
+    let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let n = source.columns.len() / 2;
     let names = &source.columns[..n];
     let velocity = match &args.velocity {

@@ -4,7 +4,7 @@ use crate::cli::constraints::constrained;
 use crate::cli::inverse::inverse;
 use crate::cli::number::{Precision, list};
 use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
-use crate::cli::source::{Source, parameter};
+use crate::cli::source::{Source, SystemOrModel};
 use crate::cli::{CliError, States, input, output, parse_states, states};
 use crate::lagrangian::{EulerLagrange, LeastNorm, ManifoldRows, ReducedMass, Request, Terms};
 use crate::linalg::{Workspace, eigenvalues};
@@ -15,15 +15,8 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them), or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
-    system: Option<String>,
-    /// A trained model, a file or the directory of a run.
-    #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
-    /// A parameter of the system, decimal text read in the working precision; may be repeated.
-    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
-    param: Vec<(String, String)>,
+    #[command(flatten)]
+    subject: SystemOrModel,
     /// CSV of states, or - for standard input. Its header has the columns of the system, in any order; other columns, such as t
     /// and energy of a roll-out, are ignored.
     #[arg(long, value_name = "FILE.csv")]
@@ -76,10 +69,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
-    let source = match &args.model {
-        Some(path) => Source::<S>::model(path)?,
-        None => Source::<S>::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
-    };
+    let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     if args.inverse {
         return inverse(&args.states, args.format, &source);
     }

@@ -7,7 +7,7 @@ use crate::lagrangian::{EulerLagrange, configure_system};
 use crate::pipeline::usual_force;
 use crate::scalar::Scalar;
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Something that moves by a Lagrangian, with the names of its state's components.
 pub struct Source<S> {
@@ -51,6 +51,37 @@ impl<S: Scalar> Source<S> {
         let (header, model) = Learned::load(path)?.motion(path)?;
         let forces = forces::names(&header);
         Ok(Self { model, columns: header.columns, forces })
+    }
+}
+
+/// A system or a trained model, as arguments.
+#[derive(Debug, clap::Args)]
+pub struct SystemOrModel {
+    /// A system by name (`lnn systems` lists them), or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
+    pub system: Option<String>,
+    /// A trained model, a file or the directory of a run.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+    /// A parameter of the system, decimal text read in the working precision; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
+    pub param: Vec<(String, String)>,
+}
+
+impl SystemOrModel {
+    /// Reads the one that was given.
+    ///
+    /// # Errors
+    /// That of its reader.
+    pub fn read<T>(
+        &self,
+        model: fn(&Path) -> Result<T, CliError>,
+        system: fn(&str, &[(String, String)]) -> Result<T, CliError>,
+    ) -> Result<T, CliError> {
+        match &self.model {
+            Some(path) => model(path),
+            None => system(self.system.as_deref().unwrap_or_default(), &self.param),
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! `lnn symmetries`: what a Lagrangian conserves.
 
 use crate::cli::probe::{Bound, Probe, bound, tolerance};
-use crate::cli::source::parameter;
+use crate::cli::source::SystemOrModel;
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
 use crate::report::text_table;
@@ -9,20 +9,12 @@ use crate::symmetry::{
     Degrees, EXACT, MOST_FIELDS, MOST_UNKNOWNS, Quadratic, Symmetries, quadratic, quadratic_unknowns, unknowns,
 };
 use serde::Serialize;
-use std::path::PathBuf;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them), or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
-    system: Option<String>,
-    /// A trained model, a file or the directory of a run.
-    #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
-    /// A parameter of the system; may be repeated.
-    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
-    param: Vec<(String, String)>,
+    #[command(flatten)]
+    subject: SystemOrModel,
     /// Functions that fields are made of, by family and total degree: polynomial, trigonometric, hyperbolic; chosen by the
     /// coordinates if not given.
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
@@ -139,10 +131,7 @@ impl From<Quadratic> for Second {
 /// # Errors
 /// A usage error for a wrong system or region, a data error for a bad model or terms that are not finite.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let mut probe = match &args.model {
-        Some(path) => Probe::model(path)?,
-        None => Probe::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
-    };
+    let mut probe = args.subject.read(Probe::model, Probe::system)?;
     probe.narrow(&args.region)?;
     let (basis, _) = probe.basis(args.basis)?;
     let n = probe.model.coordinates();

@@ -63,30 +63,26 @@ impl Watch {
         Self { events: Some(Arc::new(events)), interrupt: Arc::default() }
     }
 
-    /// The same with no events but remarks.
-    pub(crate) fn remarks_alone(&self) -> Self {
-        let events = self.events.clone().map(|events| {
-            let remarks: EventSink = Arc::new(move |event: Event<'_>| {
-                if matches!(event, Event::Note(_)) {
+    /// The same with the events that pass alone.
+    fn filtered(&self, passes: fn(Event<'_>) -> bool) -> Self {
+        let events = self.events.clone().map(|events| -> EventSink {
+            Arc::new(move |event| {
+                if passes(event) {
                     events(event);
                 }
-            });
-            remarks
+            })
         });
         Self { events, interrupt: Arc::clone(&self.interrupt) }
     }
 
+    /// The same with no events but remarks.
+    pub(crate) fn remarks_alone(&self) -> Self {
+        self.filtered(|event| matches!(event, Event::Note(_)))
+    }
+
     /// The same without remarks.
     pub(crate) fn without_remarks(&self) -> Self {
-        let events = self.events.clone().map(|events| {
-            let rest: EventSink = Arc::new(move |event: Event<'_>| {
-                if !matches!(event, Event::Note(_)) {
-                    events(event);
-                }
-            });
-            rest
-        });
-        Self { events, interrupt: Arc::clone(&self.interrupt) }
+        self.filtered(|event| !matches!(event, Event::Note(_)))
     }
 
     /// `true` if the flag was raised.
