@@ -81,7 +81,7 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
     let read = |file: &str| fs::read(folder.join(file)).unwrap();
     let table = read("table.csv");
     let model = read("liu-tricks-seed0/model.safetensors");
-    let kept = "cranmer-initialisation-as-in-the-paper-seed0/record.json";
+    let kept = "cranmer-initialisation-seed0/record.json";
     let record = String::from_utf8(read(kept)).unwrap();
     // A mark that a new run would not leave; one run lost, one made with another configuration.
     let marked = record.replace("\"seconds\":", "\"seconds\":1000000");
