@@ -9,6 +9,9 @@ use crate::scalar::Scalar;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+/// What makes something of a system, by its name or file and the values of its parameters.
+type FromSystem<T> = fn(&str, &[(String, String)]) -> Result<T, CliError>;
+
 /// Something that moves by a Lagrangian, with the names of its state's components.
 pub struct Source<S> {
     /// Its terms.
@@ -73,11 +76,7 @@ impl SystemOrModel {
     ///
     /// # Errors
     /// That of its reader.
-    pub fn read<T>(
-        &self,
-        model: fn(&Path) -> Result<T, CliError>,
-        system: fn(&str, &[(String, String)]) -> Result<T, CliError>,
-    ) -> Result<T, CliError> {
+    pub fn read<T>(&self, model: fn(&Path) -> Result<T, CliError>, system: FromSystem<T>) -> Result<T, CliError> {
         match &self.model {
             Some(path) => model(path),
             None => system(self.system.as_deref().unwrap_or_default(), &self.param),
