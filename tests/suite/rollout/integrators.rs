@@ -101,8 +101,6 @@ fn distance<S: Scalar>(a: &[S], b: &[S]) -> f64 {
 
 /// What should be zero at `(q, v, t)`.
 type Invariant = dyn Fn(&[f64], &[f64], f64) -> f64;
-/// `(model, start, h, steps)` to the largest energy errors in the first and last tenth.
-
 /// Slope of the straight line closest to the points.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
