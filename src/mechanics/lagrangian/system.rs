@@ -92,7 +92,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// The same for each of `n` coordinates.
-    pub(crate) fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
+    pub fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
         Self { positions: vec![position; n], velocities: vec![velocity; n] }
     }
 }

@@ -147,7 +147,7 @@ impl Outline {
     }
 
     /// The edge right of the centre.
-    pub(crate) fn right(&self) -> Edge {
+    pub fn right(&self) -> Edge {
         self.quarter(0)
     }
     /// The edge above the centre.
