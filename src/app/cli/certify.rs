@@ -4,8 +4,8 @@ use crate::certificate::{Certificate, CertificateError, Options, Signature, cert
 use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, seconds, thread_count, threads, whole};
+use crate::cli::shown::TableOrJson;
 use crate::cli::source::SystemOrModel;
-use crate::cli::symmetries::Format;
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
@@ -42,7 +42,7 @@ pub struct Args {
     threads: Option<usize>,
     /// Text, or one JSON object.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
-    format: Format,
+    format: TableOrJson,
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             (configured.system.name.to_string(), columns, options, found)
         }
     };
-    if args.json || args.format == Format::Json {
+    if args.json || args.format == TableOrJson::Json {
         output::print(&format!("{}\n", object(&name, &columns, &options, &found)))?;
     } else {
         output::print(&table(&columns, &options, &found))?;

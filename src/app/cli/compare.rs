@@ -1,8 +1,9 @@
 //! `lnn compare`: what two Lagrangians have in common beyond factor and gauge.
 
 use crate::cli::probe::{Bound, Probe, bound};
+use crate::cli::shown::TableOrJson;
 use crate::cli::source::parameter;
-use crate::cli::symmetries::{Format, degrees};
+use crate::cli::symmetries::degrees;
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, number as digits, rounded, wrap_text};
 use crate::report::text_table;
@@ -39,7 +40,7 @@ pub struct Args {
     seed: u64,
     /// Text, or one JSON object.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
-    format: Format,
+    format: TableOrJson,
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
@@ -76,7 +77,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
     let compared = Compared { first: &args.first, second: &args.second, comparison: &found, points, seed: args.seed };
-    if args.json || args.format == Format::Json {
+    if args.json || args.format == TableOrJson::Json {
         return output::print(&(serde_json::to_string(&compared).map_err(CliError::data)? + "\n"));
     }
     output::print(&compared.text())

@@ -1,11 +1,10 @@
 //! `lnn geometry`: metric, connection and curvature of points, full digits.
 
 use crate::cli::number::{Precision, count, list};
-use crate::cli::shown::{CHUNK, report_failures};
+use crate::cli::shown::{CHUNK, TableOrJson, report_failures};
 use crate::cli::source::{Source, SystemOrModel};
 use crate::cli::states::parse_table;
 use crate::cli::surfaces::Line;
-use crate::cli::symmetries::Format;
 use crate::cli::{CliError, input, output, states, tensors};
 use crate::geometry::{GeometryError, MOST_COORDINATES, at_once, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -43,7 +42,7 @@ pub struct Args {
     precision: Precision,
     /// One JSON object per line, or text: the nonzero components, without repeating those equal by symmetry.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
-    format: Format,
+    format: TableOrJson,
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
@@ -82,7 +81,7 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
         let ends: [Vec<S>; 2] = [list("--from", from, names)?, list("--to", to, names)?];
         note_velocity(&*source.model, &ends[0], &velocity);
         let line = Line { block: &args.surface, ends: (&ends[0], &ends[1]), velocity: &velocity, steps: args.steps };
-        return line.print(&source, !args.json && args.format == Format::Table);
+        return line.print(&source, !args.json && args.format == TableOrJson::Table);
     }
     if n > MOST_COORDINATES {
         return Err(CliError::usage(GeometryError::TooMany { found: n, most: MOST_COORDINATES }));
@@ -107,8 +106,8 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
                 Err(_) => tensors::fields(&metric(&*source.model, q, &velocity), None),
             };
             text += &match args.format {
-                Format::Json => tensors::object(n, &fields, problem.as_deref()),
-                Format::Table => tensors::block(names, row, &fields, problem.as_deref()),
+                TableOrJson::Json => tensors::object(n, &fields, problem.as_deref()),
+                TableOrJson::Table => tensors::block(names, row, &fields, problem.as_deref()),
             };
             failures.extend(problem.map(|problem| (row, problem)));
         }

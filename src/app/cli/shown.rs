@@ -8,6 +8,15 @@ use crate::scalar::Scalar;
 /// States evaluated together; bounds the memory whatever the length of the file.
 pub const CHUNK: usize = 256;
 
+/// Form of a result that has no table of numbers alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum TableOrJson {
+    /// Text.
+    Table,
+    /// One object, or one per line.
+    Json,
+}
+
 /// Form in which results are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {

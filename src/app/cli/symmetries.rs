@@ -1,6 +1,7 @@
 //! `lnn symmetries`: what a Lagrangian conserves.
 
 use crate::cli::probe::{Bound, Probe, bound, tolerance};
+use crate::cli::shown::TableOrJson;
 use crate::cli::source::SystemOrModel;
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
@@ -38,19 +39,10 @@ pub struct Args {
     quadratic: bool,
     /// Text, or one JSON object.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
-    format: Format,
+    format: TableOrJson,
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
-}
-
-/// Form of a result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
-    /// Text.
-    Table,
-    /// One object.
-    Json,
 }
 
 /// Degrees of families of functions.
@@ -177,7 +169,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         seed: args.seed,
         quadratic: second,
     };
-    if args.json || args.format == Format::Json {
+    if args.json || args.format == TableOrJson::Json {
         return output::print(&(serde_json::to_string(&found).map_err(CliError::data)? + "\n"));
     }
     output::print(&found.text())

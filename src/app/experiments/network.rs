@@ -1,8 +1,8 @@
 //! The paper's network experiments, all on the double pendulum (its appendix "Training details of network experiments").
 
+use super::physical::config_of;
 use super::{Experiment, Picture, Quantity, Reduction, Reported, Run, slug};
 use crate::configuration::{Config, Precision, Regularizer, Scaling};
-use crate::lagrangian::configure;
 use crate::network::{ActivationChoice, Initialization, InputLayer};
 use crate::presets::Preset;
 use std::f64::consts::PI;
@@ -19,8 +19,7 @@ const TURN: Range = [0.0, 2.0 * PI];
 /// The appendix names no regularizer for experiments other than its own; as in the physical experiments it is the
 /// eigenvalue penalty with weight 5.
 fn baseline() -> Config {
-    let system = configure("double-pendulum", &[]).unwrap_or_else(|e| unreachable!("{e}"));
-    let mut config = Preset::Paper.config(&system).unwrap_or_else(|| unreachable!("the paper's first system"));
+    let mut config = config_of(Preset::Paper, "double-pendulum");
     config.phases.truncate(1);
     trained_on(config, WIDE)
 }
@@ -150,8 +149,7 @@ pub(super) const ADDED_TERM: Experiment = Experiment {
     runs: || {
         let rows = [("-t'^2 + x'^2 + y'^2 + z'^2", true, 1.0), ("|v|^2", false, 1.0), ("nothing added", true, 0.0)];
         let row = |(label, signed, alpha): (&str, bool, f64)| {
-            let system = configure("ads4-geodesic", &[]).unwrap_or_else(|e| unreachable!("{e}"));
-            let mut config = Preset::Quick.config(&system).unwrap_or_else(|| unreachable!("a system of the catalogue"));
+            let mut config = config_of(Preset::Quick, "ads4-geodesic");
             config.network.alpha = alpha;
             config.network.time_like = config.network.time_like.filter(|_| signed);
             run(label, label, config)
@@ -167,7 +165,7 @@ pub(super) const BOUNDARY: Experiment = Experiment {
     name: "boundary",
     title: "Where a training needs the penalty",
     paper: "-",
-    finding: "Without the penalty 2 of 4 models were useless, by the choices that the first row of each group repeats.",
+    finding: "With the choices of the first group, 2 of 4 models without the penalty were useless.",
     pictures: &[Picture::Gain { abscissa: "width times rate" }],
     reductions: &[],
     runs: || {

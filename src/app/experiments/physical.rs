@@ -3,7 +3,7 @@
 
 use super::{Experiment, Picture, Reported, Run};
 use crate::configuration::Config;
-use crate::lagrangian::configure;
+use crate::lagrangian::{configure, find};
 use crate::optimizers::Method;
 use crate::presets::Preset;
 
@@ -12,16 +12,8 @@ const ALL: &[Picture] = &[Picture::Evaluation(&[""])];
 
 /// The paper's training of a system.
 fn system(name: &str, reported: Reported) -> Vec<Run> {
-    let configured = configure(name, &[]).unwrap_or_else(|e| unreachable!("{e}"));
-    let config = Preset::Paper.config(&configured).unwrap_or_else(|| unreachable!("a system of the paper"));
-    vec![Run {
-        name: name.to_string(),
-        label: configured.system.title.to_string(),
-        abscissa: None,
-        group: String::new(),
-        config,
-        reported,
-    }]
+    let title = find(name).map_or(name, |system| system.title.as_ref());
+    vec![run(name, title, config_of(Preset::Paper, name), reported)]
 }
 
 pub(super) const DOUBLE_PENDULUM: Experiment = Experiment {
@@ -89,7 +81,8 @@ const SYSTEMS: [(&str, Reported); 5] = [
     ("ads4-geodesic", Reported::NOTHING),
 ];
 
-fn config(preset: Preset, system: &str) -> Config {
+/// The configuration of a preset for a system of the paper.
+pub(super) fn config_of(preset: Preset, system: &str) -> Config {
     let configured = configure(system, &[]).unwrap_or_else(|e| unreachable!("{e}"));
     preset.config(&configured).unwrap_or_else(|| unreachable!("a system of the paper"))
 }
@@ -99,7 +92,7 @@ fn run(name: &str, label: &str, config: Config, reported: Reported) -> Run {
 }
 
 fn all(preset: Preset) -> Vec<Run> {
-    SYSTEMS.iter().map(|&(system, reported)| run(system, system, config(preset, system), reported)).collect()
+    SYSTEMS.iter().map(|&(system, reported)| run(system, system, config_of(preset, system), reported)).collect()
 }
 
 pub(super) const QUICK: Experiment = Experiment {
@@ -124,7 +117,7 @@ pub(super) const TIME_TO_ACCURACY: Experiment = Experiment {
     pictures: &[Picture::Clock],
     reductions: &[],
     runs: || {
-        let of = |preset| config(preset, "double-pendulum");
+        let of = |preset| config_of(preset, "double-pendulum");
         let reported = |loss| Reported { loss: Some(loss), ..Reported::NOTHING };
         let mut radam = of(Preset::Quick);
         radam.optimizer.method = Method::Radam;

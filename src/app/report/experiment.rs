@@ -316,9 +316,8 @@ fn gain(results: &[(Run, Option<Record>)]) -> Vec<Series> {
         abscissae.dedup();
         let median = |x: f64, penalised: bool| {
             let here = |run: &Run| run.abscissa == Some(x) && (run.config.penalty.lambda() > 0.0) == penalised;
-            let mut losses: Vec<f64> = members.iter().filter(|(run, _)| here(run)).map(|(_, r)| lowest(r)).collect();
-            losses.sort_by(f64::total_cmp);
-            losses.get(losses.len() / 2).copied().unwrap_or(f64::NAN)
+            let losses = members.iter().filter(|(run, _)| here(run)).map(|(_, record)| lowest(record));
+            RunSpread::of(losses).map_or(f64::NAN, |spread| spread.median)
         };
         let points = abscissae.into_iter().map(|x| (x.log2(), median(x, false) / median(x, true)));
         Series { name: name.to_string(), points: points.collect(), over: false }
