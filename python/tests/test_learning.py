@@ -247,7 +247,7 @@ def test_members_of_a_fit_are_models_of_their_seeds(tmp_path):
     alone = lnn.fit(tracks, **choices)
     first, second = (one.to_bytes() for one in fitted.members)
     assert first == fitted.model.to_bytes() == alone.model.to_bytes() != second and len(alone.members) == 1
-    assert lnn.load(tmp_path / "member-1.safetensors").to_bytes() == fitted.members[1].to_bytes()
+    assert lnn.Model.load(tmp_path / "member-1.safetensors").to_bytes() == fitted.members[1].to_bytes()
     with pytest.raises(ValueError, match="members"):
         lnn.fit(tracks, members=0, **choices)
 

@@ -103,7 +103,7 @@ fn fit_in<S: Scalar>(
     let names = &recording.coordinates;
     prepared.remarks.iter().for_each(|text| watch.say(Event::Note(text)));
     let mut data = prepared.datasets::<S>()?;
-    let faults = config.faults(names.len());
+    let faults = fit_config.faults(names.len());
     if !faults.is_empty() {
         return Err(PipelineError::Config(faults));
     }
