@@ -182,13 +182,13 @@ fn refused(error: IdentifyError) -> CliError {
 
 /// Writes the description with the values that were found.
 fn write(out: &Path, instance: &SystemInstance<f64>, found: &Identified) -> Result<(), CliError> {
-    let Some(description) = instance.system.description() else { return Ok(()) };
+    let Some(described) = &instance.system.described else { return Ok(()) };
     let given = instance.system.parameters.iter().zip(&instance.parameters);
     let mut values: Vec<(&str, f64)> = given.map(|(parameter, value)| (parameter.symbol.as_ref(), *value)).collect();
     for constant in &found.constants {
         values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
     }
-    let text = toml::to_string(&description.with_defaults(&values)).map_err(CliError::data)?;
+    let text = toml::to_string(&described.with_defaults(&values)).map_err(CliError::data)?;
     parse_system(&text).map_err(|(_, problem)| CliError::data(format_args!("--out: no system file: {problem}")))?;
     write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))
 }

@@ -3,6 +3,7 @@
 //! The structures are those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of
 //! the header of a model file.
 
+mod chain;
 pub(crate) mod pair;
 mod quantity;
 mod system;
@@ -12,6 +13,7 @@ use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
 use super::system::{Range, ShellAdvice};
 use crate::scalar::Real;
+use chain::{ChainDescription, LinkDescription};
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -34,8 +36,16 @@ pub struct Description {
     /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dissipation: Option<String>,
-    /// Coordinates, in order.
+    /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) coordinates: Vec<CoordinateDescription>,
+    /// What the links have in common.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    chain: Option<ChainDescription>,
+    /// Links of a chain from its base on, each with the joint that moves it, one per coordinate; a Lagrangian and a dissipation function are
+    /// added to theirs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    links: Vec<LinkDescription>,
     /// Constants by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) parameters: BTreeMap<String, ParameterDescription>,
@@ -137,7 +147,7 @@ impl TrajectoryDescription {
 
 impl Description {
     /// The same with other values of parameters, by name.
-    pub(crate) fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
+    fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
         let mut changed = self.clone();
         for (name, value) in values {
             if let Some(parameter) = changed.parameters.get_mut(*name) {
@@ -176,6 +186,8 @@ impl Description {
             lagrangian: Some(lagrangian),
             dissipation: None,
             coordinates: coordinates.map(coordinate).collect(),
+            chain: None,
+            links: Vec::new(),
             parameters: parameters.map(parameter).collect(),
             definitions: BTreeMap::new(),
             constraints,
@@ -210,8 +222,10 @@ impl DescriptionError {
 /// A description with the Lagrangian that it comes to.
 #[derive(Clone, Debug)]
 pub struct Described {
-    /// The description.
+    /// The description, links written out.
     pub description: Description,
+    /// The description with its links, if it has any.
+    written: Option<Description>,
     /// Its Lagrangian; parameters in the order of their names.
     pub lagrangian: ExpressionLagrangian,
     /// Its dissipation function, if it has one; parameters as the Lagrangian's.
@@ -225,6 +239,15 @@ pub struct Described {
 }
 
 impl Described {
+    /// The description as it was given, with other values of parameters, by name.
+    pub fn with_defaults(&self, values: &[(&str, f64)]) -> Description {
+        let plain = self.description.with_defaults(values);
+        match &self.written {
+            Some(written) => Description { parameters: plain.parameters, ..written.clone() },
+            None => plain,
+        }
+    }
+
     /// The velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the future;
     /// what `v` holds in its place is not read. `None` for a system without mass shell.
     pub fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {

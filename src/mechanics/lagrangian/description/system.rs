@@ -47,6 +47,13 @@ impl Description {
     /// # Errors
     /// The first key that is wrong, and how.
     pub(in crate::mechanics::lagrangian) fn compile(&self) -> Outcome<System> {
+        let plain = self.unfolded()?;
+        let written = (plain != *self).then(|| self.clone());
+        plain.compile_plain(written)
+    }
+
+    /// Compiles a description without links, which may have been `written` with some.
+    fn compile_plain(self, written: Option<Self>) -> Outcome<System> {
         self.check_texts()?;
         let n = self.coordinates.len();
         let mut compiler = Compiler::default();
@@ -95,6 +102,7 @@ impl Description {
             learning: LearningAdvice::NONE,
             described: Some(Arc::new(Described {
                 description: self.clone(),
+                written,
                 lagrangian: ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value)),
                 dissipation: dissipation
                     .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),

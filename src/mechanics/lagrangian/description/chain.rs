@@ -1,0 +1,358 @@
+//! A chain of links in a system file, from its rows of Denavit and Hartenberg to coordinates, parameters and formulas.
+//!
+//! With the angular velocity `w` of a link in its own frame, the velocity `v` of that frame's origin, the acceleration of gravity `g` and
+//! the place `r` of the origin in the base, a rigid link of mass `m`, first moments `h = m c` and inertia `I` about the origin has
+//!
+//! `L = m v^2/2 + h.(v x w) + w.I w/2 + m g.r + h.g`,
+//!
+//! which is linear in its ten constants. From one link to the next, `w' = R^T w + q_dot z` and `v' = R^T (v + w x p)` of a joint that turns
+//! (Featherstone, "Rigid Body Dynamics Algorithms", 2008).
+
+use super::quantity::Decimal;
+use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
+use crate::lagrangian::system::Range;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Most links.
+const MAX_LINKS: usize = 16;
+/// Acceleration of gravity in m/s^2 if none is given, and the speed at which dry friction is three quarters there.
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+const COULOMB_SPEED: f64 = 0.01;
+/// Bounds of positions in m, and of velocities in rad/s or m/s, of coordinates that the file does not describe.
+const BOUNDS: (f64, f64) = (1.0, 3.0);
+/// Part of a sine or cosine that is rounding.
+const ROUNDING: f64 = 1e-15;
+
+/// What a chain of links has in common.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChainDescription {
+    /// How the rows are meant.
+    #[serde(default)]
+    convention: Convention,
+    /// Acceleration of gravity in the frame of the base, in m/s^2; `[0, 0, -9.81]` if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    gravity: Option<Vec<Quantity>>,
+    /// Viscous and dry friction of every joint.
+    #[serde(default, skip_serializing_if = "is_false")]
+    friction: bool,
+    /// Speed `s` of dry friction `Fc tanh(q_dot/s)`, in rad/s or m/s; 0.01 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    coulomb_speed: Option<Quantity>,
+    /// Inertia of every drive.
+    #[serde(default, skip_serializing_if = "is_false")]
+    armature: bool,
+}
+
+/// Where the frame of a link is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Convention {
+    /// On the axis of its own joint: `Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d)` (Craig, Khalil).
+    #[default]
+    Modified,
+    /// On the axis of the next joint: `Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha)` (Denavit, Paul, Spong).
+    Standard,
+}
+
+/// A link with the joint that moves it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkDescription {
+    /// Length in m.
+    #[serde(default = "nothing")]
+    a: Quantity,
+    /// Twist in rad.
+    #[serde(default = "nothing")]
+    alpha: Quantity,
+    /// Offset along the joint in m; what a sliding joint adds to.
+    #[serde(default = "nothing")]
+    d: Quantity,
+    /// Angle about the joint in rad; what a turning joint adds to.
+    #[serde(default = "nothing")]
+    theta: Quantity,
+    /// `true` if the joint slides.
+    #[serde(default, skip_serializing_if = "is_false")]
+    prismatic: bool,
+}
+
+fn nothing() -> Quantity {
+    Quantity(0.0)
+}
+
+/// A number times names; without names the number alone.
+#[derive(Clone, Debug)]
+struct Term {
+    factor: f64,
+    names: Vec<String>,
+}
+
+impl Term {
+    fn number(factor: f64) -> Self {
+        Self { factor, names: Vec::new() }
+    }
+    fn name(name: impl Into<String>) -> Self {
+        Self { factor: 1.0, names: vec![name.into()] }
+    }
+    fn times(&self, other: &Self) -> Self {
+        Self { factor: self.factor * other.factor, names: [self.names.clone(), other.names.clone()].concat() }
+    }
+    fn scaled(&self, factor: f64) -> Self {
+        Self { factor: self.factor * factor, names: self.names.clone() }
+    }
+}
+
+type Vector = [Term; 3];
+
+/// A sum of terms as a formula.
+fn formula(terms: &[Term]) -> String {
+    let mut text = String::new();
+    for term in terms.iter().filter(|term| term.factor != 0.0) {
+        let (sign, size) = (if term.factor < 0.0 { "-" } else { "+" }, term.factor.abs());
+        match (text.is_empty(), sign) {
+            (true, "+") => {}
+            (true, _) => text += "-",
+            (false, _) => text += &format!(" {sign} "),
+        }
+        let number = (size != 1.0 || term.names.is_empty()).then(|| size.to_string());
+        text += &number.into_iter().chain(term.names.iter().cloned()).collect::<Vec<_>>().join("*");
+    }
+    if text.is_empty() { "0".to_string() } else { text }
+}
+
+/// Sine and cosine, exact at quarter turns.
+fn sine_cosine(angle: f64) -> [f64; 2] {
+    let exact = |x: f64| if x.abs() < ROUNDING { 0.0 } else { x };
+    [exact(angle.sin()), exact(angle.cos())]
+}
+
+/// `(a x b)_i` as two terms.
+fn cross(a: &Vector, b: &Vector, i: usize) -> [Term; 2] {
+    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+    [a[j].times(&b[k]), a[k].times(&b[j]).scaled(-1.0)]
+}
+
+impl Description {
+    /// The same without links: their coordinates, parameters and formulas written out.
+    pub(super) fn unfolded(&self) -> Result<Self, DescriptionError> {
+        let fault = |key: &str, problem: String| Err(DescriptionError::new(key, problem));
+        let mut plain = Self { chain: None, links: Vec::new(), ..self.clone() };
+        let count = self.links.len();
+        match (&self.chain, count) {
+            (None, 0) => return Ok(plain),
+            (Some(_), 0) => return fault("chain", "expected tables [[links]] beside it".to_string()),
+            (_, 1..=MAX_LINKS) => {}
+            _ => return fault("links", format!("expected 1 to {MAX_LINKS} tables [[links]], found {count}")),
+        }
+        if self.metric.is_some() {
+            return fault("metric", "expected `[[links]]` or `[metric]`, found both".to_string());
+        }
+        if plain.coordinates.is_empty() {
+            plain.coordinates = self.links.iter().enumerate().map(|(k, link)| link.coordinate(k)).collect();
+        }
+        if plain.coordinates.len() != count {
+            let problem = format!("expected {count} tables, one for each link, found {}", plain.coordinates.len());
+            return fault("coordinates", problem);
+        }
+        let chain = self.chain.clone().unwrap_or_default();
+        let gravity = chain.gravity.map_or(Ok(GRAVITY), |given| {
+            let given: Vec<f64> = given.iter().map(|x| x.0).collect();
+            let finite = given.iter().all(|x| x.is_finite());
+            given.try_into().ok().filter(|_| finite).ok_or_else(|| {
+                DescriptionError::new("chain.gravity", "expected three finite numbers [x, y, z]")
+            })
+        })?;
+        let speed = chain.coulomb_speed.map_or(COULOMB_SPEED, |speed| speed.0);
+        if !(speed.is_finite() && speed > 0.0) {
+            return fault("chain.coulomb_speed", format!("expected a finite number above 0, found {speed}"));
+        }
+        let (mut sums, mut losses) = (Vec::new(), Vec::new());
+        let mut base = Base {
+            turning: [0.0; 3].map(Term::number),
+            moving: [0.0; 3].map(Term::number),
+            gravity: gravity.map(Term::number),
+            height: Term::number(0.0),
+        };
+        for (k, link) in self.links.iter().enumerate() {
+            // The standard row ends where the modified row of the next joint begins.
+            let before = match chain.convention {
+                Convention::Modified => [link.a.0, link.alpha.0],
+                Convention::Standard => {
+                    k.checked_sub(1).map_or([0.0; 2], |k| [self.links[k].a.0, self.links[k].alpha.0])
+                }
+            };
+            for (key, x) in [("a", link.a.0), ("alpha", link.alpha.0), ("d", link.d.0), ("theta", link.theta.0)] {
+                if !x.is_finite() {
+                    return fault(&format!("links[{k}].{key}"), format!("expected a finite number, found {x}"));
+                }
+            }
+            sums.push(Term::name(plain.link((k + 1, link, before), &mut base, chain.armature)?));
+            if chain.friction {
+                losses.extend(plain.friction((k + 1, link), speed)?);
+            }
+        }
+        let whole = |own: Vec<Term>, more: &Option<String>| {
+            let own = formula(&own);
+            Some(more.as_ref().map_or(own.clone(), |more| format!("{own} + ({more})")))
+        };
+        plain.lagrangian = whole(sums, &self.lagrangian);
+        if chain.friction {
+            plain.dissipation = whole(losses, &self.dissipation);
+        }
+        Ok(plain)
+    }
+
+    /// Adds a link: the name of its part of the Lagrangian, and `base` moved on to it.
+    fn link(
+        &mut self,
+        (number, link, [a, alpha]): (usize, &LinkDescription, [f64; 2]),
+        base: &mut Base,
+        armature: bool,
+    ) -> Result<String, DescriptionError> {
+        let coordinate = self.coordinates[number - 1].name.clone();
+        let (q, speed) = (Term::name(&coordinate), Term::name(format!("{coordinate}_dot")));
+        let own = |what: &str| format!("link{number}_{what}");
+        let [sine, cosine] = if link.prismatic {
+            sine_cosine(link.theta.0).map(Term::number)
+        } else {
+            let angle = formula(&[q.clone(), Term::number(link.theta.0)]);
+            self.define(own("s"), format!("sin({angle})"))?;
+            self.define(own("c"), format!("cos({angle})"))?;
+            ["s", "c"].map(|what| Term::name(own(what)))
+        };
+        let along = if link.prismatic {
+            self.sum(own("d"), &[q, Term::number(link.d.0)])?
+        } else {
+            Term::number(link.d.0)
+        };
+        let [sa, ca] = sine_cosine(alpha);
+        let place = [Term::number(a), along.scaled(-sa), along.scaled(ca)];
+        let height = [0, 1, 2].map(|i| place[i].times(&base.gravity[i]));
+        let height = self.sum(own("u"), &[&height[..], &[base.height.clone()]].concat())?;
+        let mut there = Vec::with_capacity(3);
+        for i in 0..3 {
+            let swung = cross(&base.turning, &place, i);
+            there.push(self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], &[base.moving[i].clone()]].concat())?);
+        }
+        let there: Vector = there.try_into().unwrap_or_else(|_| [0.0; 3].map(Term::number));
+        // R^T, first about x and then about z; the motion of the joint is along z.
+        let mut turned = |what: &str, from: &Vector, joint: Option<&Term>| -> Result<Vector, DescriptionError> {
+            let [y, z] = [[ca, sa], [-sa, ca]].map(|[y, z]| [from[1].scaled(y), from[2].scaled(z)]);
+            let y = self.sum(own(&format!("{what}t")), &y)?;
+            let x = self.sum(own(&format!("{what}x")), &[cosine.times(&from[0]), sine.times(&y)])?;
+            let y = self.sum(own(&format!("{what}y")), &[sine.times(&from[0]).scaled(-1.0), cosine.times(&y)])?;
+            let z = [&z[..], &joint.into_iter().cloned().collect::<Vec<_>>()].concat();
+            Ok([x, y, self.sum(own(&format!("{what}z")), &z)?])
+        };
+        let (turns, slides) = if link.prismatic { (None, Some(&speed)) } else { (Some(&speed), None) };
+        let w = turned("w", &base.turning, turns)?;
+        let v = turned("v", &there, slides)?;
+        let g = turned("g", &base.gravity, None)?;
+        let constant = |what: &str| Term::name(format!("{what}{number}"));
+        let mass = constant("m");
+        let mut terms: Vec<Term> = v.iter().map(|v| mass.times(v).times(v).scaled(0.5)).collect();
+        terms.push(mass.times(&height));
+        for i in 0..3 {
+            let moment = constant(&format!("m{}", AXES[i]));
+            terms.extend(cross(&v, &w, i).iter().chain([&g[i]]).map(|term| moment.times(term)));
+            for j in i..3 {
+                let inertia = constant(&format!("I{}{}", AXES[i], AXES[j]));
+                terms.push(inertia.times(&w[i]).times(&w[j]).scaled(if i == j { 0.5 } else { 1.0 }));
+            }
+        }
+        let (inertia, about) = if link.prismatic { ("kg", "kg") } else { ("kg m^2", "kg m^2") };
+        let mut constants = vec![("m".to_string(), "kg", 1.0)];
+        for (i, x) in AXES.iter().enumerate() {
+            constants.push((format!("m{x}"), "kg m", 0.0));
+            constants.extend(AXES[i..].iter().map(|y| (format!("I{x}{y}"), about, if x == y { 0.1 } else { 0.0 })));
+        }
+        if armature {
+            terms.push(constant("Ia").times(&speed).times(&speed).scaled(0.5));
+            constants.push(("Ia".to_string(), inertia, 0.0));
+        }
+        self.constants(number, &constants);
+        *base = Base { turning: w, moving: v, gravity: g, height };
+        self.define(own("L"), formula(&terms))?;
+        Ok(own("L"))
+    }
+
+    /// Terms of Rayleigh's function of a joint: `Fv q_dot^2/2 + Fc s ln cosh(q_dot/s)`.
+    fn friction(&mut self, (number, link): (usize, &LinkDescription), speed: f64) -> Result<[Term; 2], DescriptionError> {
+        let units = if link.prismatic { ["N s/m", "N"] } else { ["N m s", "N m"] };
+        let velocity = format!("{}_dot", self.coordinates[number - 1].name);
+        let dry = format!("link{number}_dry");
+        // ln cosh x = |x| + ln(1 + exp(-2 |x|)) - ln 2, which no speed overflows.
+        let size = format!("abs({velocity}/{speed})");
+        self.define(dry.clone(), format!("{speed}*({size} + ln1p(exp(-2*{size})))"))?;
+        self.constants(number, &[("Fv".to_string(), units[0], 0.0), ("Fc".to_string(), units[1], 0.0)]);
+        let constant = |what: &str| Term::name(format!("{what}{number}"));
+        let viscous = Term { factor: 0.5, names: [constant("Fv").names, vec![velocity.clone(), velocity]].concat() };
+        Ok([viscous, constant("Fc").times(&Term::name(dry))])
+    }
+
+    /// Unknown constants of a link, unless the file says more of them.
+    fn constants(&mut self, number: usize, constants: &[(String, &str, f64)]) {
+        for (name, unit, value) in constants {
+            let own = || ParameterDescription {
+                default: Decimal(value.to_string()),
+                unit: (*unit).to_string(),
+                range: Range::Any,
+                learn: true,
+            };
+            self.parameters.entry(format!("{name}{number}")).or_insert_with(own);
+        }
+    }
+
+    /// A sum of terms as one: a definition if it takes one.
+    fn sum(&mut self, name: String, terms: &[Term]) -> Result<Term, DescriptionError> {
+        let mut all: Vec<Term> = Vec::with_capacity(terms.len());
+        for term in terms.iter().filter(|term| term.factor != 0.0) {
+            match all.iter_mut().find(|known| known.names == term.names) {
+                Some(known) => known.factor += term.factor,
+                None => all.push(term.clone()),
+            }
+        }
+        all.retain(|term| term.factor != 0.0);
+        match &all[..] {
+            [] => Ok(Term::number(0.0)),
+            [single] if single.names.len() < 2 => Ok(single.clone()),
+            _ => {
+                self.define(name.clone(), formula(&all))?;
+                Ok(Term::name(name))
+            }
+        }
+    }
+
+    fn define(&mut self, name: String, text: String) -> Result<(), DescriptionError> {
+        match self.definitions.insert(name.clone(), text) {
+            Some(_) => Err(DescriptionError::new(format!("definitions.{name}"), "the name is taken by `[[links]]`")),
+            None => Ok(()),
+        }
+    }
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Motion of the link before, in its frame, the acceleration of gravity there, and `g.r` of its origin.
+struct Base {
+    turning: Vector,
+    moving: Vector,
+    gravity: Vector,
+    height: Term,
+}
+
+impl LinkDescription {
+    /// A coordinate that the file does not describe.
+    fn coordinate(&self, k: usize) -> CoordinateDescription {
+        let pair = |size: f64| Some([Quantity(-size), Quantity(size)]);
+        CoordinateDescription {
+            name: format!("q{}", k + 1),
+            unit: if self.prismatic { "m" } else { "rad" }.to_string(),
+            periodic: !self.prismatic,
+            time_like: false,
+            bounds: pair(if self.prismatic { BOUNDS.0 } else { PI }),
+            velocity_bounds: pair(BOUNDS.1),
+        }
+    }
+}
