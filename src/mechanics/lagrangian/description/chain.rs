@@ -189,7 +189,7 @@ impl Description {
             }
             sums.push(Term::name(plain.link((k + 1, link, before), &mut base, chain.armature)?));
             if chain.friction {
-                losses.extend(plain.friction((k + 1, link), speed)?);
+                losses.extend(plain.rub((k + 1, link), speed)?);
             }
         }
         let whole = |own: Vec<Term>, more: &Option<String>| {
@@ -217,8 +217,8 @@ impl Description {
             sine_cosine(link.theta.0).map(Term::number)
         } else {
             let angle = formula(&[q.clone(), Term::number(link.theta.0)]);
-            self.define(own("s"), format!("sin({angle})"))?;
-            self.define(own("c"), format!("cos({angle})"))?;
+            self.name(own("s"), format!("sin({angle})"))?;
+            self.name(own("c"), format!("cos({angle})"))?;
             ["s", "c"].map(|what| Term::name(own(what)))
         };
         let along = if link.prismatic {
@@ -273,18 +273,18 @@ impl Description {
         }
         self.constants(number, &constants);
         *base = Base { turning: w, moving: v, gravity: g, height };
-        self.define(own("L"), formula(&terms))?;
+        self.name(own("L"), formula(&terms))?;
         Ok(own("L"))
     }
 
     /// Terms of Rayleigh's function of a joint: `Fv q_dot^2/2 + Fc s ln cosh(q_dot/s)`.
-    fn friction(&mut self, (number, link): (usize, &LinkDescription), speed: f64) -> Result<[Term; 2], DescriptionError> {
+    fn rub(&mut self, (number, link): (usize, &LinkDescription), speed: f64) -> Result<[Term; 2], DescriptionError> {
         let units = if link.prismatic { ["N s/m", "N"] } else { ["N m s", "N m"] };
         let velocity = format!("{}_dot", self.coordinates[number - 1].name);
         let dry = format!("link{number}_dry");
         // ln cosh x = |x| + ln(1 + exp(-2 |x|)) - ln 2, which no speed overflows.
         let size = format!("abs({velocity}/{speed})");
-        self.define(dry.clone(), format!("{speed}*({size} + ln1p(exp(-2*{size})))"))?;
+        self.name(dry.clone(), format!("{speed}*({size} + ln1p(exp(-2*{size})))"))?;
         self.constants(number, &[("Fv".to_string(), units[0], 0.0), ("Fc".to_string(), units[1], 0.0)]);
         let constant = |what: &str| Term::name(format!("{what}{number}"));
         let viscous = Term { factor: 0.5, names: [constant("Fv").names, vec![velocity.clone(), velocity]].concat() };
@@ -318,13 +318,13 @@ impl Description {
             [] => Ok(Term::number(0.0)),
             [single] if single.names.len() < 2 => Ok(single.clone()),
             _ => {
-                self.define(name.clone(), formula(&all))?;
+                self.name(name.clone(), formula(&all))?;
                 Ok(Term::name(name))
             }
         }
     }
 
-    fn define(&mut self, name: String, text: String) -> Result<(), DescriptionError> {
+    fn name(&mut self, name: String, text: String) -> Result<(), DescriptionError> {
         match self.definitions.insert(name.clone(), text) {
             Some(_) => Err(DescriptionError::new(format!("definitions.{name}"), "the name is taken by `[[links]]`")),
             None => Ok(()),
