@@ -261,6 +261,10 @@ impl System {
     pub fn description(&self) -> Option<&Description> {
         self.described.as_deref().map(|described| &described.description)
     }
+    /// `true` for a chain of links.
+    pub(crate) fn is_chain(&self) -> bool {
+        self.described.as_ref().is_some_and(|described| described.is_chain())
+    }
     /// Coordinates, in order, of the system of `n` coordinates.
     pub fn coordinates(&self, n: usize) -> Vec<Coordinate> {
         self.coordinates.of(n)

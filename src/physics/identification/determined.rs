@@ -1,7 +1,7 @@
 //! What the motion determines: standard errors, and the directions that it leaves open, in words.
 
 use super::follow::{Follower, Segment};
-use super::found::Undetermined;
+use super::found::{Combination, Undetermined};
 use super::solve::{Normal, Problem};
 use crate::lagrangian::system::Bounds;
 use crate::linalg::{Workspace, dot, eigh};
@@ -11,6 +11,8 @@ use crate::linalg::{Workspace, dot, eigh};
 const NULL: f64 = 1e-8;
 /// Relative standard error from which on a direction is open.
 const OPEN: f64 = 1.0;
+/// Part of the effect of a change below which a constant has none in it: rounding.
+const PIVOT: f64 = 1e-5;
 /// Share of a direction below which a constant has no part in it.
 const NO_PART: f64 = 0.02;
 /// Largest power of a constant in a combination.
@@ -30,6 +32,10 @@ pub(super) struct Determined {
     pub errors: Vec<Option<f64>>,
     /// Directions in relative changes of the unknowns, each with its relative error if it has one.
     pub open: Vec<(Vec<f64>, Option<f64>)>,
+    /// Changes of the unknowns that have no effect at all, in their own units.
+    pub null: Vec<Vec<f64>>,
+    /// Effect of the unknowns, each for itself.
+    pub effects: Vec<f64>,
 }
 
 impl Determined {
@@ -52,8 +58,10 @@ impl Determined {
         let scale = |k: usize| Some(problem.scale(k, x[k])).filter(|scale| *scale > 0.0).unwrap_or_else(|| alone(k));
         let mut covariance = vec![0.0; m * m];
         let mut null: Vec<Vec<f64>> = Vec::new();
+        let mut changes: Vec<Vec<f64>> = Vec::new();
         for k in (0..m).filter(|k| !live.contains(k)) {
             null.push((0..m).map(|j| f64::from(u8::from(j == k))).collect());
+            changes.extend(null.last().cloned());
         }
         for (value, vector) in values.iter().zip(vectors.chunks_exact(count.max(1))) {
             let along: Vec<f64> = vector.iter().zip(&live).map(|(x, &k)| x / root(k)).collect();
@@ -64,9 +72,10 @@ impl Determined {
                     }
                 }
             } else {
-                let mut direction = vec![0.0; m];
-                along.iter().zip(&live).for_each(|(a, &k)| direction[k] = a / scale(k));
+                let (mut direction, mut change) = (vec![0.0; m], vec![0.0; m]);
+                along.iter().zip(&live).for_each(|(a, &k)| (direction[k], change[k]) = (a / scale(k), *a));
                 null.push(unit(direction));
+                changes.push(change);
             }
         }
         let null = sparse(null);
@@ -100,7 +109,54 @@ impl Determined {
             (direction, Some(error))
         });
         let open = null.into_iter().map(|direction| (direction, None)).chain(weak).collect();
-        Self { covariance, errors, open }
+        let effects = (0..m).map(|k| if muted[k] { 0.0 } else { root(k) }).collect();
+        Self { covariance, errors, open, null: changes, effects }
+    }
+
+    /// Sums of constants that no change without effect moves: the base parameters. Of each such change the last constant that it moves
+    /// gets no sum of its own, in the order of names; of a chain of links those are the masses and the moments along its axes, as
+    /// in Khalil and Dombre ("Modeling, Identification and Control of Robots", 2002).
+    pub fn combinations(&self, names: &[&str], units: &[&str], x: &[f64]) -> Vec<Combination> {
+        let m = x.len();
+        let size = |row: &[f64], k: usize| row[k].abs() * if self.effects[k] > 0.0 { self.effects[k] } else { 1.0 };
+        let mut open = self.null.clone();
+        let mut done: Vec<(usize, Vec<f64>)> = Vec::new();
+        for k in (0..m).rev() {
+            let most = (0..open.len()).max_by(|&a, &b| size(&open[a], k).total_cmp(&size(&open[b], k)));
+            let Some(at) = most else { break };
+            let largest = (0..m).map(|j| size(&open[at], j)).fold(0.0, f64::max);
+            if size(&open[at], k) < PIVOT * largest {
+                continue;
+            }
+            let mut row = open.swap_remove(at);
+            let pivot = row[k];
+            row.iter_mut().for_each(|x| *x /= pivot);
+            for other in open.iter_mut().chain(done.iter_mut().map(|(_, other)| other)) {
+                let factor = other[k];
+                other.iter_mut().zip(&row).for_each(|(x, own)| *x -= factor * own);
+            }
+            done.push((k, row));
+        }
+        let kept = (0..m).filter(|k| done.iter().all(|(gone, _)| gone != k));
+        let sum = |k: usize| {
+            let mut factors = vec![0.0; m];
+            factors[k] = 1.0;
+            for (gone, row) in &done {
+                if size(row, k) > PIVOT * size(row, *gone) {
+                    factors[*gone] = -row[k];
+                }
+            }
+            let along: Vec<f64> =
+                (0..m).map(|i| dot(&self.covariance[i * m..(i + 1) * m], &factors) * factors[i]).collect();
+            let others = (0..m).filter(|&j| j != k && factors[j] != 0.0);
+            Combination {
+                terms: [k].into_iter().chain(others).map(|j| (names[j].to_string(), factors[j])).collect(),
+                value: dot(&factors, x),
+                standard_error: along.iter().sum::<f64>().max(0.0).sqrt(),
+                unit: units[k].to_string(),
+            }
+        };
+        kept.map(sum).collect()
     }
 }
 
@@ -187,6 +243,22 @@ fn combinations(names: &[&str], x: &[f64], direction: &[f64]) -> Vec<(String, f6
     rest.iter().enumerate().map(of).collect()
 }
 
+/// Names in a sentence.
+fn listed(names: &[String]) -> String {
+    match names.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, rest)) => format!("{} and {last}", rest.join(", ")),
+        None => String::new(),
+    }
+}
+
+/// Spreads coordinate `i` of states evenly over a range.
+fn spread((values, n): (&mut [f64], usize), i: usize, [low, high]: [f64; 2]) {
+    for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
+        *x = low + (high - low) * ((k + 1) as f64 * 0.618_033_988_749_895 * (i + 1) as f64).fract();
+    }
+}
+
 /// Looks for motion that would tell an open direction.
 pub(super) struct Examiner<'a> {
     pub problem: &'a Problem<'a>,
@@ -210,11 +282,7 @@ impl Examiner<'_> {
         let inside: Vec<usize> = (0..self.x.len()).filter(|&k| direction[k] != 0.0).collect();
         let constants: Vec<String> = inside.iter().map(|&k| self.names[k].to_string()).collect();
         let known = combinations(self.names, self.x, direction);
-        let listed = match constants.split_last() {
-            Some((last, [])) => last.clone(),
-            Some((last, rest)) => format!("{} and {last}", rest.join(", ")),
-            None => String::new(),
-        };
+        let listed = listed(&constants);
         let error = relative_error.map(|error| format!(", relative error {error:.1}")).unwrap_or_default();
         let text = if known.is_empty() {
             format!("{listed} is not determined{error}")
@@ -290,6 +358,58 @@ impl Examiner<'_> {
         ([low, high], [(middle - half).min(bounds.0), (middle + half).max(bounds.1)])
     }
 
+    /// Lowest and highest of every position and velocity, as recorded and wider.
+    fn ranges(&self, recorded: &Probe) -> [Vec<([f64; 2], [f64; 2])>; 2] {
+        let n = self.n();
+        let wider = |values: &[f64], bounds: &[(f64, f64)]| {
+            (0..n).map(|i| Self::wider(values, (n, i), bounds[i])).collect::<Vec<_>>()
+        };
+        [wider(&recorded.q, &self.bounds.positions), wider(&recorded.v, &self.bounds.velocities)]
+    }
+
+    /// States spread evenly over the wider ranges, whatever the recorded ones are.
+    fn wild(&self) -> Probe {
+        let n = self.n();
+        let mut wild = self.recorded();
+        let [wide_q, wide_v] = self.ranges(&wild);
+        for i in 0..n {
+            spread((&mut wild.q, n), i, wide_q[i].1);
+            spread((&mut wild.v, n), i, wide_v[i].1);
+        }
+        wild
+    }
+
+    /// What sums alone tell of constants: those that the equations hold together, and those that this motion does.
+    pub fn together(&self, changes: &[Vec<f64>]) -> Vec<Undetermined> {
+        let (n, m) = (self.n(), self.problem.chosen.len());
+        let probe = self.wild();
+        let mut a = probe.v.clone();
+        a.iter_mut().enumerate().for_each(|(at, a)| *a *= if at % 3 == 0 { -1.7 } else { 1.3 });
+        let mut follower = Follower::new(&self.problem.course);
+        let slopes = follower.force_slopes(&self.problem.parameters(self.x), (&probe.q, &probe.v, &a));
+        let everywhere = |change: &[f64]| {
+            let rows = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]);
+            let (whole, apart) = rows.fold((0.0, 0.0), |(whole, apart): (f64, f64), row| {
+                let parts = || row.iter().zip(change).map(|(r, c)| r * c);
+                (whole + parts().sum::<f64>().powi(2), apart + parts().map(|x| x * x).sum::<f64>())
+            });
+            whole <= ROUNDING * ROUNDING * apart
+        };
+        let (always, here): (Vec<&Vec<f64>>, Vec<&Vec<f64>>) = changes.iter().partition(|change| everywhere(change));
+        let told = |changes: &[&Vec<f64>], (text, cure): (&str, &str)| {
+            let largest = |change: &[f64]| change.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            let inside = |k: &usize| changes.iter().any(|change| change[*k].abs() > NO_PART * largest(change));
+            let constants: Vec<String> = (0..m).filter(inside).map(|k| self.names[k].to_string()).collect();
+            let (text, cure) = (format!("{} {text}", listed(&constants)), cure.to_string());
+            Undetermined { constants, direction: Vec::new(), known: Vec::new(), relative_error: None, text, cure }
+        };
+        let all = [
+            (always, ("are held together by the equations, whatever the motion", "none: the sums are all that moves")),
+            (here, ("are not told apart by this motion", "motion that goes farther, faster, or by other joints")),
+        ];
+        all.into_iter().filter(|(some, _)| !some.is_empty()).map(|(some, words)| told(&some, words)).collect()
+    }
+
     /// What would determine a direction.
     fn cure(&self, direction: &[f64], relative_error: Option<f64>) -> String {
         let (n, m) = (self.n(), self.problem.chosen.len());
@@ -305,23 +425,8 @@ impl Examiner<'_> {
         let recorded = self.recorded();
         let sizes = self.sizes(&recorded);
         let [now, _] = self.effect(direction, &recorded, &sizes);
-        // Spread evenly over a range, whatever the recorded state is.
-        let spread = |values: &mut [f64], i: usize, [low, high]: [f64; 2]| {
-            for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
-                *x = low + (high - low) * ((k + 1) as f64 * 0.618_033_988_749_895 * (i + 1) as f64).fract();
-            }
-        };
-        let ranges = |probe: &Probe| {
-            let q = (0..n).map(|i| Self::wider(&probe.q, (n, i), self.bounds.positions[i])).collect::<Vec<_>>();
-            let v = (0..n).map(|i| Self::wider(&probe.v, (n, i), self.bounds.velocities[i])).collect::<Vec<_>>();
-            (q, v)
-        };
-        let (wide_q, wide_v) = ranges(&recorded);
-        let mut wild = self.recorded();
-        for i in 0..n {
-            spread(&mut wild.q, i, wide_q[i].1);
-            spread(&mut wild.v, i, wide_v[i].1);
-        }
+        let [wide_q, wide_v] = self.ranges(&recorded);
+        let wild = self.wild();
         let [anywhere, apart] = self.effect(direction, &wild, &sizes);
         if anywhere < ROUNDING * apart.max(1.0) {
             let forced = self.problem.course.recording.tracks.iter().any(|track| !track.force.is_empty());

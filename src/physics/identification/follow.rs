@@ -127,12 +127,26 @@ impl<'a> Follower<'a> {
         }
     }
 
+    /// Residuals of force `M a - h - Q` of the states evaluated last, `(lanes, n)`.
+    pub fn missing_forces(&self, a: &[f64], into: &mut [f64]) {
+        let n = self.course.equations.n;
+        let rows = self.mass.chunks_exact(n).zip(&self.rest).zip(into).enumerate();
+        rows.for_each(|(at, ((row, rest), into))| *into = linalg::dot(row, &a[at / n * n..][..n]) - rest);
+    }
+
+    /// Slopes of these residuals by positions, velocities and constants, accelerations held fixed: `(lanes, n, 2n + chosen)`.
+    pub fn force_slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
+        let n = self.course.equations.n;
+        self.by_state.resize(q.len() * (2 * n + self.course.chosen), 0.0);
+        let _ = self.slopes.evaluate(q.len() / n, &[q, v, a], values, &mut [&mut self.by_state]);
+        &self.by_state
+    }
+
     /// Slopes of the accelerations found last by positions, velocities and constants: `(lanes, n, 2n + chosen)`.
     pub fn slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
         let n = self.course.equations.n;
         let (lanes, width) = (q.len() / n, 2 * n + self.course.chosen);
-        self.by_state.resize(lanes * n * width, 0.0);
-        let _ = self.slopes.evaluate(lanes, &[q, v, a], values, &mut [&mut self.by_state]);
+        self.force_slopes(values, (q, v, a));
         self.inverse.resize(lanes * n * n, 0.0);
         if n == 1 {
             self.inverse.iter_mut().zip(&self.mass).for_each(|(inverse, mass)| *inverse = mass.recip());

@@ -48,15 +48,30 @@ pub struct Undetermined {
     pub cure: String,
 }
 
-/// What is left of the motion of one coordinate.
+/// A sum of constants that is known though they are not: a base parameter of a robot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Combination {
+    /// Each constant with its factor; the first has the factor 1.
+    pub terms: Vec<(String, f64)>,
+    /// The value of the sum.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Unit of the sum.
+    pub unit: String,
+}
+
+/// What is left of the motion of one coordinate, or of the force on it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residual {
     /// The coordinate.
     pub coordinate: String,
     /// Root mean square.
     pub rms: f64,
-    /// Standard deviation of the noise, as given or as estimated before the fit.
+    /// Standard deviation of the noise, as given or as estimated before the fit; of forces with what the errors of accelerations come to.
     pub noise: f64,
+    /// Standard deviation of what is met: of the positions, or of the forces.
+    pub spread: f64,
     /// Correlation of residuals that follow each other; that of noise is 0.
     pub autocorrelation: f64,
     /// `true` if they follow each other as noise does.
@@ -79,7 +94,7 @@ pub struct Outlier {
 }
 
 /// Constants with their errors, and how far they can be trusted.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Identified {
     /// The constants that were unknown, in the order of the system.
     pub constants: Vec<Constant>,
@@ -89,6 +104,8 @@ pub struct Identified {
     pub correlations: Vec<f64>,
     /// What the motion leaves open.
     pub undetermined: Vec<Undetermined>,
+    /// Sums of constants that are known, where forces are met and are linear in the constants.
+    pub combinations: Vec<Combination>,
     /// What is left, by coordinate.
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
@@ -101,9 +118,9 @@ pub struct Identified {
     pub outlier_count: usize,
     /// Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
     pub inflation: f64,
-    /// Samples that were followed, segments, and the length of the usual segment in s.
+    /// Samples that were followed, or whose forces were met.
     pub samples: usize,
-    /// Number of segments.
+    /// Number of segments; none where forces were met.
     pub segments: usize,
     /// Length of the usual segment in s.
     pub segment_seconds: f64,

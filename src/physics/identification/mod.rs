@@ -5,6 +5,9 @@
 //! constants of sensors are moved to where the measured positions are met best. Segments grow as long as that makes the constants better
 //! known. Noise enters positions alone, so that nothing is biased by it.
 //!
+//! Of machines under known forces whose noise is larger than that of the motion, such as robots, residuals of force are met instead: those
+//! of a chain of links are linear in its constants, however many there are.
+//!
 //! ```
 //! use lnn::identification::{IdentifyOptions, identify};
 //! use lnn::lagrangian::configure;
@@ -22,6 +25,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod by_forces;
 mod determined;
 mod error;
 mod follow;
@@ -36,11 +40,12 @@ mod tests;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
-pub use found::{Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
+pub use found::{Combination, Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
 pub(crate) use stages::{choose_steps, joined, spread_of};
 
+use crate::recording::Targets;
 use serde::{Deserialize, Serialize};
 
 /// Known forces between the samples.
@@ -72,6 +77,8 @@ pub struct IdentifyOptions {
     pub delays: Vec<String>,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,
+    /// What is met, [`Targets::Motion`] or [`Targets::Forces`]; of a chain of links under known forces these, else the motion, if not given.
+    pub targets: Option<Targets>,
     /// Known forces between the samples; what meets the motion best if not given.
     pub between: Option<Between>,
     /// Length of the segments in s; chosen by the data if not given.

@@ -1,8 +1,8 @@
-//! Constants by least squares on smoothed accelerations: where the fit through the motion begins.
+//! Constants by least squares on smoothed motion: on its accelerations, where the fit through the motion begins, or on known forces.
 
 use super::follow::{Follower, LANES, forces};
 use super::linear::{inverse_with, times};
-use super::solve::{Problem, mute, without_effect};
+use super::solve::{Normal, Problem, mute, without_effect};
 use crate::recording::smooth::Smoothed;
 
 /// States at most.
@@ -15,39 +15,53 @@ const RIDGE: f64 = 1e-11;
 /// Effect of a constant on accelerations, over these and squared, that is rounding alone.
 const NO_EFFECT: f64 = 1e-20;
 
-/// States with their accelerations, `(states, n)`, and one over the errors to expect of these.
+/// States with their accelerations, `(states, n)`, and the errors to expect of these.
+#[derive(Default)]
 pub(super) struct States {
     pub q: Vec<f64>,
     pub v: Vec<f64>,
     pub a: Vec<f64>,
     pub force: Vec<f64>,
-    weight: Vec<f64>,
+    pub a_error: Vec<f64>,
+    /// Trajectory and sample of every state.
+    pub places: Vec<(usize, usize)>,
+    /// One over the errors of what is met: of the accelerations, or of the forces.
+    pub weight: Vec<f64>,
+}
+
+/// What is met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Met {
+    Accelerations,
+    Forces,
 }
 
 impl States {
     /// Of the samples with full windows.
     pub fn new(problem: &Problem<'_>, smoothed: &[Option<Smoothed>]) -> Self {
         let n = problem.course.equations.n;
-        let mut states = Self { q: vec![], v: vec![], a: vec![], force: vec![], weight: vec![] };
+        let (mut states, mut force) = (Self::default(), vec![0.0; n]);
         let full = |s: &Smoothed| s.interior().filter(|&at| s.is_full(at)).collect::<Vec<_>>();
         let all: usize = smoothed.iter().flatten().map(|s| full(s).len()).sum();
         let stride = all.div_ceil(MOST_STATES).max(1);
-        let mut force = vec![0.0; n];
-        for (track, smoothed) in problem.course.recording.tracks.iter().zip(smoothed) {
+        for (at, (track, smoothed)) in problem.course.recording.tracks.iter().zip(smoothed).enumerate() {
             let Some(smoothed) = smoothed else { continue };
-            for at in full(smoothed).into_iter().step_by(stride) {
-                let range = at * n..(at + 1) * n;
+            for sample in full(smoothed).into_iter().step_by(stride) {
+                let range = sample * n..(sample + 1) * n;
+                states.places.push((at, sample));
                 states.q.extend(&smoothed.q[range.clone()]);
                 states.v.extend(&smoothed.v[range.clone()]);
                 states.a.extend(&smoothed.a[range.clone()]);
                 let errors = smoothed.a_error[range.clone()].iter().zip(&smoothed.a_bias[range]);
-                states.weight.extend(errors.map(|(error, bias)| error.hypot(*bias).max(1e-300).recip()));
+                states.a_error.extend(errors.map(|(error, bias)| error.hypot(*bias)));
                 if !track.force.is_empty() {
-                    forces(track, problem.course.between, (at.max(1), if at == 0 { 0.0 } else { 1.0 }), &mut force);
+                    let place = (sample.max(1), if sample == 0 { 0.0 } else { 1.0 });
+                    forces(track, problem.course.between, place, &mut force);
                 }
                 states.force.extend(&force);
             }
         }
+        states.weight = states.a_error.iter().map(|error| error.max(1e-300).recip()).collect();
         // One sample that happens to look exact does not outweigh all others.
         let mut sorted = states.weight.clone();
         sorted.sort_by(f64::total_cmp);
@@ -60,60 +74,90 @@ impl States {
         self.q.len() / n
     }
 
-    /// Normal equations of the accelerations' errors; `None` where they cannot be solved for anywhere.
-    fn normal(&self, problem: &Problem<'_>, x: &[f64]) -> Option<(Vec<f64>, Vec<f64>, f64)> {
-        let (n, m) = (problem.course.equations.n, problem.chosen.len());
+    /// Residuals of what is met with their slopes by the constants, batch by batch: `visit(first number, residuals, slopes)`.
+    fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+        let n = problem.course.equations.n;
         let values = problem.parameters(x);
         let mut follower = Follower::new(&problem.course);
-        let (mut matrix, mut right, mut square, mut used) = (vec![0.0; m * m], vec![0.0; m], 0.0, 0);
-        let mut a = vec![0.0; LANES * n];
+        let (mut a, mut residual) = (vec![0.0; LANES * n], vec![0.0; LANES * n]);
         for first in (0..self.q.len()).step_by(LANES * n) {
             let range = first..(first + LANES * n).min(self.q.len());
-            let (q, v) = (&self.q[range.clone()], &self.v[range.clone()]);
-            let a = &mut a[..q.len()];
-            follower.accelerate(&values, (q, v), &self.force[range.clone()], a);
-            let slopes = follower.slopes(&values, (q, v, a));
-            for (k, row) in slopes.chunks_exact(2 * n + m).enumerate() {
-                let at = first + k;
-                let row = &row[2 * n..];
-                let residual = (self.a[at] - a[k]) * self.weight[at];
-                if !(residual.is_finite() && row.iter().all(|x| x.is_finite())) {
-                    square += 1e6;
-                    continue;
+            let state = (&self.q[range.clone()], &self.v[range.clone()]);
+            let (a, residual) = (&mut a[..range.len()], &mut residual[..range.len()]);
+            let measured = &self.a[range.clone()];
+            follower.accelerate(&values, state, &self.force[range.clone()], a);
+            let slopes = match met {
+                Met::Accelerations => {
+                    residual.iter_mut().zip(measured.iter().zip(&*a)).for_each(|(r, (measured, a))| *r = measured - a);
+                    follower.slopes(&values, (state.0, state.1, a))
                 }
-                used += 1;
-                let size = residual.abs();
-                let cut = if size > HUBER { HUBER / size } else { 1.0 };
-                square += if size > HUBER { HUBER * (2.0 * size - HUBER) } else { residual * residual };
-                let scale = cut * self.weight[at] * self.weight[at];
-                for (i, x) in row.iter().enumerate() {
-                    right[i] += cut * self.weight[at] * x * residual;
-                    matrix[i * m..(i + 1) * m].iter_mut().zip(row).for_each(|(sum, y)| *sum += scale * x * y);
+                Met::Forces => {
+                    follower.missing_forces(measured, residual);
+                    residual.iter_mut().for_each(|r| *r = -*r);
+                    follower.force_slopes(&values, (state.0, state.1, measured))
                 }
-            }
+            };
+            visit(first, residual, slopes);
         }
-        (used > 0).then_some((matrix, right, square))
     }
 
-    /// Moves constants to where smoothed accelerations are met best; `false` if no acceleration can be solved for.
-    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> bool {
+    /// Normal equations of what is met, with the right-hand sides of batches of states; `None` where no residual is finite.
+    pub fn normal(&self, problem: &Problem<'_>, x: &[f64], met: Met) -> Option<Normal> {
+        let (n, m) = (problem.course.equations.n, problem.chosen.len());
+        let mut normal = Normal::empty(m);
+        self.residuals(problem, x, met, |first, residuals, slopes| {
+            let mut part = vec![0.0; m];
+            for (k, (residual, row)) in residuals.iter().zip(slopes.chunks_exact(2 * n + m)).enumerate() {
+                let weight = self.weight[first + k];
+                let (residual, row) = (residual * weight, &row[2 * n..]);
+                if !(residual.is_finite() && row.iter().all(|x| x.is_finite())) {
+                    normal.square += 1e6;
+                    continue;
+                }
+                normal.count += 1.0;
+                let size = residual.abs();
+                let cut = if size > HUBER { HUBER / size } else { 1.0 };
+                normal.square += if size > HUBER { HUBER * (2.0 * size - HUBER) } else { residual * residual };
+                let scale = cut * weight * weight;
+                for (i, x) in row.iter().enumerate() {
+                    part[i] += cut * weight * x * residual;
+                    let line = &mut normal.matrix[i * m..(i + 1) * m];
+                    line.iter_mut().zip(row).for_each(|(sum, y)| *sum += scale * x * y);
+                }
+            }
+            normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
+            normal.parts.push(part);
+        });
+        normal.diagonal = (0..m).map(|k| normal.matrix[k * m + k]).collect();
+        (normal.count > 0.0).then_some(normal)
+    }
+
+    /// Residuals of force, `(states, n)`.
+    pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(self.q.len());
+        self.residuals(problem, x, Met::Forces, |_, residuals, _| all.extend(residuals));
+        all
+    }
+
+    /// Moves constants to where smoothed motion is met best; `false` if no residual is finite.
+    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> bool {
         let m = problem.chosen.len();
-        let Some(mut best) = self.normal(problem, x) else { return false };
-        let size: f64 = self.a.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
+        let Some(mut best) = self.normal(problem, x, met) else { return false };
+        let given = if met == Met::Forces { &self.force } else { &self.a };
+        let size: f64 = given.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
         let mut damping = 1e-3;
         for _ in 0..ITERATIONS {
-            let (matrix, right, square) = &best;
-            let mut right = right.clone();
+            let mut right = best.right.clone();
             let mut damped: Vec<f64> =
-                (0..m * m).map(|at| matrix[at] * if at / m == at % m { 1.0 + damping } else { 1.0 }).collect();
-            mute(&without_effect(&x[..m], matrix, NO_EFFECT * size), &mut damped, &mut right);
+                (0..m * m).map(|at| best.matrix[at] * if at / m == at % m { 1.0 + damping } else { 1.0 }).collect();
+            mute(&without_effect(&x[..m], &best.matrix, NO_EFFECT * size), &mut damped, &mut right);
             let Some(inverse) = inverse_with(m, &damped, RIDGE) else { break };
             let mut change = times(m, &inverse, &right);
             change.resize(x.len(), 0.0);
             let moved = problem.moved(x, &change);
-            match self.normal(problem, &moved) {
-                Some(tried) if tried.2 < *square => {
-                    let done = square - tried.2 < 1e-8 * square;
+            match self.normal(problem, &moved, met) {
+                Some(tried) if tried.square < best.square => {
+                    let done = best.square - tried.square < 1e-8 * best.square;
                     (*x, best) = (moved, tried);
                     damping = f64::max(damping / 10.0, 1e-10);
                     if done {

@@ -88,6 +88,14 @@ pub(crate) struct Normal {
     pub failed: usize,
 }
 
+impl Normal {
+    /// Of `m` unknowns before the first residual.
+    pub fn empty(m: usize) -> Self {
+        let [right, diagonal] = [(); 2].map(|()| vec![0.0; m]);
+        Self { matrix: vec![0.0; m * m], right, diagonal, parts: Vec::new(), square: 0.0, count: 0.0, failed: 0 }
+    }
+}
+
 impl Problem<'_> {
     fn n(&self) -> usize {
         self.course.equations.n
@@ -265,15 +273,7 @@ impl Problem<'_> {
     pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment], damping: f64) -> Normal {
         let (n, m) = (self.n(), self.unknowns());
         let (starts, width) = (2 * n, 2 * n + m);
-        let mut normal = Normal {
-            matrix: vec![0.0; m * m],
-            right: vec![0.0; m],
-            diagonal: vec![0.0; m],
-            parts: Vec::with_capacity(found.len()),
-            square: 0.0,
-            count: 0.0,
-            failed: 0,
-        };
+        let mut normal = Normal::empty(m);
         for (linear, segment) in found.iter().zip(segments) {
             let Some(linear) = linear else {
                 normal.failed += 1;

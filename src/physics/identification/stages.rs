@@ -2,14 +2,14 @@
 
 use super::determined::{Determined, Examiner};
 use super::follow::{Course, Segment};
-use super::found::{Constant, Identified, Outlier, Residual, SensorConstant};
+use super::found::{Combination, Constant, Identified, Outlier, Residual, SensorConstant};
 use super::quality::{outliers, usual, whiteness};
-use super::smoothed::States;
+use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem, Sensor, SensorKind};
-use super::{Between, IdentifyError, IdentifyOptions};
+use super::{Between, IdentifyError, IdentifyOptions, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
-use crate::recording::Recording;
+use crate::recording::{Recording, Targets};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
 
 /// Samples in a row that are needed.
@@ -39,11 +39,11 @@ const ITERATIONS: usize = 40;
 
 /// Constants, sensors and starts with the normal equations there.
 #[derive(Clone)]
-struct Fitted {
-    x: Vec<f64>,
-    segments: Vec<Segment>,
-    normal: Normal,
-    substeps: usize,
+pub(super) struct Fitted {
+    pub x: Vec<f64>,
+    pub segments: Vec<Segment>,
+    pub normal: Normal,
+    pub substeps: usize,
 }
 
 impl Fitted {
@@ -54,7 +54,7 @@ impl Fitted {
 
     /// Variance of the unknowns over that of independent noise of the given size: the mean square of the residuals, or what the
     /// scatter of the segments' pulls says if they are alike all along a segment. The second number is the part of the latter.
-    fn inflation(&self) -> (f64, f64) {
+    pub fn inflation(&self) -> (f64, f64) {
         let square = self.mean_square();
         let (m, count) = (self.x.len(), self.normal.parts.len());
         if count < MANY {
@@ -98,6 +98,7 @@ pub fn identify(
     recording.tracks.iter().try_for_each(|track| track.validate(n))?;
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
+    let met = met(instance, recording, options)?;
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
     let longest = recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0);
@@ -135,8 +136,12 @@ pub fn identify(
         robust: options.robust,
         threads: options.threads.max(1),
     };
-    let states = States::new(&problem, &smoothed);
-    if states.len(n) > 0 && !states.fit(&problem, &mut x) {
+    let mut states = States::new(&problem, &smoothed);
+    if met == Met::Forces {
+        let segments = cut(recording, &smoothed, LEAST_SEGMENT, n);
+        return by_forces::identify(instance, &problem, &mut states, (x, segments));
+    }
+    if states.len(n) > 0 && !states.fit(&problem, &mut x, met) {
         return Err(IdentifyError::Singular);
     }
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
@@ -161,6 +166,30 @@ pub fn identify(
     }
     refit(&problem, &mut fitted);
     Ok(result(instance, &problem, &fitted, (&start, &noise), options))
+}
+
+/// What is met.
+fn met(
+    instance: &SystemInstance<f64>,
+    recording: &Recording,
+    options: &IdentifyOptions,
+) -> Result<Met, IdentifyError> {
+    let driven = recording.is_driven();
+    let sensors = [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
+    let refused = |expected: &str, found: &str| {
+        let (expected, found) = (expected.to_string(), found.to_string());
+        Err(IdentifyError::Option { what: "targets", expected, found })
+    };
+    match options.targets {
+        Some(Targets::Motion) => Ok(Met::Accelerations),
+        Some(Targets::Forces) if !driven => refused("motion, of a recording without known forces", "forces"),
+        Some(Targets::Forces) if sensors => refused("motion, beside unknown constants of sensors", "forces"),
+        Some(Targets::Forces) => Ok(Met::Forces),
+        Some(Targets::Measured) => refused("motion or forces", "measured"),
+        Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),
+        None if instance.system.is_chain() && driven && !sensors => Ok(Met::Forces),
+        None => Ok(Met::Accelerations),
+    }
 }
 
 /// Parameters that are unknown.
@@ -451,19 +480,16 @@ fn usual_samples(segments: &[Segment]) -> usize {
     samples.get(samples.len() / 2).copied().unwrap_or(0)
 }
 
-fn result(
+/// Constants and sensors with their errors, and what is open; what is left of the motion is not said yet.
+pub(super) fn unknowns(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
     fitted: &Fitted,
-    (start, noise): (&[f64], &[f64]),
-    options: &IdentifyOptions,
+    (start, inflation): (&[f64], f64),
+    met: Met,
 ) -> Identified {
     let (n, m) = (problem.sigma.len(), fitted.x.len());
     let recording = problem.course.recording;
-    let (mut inflation, widened) = fitted.inflation();
-    if options.noise.is_some() {
-        inflation = inflation.max(1.0);
-    }
     let determined = Determined::new(problem, &fitted.x, &fitted.normal, inflation);
     let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
     let sensor_name = |sensor: &Sensor| {
@@ -483,11 +509,33 @@ fn result(
         bounds: instance.system.validation(n),
         names: &names,
     };
-    let undetermined = determined.open.iter().map(|(direction, error)| examiner.describe(direction, *error)).collect();
+    let (undetermined, combinations) = match met {
+        // What sums are known says what is open.
+        Met::Forces if problem.is_linear(&fitted.segments) => {
+            let units: Vec<&str> = (0..m).map(|k| parameter(k).unit.as_ref()).collect();
+            (examiner.together(&determined.null), determined.combinations(&names, &units, &fitted.x))
+        }
+        _ => {
+            let open = determined.open.iter();
+            (open.map(|(direction, error)| examiner.describe(direction, *error)).collect(), Vec::new())
+        }
+    };
+    let alone: Vec<&str> = combinations
+        .iter()
+        .filter(|sum: &&Combination| sum.terms.len() == 1)
+        .map(|sum| sum.terms[0].0.as_str())
+        .collect();
+    let errors: Vec<Option<f64>> = match combinations.is_empty() {
+        true => determined.errors.clone(),
+        false => {
+            let error = |k: usize| alone.contains(&names[k]).then(|| determined.covariance[k * m + k].sqrt());
+            (0..m).map(error).collect()
+        }
+    };
     let constants = start.iter().enumerate().map(|(k, &start)| Constant {
         symbol: parameter(k).symbol.to_string(),
         value: fitted.x[k],
-        standard_error: determined.errors[k],
+        standard_error: errors[k],
         unit: parameter(k).unit.to_string(),
         start,
     });
@@ -495,17 +543,40 @@ fn result(
         kind: kind(sensor.kind),
         coordinate: recording.coordinates[sensor.coordinate].clone(),
         value: fitted.x[k],
-        standard_error: determined.errors[k],
+        standard_error: errors[k],
     });
     let correlation = |at: usize| {
         let (i, j) = (at / m, at % m);
         let root = |k: usize| determined.covariance[k * m + k].sqrt();
-        match (determined.errors[i], determined.errors[j]) {
+        match (errors[i], errors[j]) {
             _ if i == j => 1.0,
             (Some(_), Some(_)) if root(i) * root(j) > 0.0 => determined.covariance[at] / (root(i) * root(j)),
             _ => 0.0,
         }
     };
+    Identified {
+        constants: constants.collect(),
+        sensors: sensors.collect(),
+        correlations: (0..m * m).map(correlation).collect(),
+        undetermined,
+        combinations,
+        ..Identified::default()
+    }
+}
+
+fn result(
+    instance: &SystemInstance<f64>,
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    (start, noise): (&[f64], &[f64]),
+    options: &IdentifyOptions,
+) -> Identified {
+    let (n, m) = (problem.sigma.len(), fitted.x.len());
+    let recording = problem.course.recording;
+    let (mut inflation, widened) = fitted.inflation();
+    if options.noise.is_some() {
+        inflation = inflation.max(1.0);
+    }
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
     let numbers: f64 = residuals.iter().map(|r| r.len() as f64).sum();
     let taken = (fitted.normal.count - m as f64).max(1.0) / numbers;
@@ -514,7 +585,8 @@ fn result(
         let square = own().map(|r| r * r).sum::<f64>() / own().count().max(1) as f64 / taken;
         let (autocorrelation, white) = whiteness(&residuals, n, i);
         let rms = square.sqrt() * problem.sigma[i];
-        Residual { coordinate: recording.coordinates[i].clone(), rms, noise: noise[i], autocorrelation, white }
+        let (coordinate, spread) = (recording.coordinates[i].clone(), problem.spread[i]);
+        Residual { coordinate, rms, noise: noise[i], spread, autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
     let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
@@ -533,10 +605,6 @@ fn result(
     };
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
     Identified {
-        constants: constants.collect(),
-        sensors: sensors.collect(),
-        correlations: (0..m * m).map(correlation).collect(),
-        undetermined,
         explained: by_coordinate.iter().all(|r| r.white) && usual_over_noise < EXPLAINED && alike,
         residuals: by_coordinate,
         over_noise,
@@ -548,6 +616,7 @@ fn result(
         segment_seconds: usual_samples(&fitted.segments) as f64 * problem.course.step,
         substeps: fitted.substeps,
         between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
+        ..unknowns(instance, problem, fitted, (start, inflation), Met::Accelerations)
     }
 }
 

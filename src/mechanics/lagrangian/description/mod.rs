@@ -239,6 +239,11 @@ pub struct Described {
 }
 
 impl Described {
+    /// `true` if it was written as a chain of links.
+    pub fn is_chain(&self) -> bool {
+        self.written.is_some()
+    }
+
     /// The description as it was given, with other values of parameters, by name.
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Description {
         let plain = self.description.with_defaults(values);
