@@ -12,7 +12,7 @@ from . import _lnn
 from ._arrays import thread_count
 from ._recorded import recorded
 from ._mechanics import System
-from ._results import Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
+from ._results import Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
 
 
@@ -120,6 +120,7 @@ def identify(
     gains: Sequence[str] = (),
     delays: Sequence[str] = (),
     noise: Sequence[float] | None = None,
+    targets: str | None = None,
     between: str | None = None,
     segment: float | None = None,
     robust: bool = False,
@@ -141,6 +142,8 @@ def identify(
         Coordinates whose sensor has an unknown offset, an unknown gain, or is late by an unknown time.
     noise : sequence of float, optional
         Standard deviation of the noise of every coordinate in SI units; estimated by default.
+    targets : str, optional
+        What is met, ``"motion"`` or ``"forces"``; the forces of a chain of links, else the motion by default.
     between : str, optional
         Known forces between the samples: ``"held"``, ``"linear"``, ``"cubic"`` or ``"band-limited"``; what meets the motion best by default.
     segment : float, optional
@@ -167,7 +170,7 @@ def identify(
     motion = recorded(data, coordinates, angles, **more)
     named = {"constants": constants, "offsets": offsets, "gains": gains, "delays": delays}
     choices: dict[str, Any] = {key: [str(name) for name in names] for key, names in named.items()}
-    choices |= {"noise": None if noise is None else [float(x) for x in noise], "between": between, "robust": bool(robust)}
+    choices |= {"noise": None if noise is None else [float(x) for x in noise], "targets": targets, "between": between, "robust": bool(robust)}
     choices |= {"segment": None if segment is None else float(segment), "threads": thread_count(threads)}
     found = json.loads(_lnn.identify(motion, system._subject, json.dumps(choices)))
     found["constants"] = {constant["symbol"]: IdentifiedConstant(**constant) for constant in found["constants"]}
@@ -175,6 +178,7 @@ def identify(
     unknowns = len(found["constants"]) + len(found["sensors"])
     found["correlations"] = np.array(found["correlations"], float).reshape(unknowns, unknowns)
     found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
+    found["combinations"] = tuple(Combination(dict(sum.pop("terms")), **sum) for sum in found["combinations"])
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
     found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)

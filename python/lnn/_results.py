@@ -403,6 +403,24 @@ class Undetermined:
 
 
 @dataclass(frozen=True)
+class Combination:
+    """A sum of constants that is known though they are not: a base parameter of a robot.
+
+    Attributes
+    ----------
+    terms : dict of str to float
+        Factors of the constants by symbol.
+    value, standard_error : float
+    unit : str
+    """
+
+    terms: dict[str, float]
+    value: float
+    standard_error: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Residual:
     """What the identified system leaves of the motion of one coordinate.
 
@@ -411,6 +429,8 @@ class Residual:
     coordinate : str
     rms, noise : float
         Root mean square, and the standard deviation of the noise as it was known before.
+    spread : float
+        Standard deviation of what is met: of the positions, or of the forces.
     autocorrelation : float
         Correlation of residuals that follow each other; that of noise is 0.
     white : bool
@@ -420,6 +440,7 @@ class Residual:
     coordinate: str
     rms: float
     noise: float
+    spread: float
     autocorrelation: float
     white: bool
 
@@ -460,6 +481,8 @@ class Identified:
         Of the errors of the constants, then of the sensors; 0 beside those without an error.
     undetermined : tuple of Undetermined
         What the motion leaves open.
+    combinations : tuple of Combination
+        Sums of constants that are known, where forces are met and are linear in the constants.
     residuals : dict of str to Residual
         By coordinate.
     over_noise : float
@@ -480,6 +503,7 @@ class Identified:
     sensors: tuple[SensorConstant, ...]
     correlations: np.ndarray
     undetermined: tuple[Undetermined, ...]
+    combinations: tuple[Combination, ...]
     residuals: dict[str, Residual]
     over_noise: float
     explained: bool

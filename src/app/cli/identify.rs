@@ -4,10 +4,10 @@ use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::source::parameter;
 use crate::cli::{CliError, chosen, output, parse_system};
-use crate::identification::{Between, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
+use crate::identification::{Between, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{number, pluralize, rounded};
-use crate::recording::LoadedRecording;
+use crate::recording::{LoadedRecording, Targets};
 use crate::report::text_table;
 use crate::storage::{check_target, write_atomically};
 use serde_json::{Map, Value, json};
@@ -43,6 +43,10 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
+    /// What is met: the motion, or the known forces, whose residuals are linear in the constants of a chain of links [default: forces of a
+    /// chain of links, else the motion].
+    #[arg(long, value_enum, value_name = "WHAT")]
+    targets: Option<Met>,
     /// Known forces between the samples [default: what meets the motion best].
     #[arg(long, value_enum, value_name = "WAY")]
     between: Option<Way>,
@@ -61,6 +65,24 @@ pub struct Args {
     /// Write the system with the constants that were found, as a file that rolls out, trains and is known to a grey box.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
+}
+
+/// What is met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Met {
+    /// The motion.
+    Motion,
+    /// Known forces.
+    Forces,
+}
+
+impl From<Met> for Targets {
+    fn from(met: Met) -> Self {
+        match met {
+            Met::Motion => Self::Motion,
+            Met::Forces => Self::Forces,
+        }
+    }
 }
 
 /// Known forces between the samples.
@@ -123,6 +145,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         gains: args.gain.clone(),
         delays: args.delay.clone(),
         noise: args.noise.clone(),
+        targets: args.targets.map(Targets::from),
         between: args.between.map(Between::from),
         segment: args.segment,
         robust: args.robust,
@@ -229,10 +252,19 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
                 "relative_error": u.relative_error, "text": u.text, "cure": u.cure })
         })
         .collect();
+    let combinations: Vec<Value> = found
+        .combinations
+        .iter()
+        .map(|sum| {
+            let terms: Map<String, Value> = sum.terms.iter().map(|(name, x)| (name.clone(), json!(x))).collect();
+            json!({ "terms": terms, "value": sum.value, "standard_error": sum.standard_error, "unit": sum.unit })
+        })
+        .collect();
     let whole = json!({
         "constants": constants,
         "sensors": found.sensors,
         "undetermined": undetermined,
+        "combinations": combinations,
         "correlations": { "names": names, "matrix": matrix },
         "residual": {
             "coordinates": found.residuals,
@@ -270,7 +302,9 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         let [value, error] = with_error(value, error);
         vec![name, value, error, unit.to_string(), rounded(start, 4)]
     };
-    let rows = found.constants.iter().map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
+    // Where sums are known, constants that they alone tell have no row of their own.
+    let alone = |c: &&Constant| found.combinations.is_empty() || c.standard_error.is_some();
+    let rows = found.constants.iter().filter(alone).map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
     let perfect = |kind: &str| if kind == "gain" { 1.0 } else { 0.0 };
     let sensors = found.sensors.iter().map(|s| {
         let unit = if s.kind == "delay" { "s" } else { "" };
@@ -278,6 +312,19 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     });
     let headers = ["constant", "value", "standard error", "unit", "start"];
     let mut text = text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
+    let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1).map(|sum| {
+        let term = |(at, (name, factor)): (usize, &(String, f64))| {
+            let (sign, size) = if *factor < 0.0 { ("-", -factor) } else { ("+", *factor) };
+            let sign = if at == 0 { String::new() } else { format!(" {sign} ") };
+            if size == 1.0 { format!("{sign}{name}") } else { format!("{sign}{}*{name}", rounded(size, 4)) }
+        };
+        let [value, error] = with_error(sum.value, Some(sum.standard_error));
+        vec![sum.terms.iter().enumerate().map(term).collect(), value, error, sum.unit.clone()]
+    });
+    let sums: Vec<Vec<String>> = sums.collect();
+    if !sums.is_empty() {
+        text += &format!("\n{}", text_table(&["sum of constants", "value", "standard error", "unit"], &sums));
+    }
     for Undetermined { text: open, cure, known, .. } in &found.undetermined {
         text += &format!("\n{open}\n");
         for (combination, value) in known {
@@ -302,18 +349,23 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
             r.coordinate.clone(),
             number(r.rms),
             number(r.noise),
+            number(r.spread),
             format!("{:.2}", r.autocorrelation),
             white.to_string(),
         ]
     });
-    let headers = ["coordinate", "residual", "noise", "of neighbours", ""];
+    let what = if found.segments == 0 { "force on" } else { "coordinate" };
+    let headers = [what, "residual", "noise", "spread", "of neighbours", ""];
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
     text += match found.explained {
-        true => "the form explains the motion\n",
-        false => "the form does not explain the motion: something is missing, and errors are those of a wrong form\n",
+        true => "the form explains what was measured\n",
+        false => "the form does not explain what was measured: something is missing, and errors are those of a wrong form\n",
     };
-    let segments = pluralize(found.segments, "segment", "segments");
-    text += &format!("{} samples in {segments} of {} s", found.samples, number(found.segment_seconds));
+    text += &pluralize(found.samples, "sample", "samples");
+    if found.segments > 0 {
+        let segments = pluralize(found.segments, "segment", "segments");
+        text += &format!(" in {segments} of {} s", number(found.segment_seconds));
+    }
     if let Some(between) = found.between {
         let way = match between {
             Between::Held => "held",

@@ -458,13 +458,13 @@ impl Examiner<'_> {
         for (i, name) in self.coordinates.iter().enumerate() {
             let range = |[low, high]: [f64; 2]| format!("{low:.3} .. {high:.3}");
             let mut probe = self.recorded();
-            spread(&mut probe.q, i, wide_q[i].1);
+            spread((&mut probe.q, n), i, wide_q[i].1);
             try_out(
                 probe,
                 format!("motion in which {name} goes farther, over {}, not {}", range(wide_q[i].1), range(wide_q[i].0)),
             );
             let mut probe = self.recorded();
-            spread(&mut probe.v, i, wide_v[i].1);
+            spread((&mut probe.v, n), i, wide_v[i].1);
             try_out(
                 probe,
                 format!(
