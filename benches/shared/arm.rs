@@ -135,6 +135,29 @@ pub fn torques(q: &[f64; JOINTS], v: &[f64; JOINTS], a: &[f64; JOINTS]) -> [f64;
     std::array::from_fn(|k| free[k] + rubbed[k])
 }
 
+/// The exact constants by the names that a system file gives them: of every link its mass, first moments and inertia about the origin of its
+/// frame, and the friction of its joint.
+pub fn constants() -> Vec<(String, f64)> {
+    const AXES: [&str; 3] = ["x", "y", "z"];
+    let mut all = Vec::new();
+    for (k, link) in LINKS.iter().enumerate() {
+        let Link { mass, centre, inertia, friction: [viscous, dry], .. } = link;
+        let mut put = |name: String, value: f64| all.push((format!("{name}{}", k + 1), value));
+        put("m".to_string(), *mass);
+        for i in 0..3 {
+            put(format!("m{}", AXES[i]), mass * centre[i]);
+            for j in i..3 {
+                let about_centre =
+                    if i == j { inertia[i] + mass * centre.iter().map(|c| c * c).sum::<f64>() } else { 0.0 };
+                put(format!("I{}{}", AXES[i], AXES[j]), about_centre - mass * centre[i] * centre[j]);
+            }
+        }
+        put("Fv".to_string(), *viscous);
+        put("Fc".to_string(), *dry);
+    }
+    all
+}
+
 /// What is wrong with a log.
 #[derive(Clone, Copy, Debug)]
 pub struct Faults {

@@ -304,7 +304,11 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     };
     // Where sums are known, constants that they alone tell have no row of their own.
     let alone = |c: &&Constant| found.combinations.is_empty() || c.standard_error.is_some();
-    let rows = found.constants.iter().filter(alone).map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
+    let rows = found
+        .constants
+        .iter()
+        .filter(alone)
+        .map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
     let perfect = |kind: &str| if kind == "gain" { 1.0 } else { 0.0 };
     let sensors = found.sensors.iter().map(|s| {
         let unit = if s.kind == "delay" { "s" } else { "" };
@@ -359,7 +363,9 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
     text += match found.explained {
         true => "the form explains what was measured\n",
-        false => "the form does not explain what was measured: something is missing, and errors are those of a wrong form\n",
+        false => {
+            "the form does not explain what was measured: something is missing, and errors are those of a wrong form\n"
+        }
     };
     text += &pluralize(found.samples, "sample", "samples");
     if found.segments > 0 {

@@ -97,7 +97,8 @@ pub(super) fn identify(
 /// accelerations come to.
 fn noises(problem: &Problem<'_>, states: &States, x: &[f64]) -> Vec<f64> {
     let n = problem.course.equations.n;
-    let tracks = || problem.course.recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
+    let tracks =
+        || problem.course.recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
     let mut squares = vec![0.0; n];
     let values = problem.parameters(x);
     let mut follower = Follower::new(&problem.course);
@@ -113,7 +114,8 @@ fn noises(problem: &Problem<'_>, states: &States, x: &[f64]) -> Vec<f64> {
             }
         }
     }
-    let of = |(i, square): (usize, f64)| noise(tracks(), n, i).sigma.hypot((square / states.places.len() as f64).sqrt());
+    let of =
+        |(i, square): (usize, f64)| noise(tracks(), n, i).sigma.hypot((square / states.places.len() as f64).sqrt());
     squares.into_iter().enumerate().map(of).collect()
 }
 

@@ -9,8 +9,8 @@ use super::solve::{Normal, Problem, Sensor, SensorKind};
 use super::{Between, IdentifyError, IdentifyOptions, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
-use crate::recording::{Recording, Targets};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
+use crate::recording::{Recording, Targets};
 
 /// Samples in a row that are needed.
 const LEAST_SAMPLES: usize = 12;
@@ -169,11 +169,7 @@ pub fn identify(
 }
 
 /// What is met.
-fn met(
-    instance: &SystemInstance<f64>,
-    recording: &Recording,
-    options: &IdentifyOptions,
-) -> Result<Met, IdentifyError> {
+fn met(instance: &SystemInstance<f64>, recording: &Recording, options: &IdentifyOptions) -> Result<Met, IdentifyError> {
     let driven = recording.is_driven();
     let sensors = [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
     let refused = |expected: &str, found: &str| {

@@ -1,7 +1,9 @@
 //! `lnn identify`: constants of systems in files, from recorded motion.
 
+use crate::common::arm::{self, Faults, JOINTS};
 use crate::common::program::{Folder, lnn, text};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
@@ -102,4 +104,70 @@ fn a_listed_system_serves_and_what_is_wrong_is_named() {
         assert_eq!(run.code, Some(code), "{wrong:?}: {}", run.stderr);
         assert!(run.stderr.contains(named) && run.stderr.lines().count() == 1, "{wrong:?}: {}", run.stderr);
     }
+}
+
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/seven_joints.toml");
+
+#[test]
+fn links_move_as_the_recursion_of_newton_and_euler_says() {
+    let folder = Folder::new();
+    let motion = arm::Motion::new(3);
+    let states: Vec<[[f64; JOINTS]; 3]> = (0..5).map(|k| motion.at(0.7 * f64::from(k))).collect();
+    let columns = ["", "_dot", "_ddot"].iter().flat_map(|end| (1..=JOINTS).map(move |k| format!("q{k}{end}")));
+    let mut csv = columns.collect::<Vec<_>>().join(",") + "\n";
+    for state in &states {
+        csv += &(state.concat().iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n");
+    }
+    let file = folder.file("states.csv", csv);
+    let constants: Vec<String> = arm::constants().iter().map(|(name, x)| format!("{name}={x}")).collect();
+    let params: Vec<&str> = constants.iter().flat_map(|pair| ["--param", pair]).collect();
+    let run =
+        lnn(&[&["inspect", "--system", ARM, "--inverse", "--states", &file, "--format", "csv"][..], &params].concat());
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let rows: Vec<Vec<f64>> =
+        run.stdout.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), states.len());
+    for (row, [q, v, a]) in rows.iter().zip(&states) {
+        let exact = arm::torques(q, v, a);
+        assert!(row.iter().zip(exact).all(|(found, exact)| (found - exact).abs() < 1e-9), "{row:?} {exact:?}");
+    }
+}
+
+#[test]
+fn torques_of_a_log_tell_the_sums_of_the_constants_of_an_arm() {
+    let folder = Folder::new();
+    let data = folder.file("arm.csv", arm::log(6.0, Faults::USUAL, 1));
+    let torques = arm::names("tau").join(",");
+    let out = text(&folder.path("found.toml"));
+    let asked = ["identify", &data, "--system", ARM, "--force", &torques, "--json", "--out", &out];
+    let run = lnn(&asked);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found: Value = serde_json::from_str(&run.stdout).unwrap();
+    let truth: BTreeMap<String, f64> = arm::constants().into_iter().collect();
+    let (mut far, mut sums) = (Vec::new(), 0);
+    for sum in found["combinations"].as_array().unwrap() {
+        let [value, error] = ["value", "standard_error"].map(|key| sum[key].as_f64().unwrap());
+        let exact: f64 =
+            sum["terms"].as_object().unwrap().iter().map(|(name, x)| x.as_f64().unwrap() * truth[name]).sum();
+        far.push((value - exact).abs() / error);
+        sums += usize::from(sum["terms"].as_object().unwrap().len() > 1);
+    }
+    // A revolute arm with a vertical first axis has 43 base parameters; each joint has two of friction.
+    assert!(far.len() == 43 + 14 && sums > 10, "{} {sums}", far.len());
+    far.sort_by(f64::total_cmp);
+    assert!(far[far.len() / 2] < 2.0 && far[far.len() - 1] < 8.0, "{far:?}");
+    let open = found["undetermined"].as_array().unwrap();
+    assert!(open.len() == 1 && open[0]["constants"].as_array().unwrap().iter().any(|name| name == "m1"), "{open:?}");
+    for left in found["residual"]["coordinates"].as_array().unwrap() {
+        let [rms, spread] = ["rms", "spread"].map(|key| left[key].as_f64().unwrap());
+        assert!(rms < 0.2 * spread, "{left}");
+    }
+    // The file keeps its links and moves as the arm does: torques of its own log, by it.
+    let written = fs::read_to_string(&out).unwrap();
+    assert!(written.contains("[[links]]") && !written.contains("[definitions]"), "{written}");
+    let again = lnn(&["systems", "--system", &out]);
+    assert_eq!(again.code, Some(0), "{}", again.stderr);
+    // Sensors are a matter of the motion.
+    lnn(&[&asked[..], &["--targets", "forces", "--offset", "q1"]].concat()).refused(2, &["--targets", "sensors"]);
+    lnn(&["identify", &data, "--system", ARM, "--targets", "forces"]).refused(2, &["--targets", "known forces"]);
 }

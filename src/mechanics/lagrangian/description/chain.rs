@@ -159,9 +159,11 @@ impl Description {
         let gravity = chain.gravity.map_or(Ok(GRAVITY), |given| {
             let given: Vec<f64> = given.iter().map(|x| x.0).collect();
             let finite = given.iter().all(|x| x.is_finite());
-            given.try_into().ok().filter(|_| finite).ok_or_else(|| {
-                DescriptionError::new("chain.gravity", "expected three finite numbers [x, y, z]")
-            })
+            given
+                .try_into()
+                .ok()
+                .filter(|_| finite)
+                .ok_or_else(|| DescriptionError::new("chain.gravity", "expected three finite numbers [x, y, z]"))
         })?;
         let speed = chain.coulomb_speed.map_or(COULOMB_SPEED, |speed| speed.0);
         if !(speed.is_finite() && speed > 0.0) {
@@ -221,11 +223,8 @@ impl Description {
             self.name(own("c"), format!("cos({angle})"))?;
             ["s", "c"].map(|what| Term::name(own(what)))
         };
-        let along = if link.prismatic {
-            self.sum(own("d"), &[q, Term::number(link.d.0)])?
-        } else {
-            Term::number(link.d.0)
-        };
+        let along =
+            if link.prismatic { self.sum(own("d"), &[q, Term::number(link.d.0)])? } else { Term::number(link.d.0) };
         let [sa, ca] = sine_cosine(alpha);
         let place = [Term::number(a), along.scaled(-sa), along.scaled(ca)];
         let height = [0, 1, 2].map(|i| place[i].times(&base.gravity[i]));
@@ -354,5 +353,118 @@ impl LinkDescription {
             bounds: pair(if self.prismatic { BOUNDS.0 } else { PI }),
             velocity_bounds: pair(BOUNDS.1),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{SystemInstance, configure_system, inverse_dynamics};
+    use std::borrow::Cow;
+
+    fn instance(chain: &str, links: &str, pairs: &[(&str, f64)]) -> SystemInstance<f64> {
+        let text = format!(r#"{{"name": "arm", "chain": {chain}, "links": {links}}}"#);
+        let description: Description = serde_json::from_str(&text).unwrap();
+        let given: Vec<(String, String)> = pairs.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
+        configure_system(Cow::Owned(description.system().unwrap()), &given).unwrap()
+    }
+
+    fn forces(instance: &SystemInstance<f64>, [q, v, a]: [&[f64]; 3]) -> Vec<f64> {
+        inverse_dynamics(&instance.build().unwrap(), q, v, a).unwrap().external
+    }
+
+    fn close(found: &[f64], expected: &[f64]) {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected:?}");
+        assert_eq!(found.len(), expected.len());
+    }
+
+    /// Two rods that swing about level axes, of lengths `l` and masses `m` at their ends.
+    const RODS: [(&str, f64); 8] = [
+        ("m1", 2.0),
+        ("mx1", 1.4),
+        ("Izz1", 0.98),
+        ("m2", 0.5),
+        ("mx2", 0.2),
+        ("Izz2", 0.08),
+        ("Fv2", 0.3),
+        ("Fc2", 0.1),
+    ];
+    const STATE: [&[f64]; 3] = [&[0.4, -1.1], &[0.8, 1.7], &[-0.6, 2.3]];
+
+    /// Torques of these rods by the textbook's equations, angles from the direction of gravity.
+    fn textbook() -> Vec<f64> {
+        let ([q, v, a], g) = (STATE, 9.81);
+        let (l, [m1, c1], [m2, c2]) = (0.7, [2.0, 0.7], [0.5, 0.4]);
+        let (cosine, sine) = (q[1].cos(), q[1].sin());
+        let (far, mixed) = (m2 * c2 * c2, m2 * l * c2);
+        let hanging = m2 * g * c2 * (q[0] + q[1]).sin();
+        let first = (m1 * c1 * c1 + m2 * l * l + far + 2.0 * mixed * cosine) * a[0] + (far + mixed * cosine) * a[1]
+            - mixed * sine * v[1] * (2.0 * v[0] + v[1])
+            + (m1 * c1 + m2 * l) * g * q[0].sin()
+            + hanging;
+        let second = (far + mixed * cosine) * a[0] + far * a[1] + mixed * sine * v[0] * v[0] + hanging;
+        vec![first, second + 0.3 * v[1] + 0.1 * (v[1] / 0.01).tanh()]
+    }
+
+    #[test]
+    fn rods_by_rows_of_either_convention_move_as_the_textbook_says() {
+        // Gravity along x of the base.
+        let chain = |convention: &str| {
+            format!(r#"{{"convention": "{convention}", "gravity": [9.81, 0, 0], "friction": true}}"#)
+        };
+        let modified = instance(&chain("modified"), r#"[{}, {"a": 0.7}]"#, &RODS);
+        close(&forces(&modified, STATE), &textbook());
+        let standard = instance(&chain("standard"), r#"[{"a": 0.7}, {"a": 3, "alpha": 1}]"#, &RODS);
+        close(&forces(&standard, STATE), &textbook());
+    }
+
+    #[test]
+    fn a_pole_on_a_cart_moves_as_the_textbook_says() {
+        // Gravity pulls against the x axis of the base and of the cart, which slides along its own z axis; at q2 = 0 the pole points
+        // upwards, and it turns towards z.
+        let links = r#"[{"prismatic": true, "d": 0.3, "alpha": "pi/2"}, {"alpha": "pi/2"}]"#;
+        let masses = [("m1", 2.0), ("m2", 0.5), ("mx2", 0.2), ("Izz2", 0.08), ("Ia1", 0.25)];
+        let cart = instance(r#"{"armature": true, "gravity": [-9.81, 0, 0]}"#, links, &masses);
+        let [q, v, a] = STATE;
+        let (cosine, sine) = (q[1].cos(), q[1].sin());
+        let push = 2.75 * a[0] + 0.2 * (cosine * a[1] - sine * v[1] * v[1]);
+        let swing = 0.08 * a[1] + 0.2 * cosine * a[0] - 0.2 * 9.81 * sine;
+        close(&forces(&cart, STATE), &[push, swing]);
+    }
+
+    #[test]
+    fn a_mistake_in_links_names_its_key() {
+        let key = |text: &str| {
+            let description: Description = serde_json::from_str(text).unwrap();
+            description.system().unwrap_err().key
+        };
+        let of = |more: &str| key(&format!(r#"{{"name": "arm", {more}}}"#));
+        assert_eq!(of(r#""chain": {}"#), "chain");
+        assert_eq!(of(r#""chain": {"gravity": [0, 1]}, "links": [{}]"#), "chain.gravity");
+        assert_eq!(of(r#""chain": {"coulomb_speed": 0}, "links": [{}]"#), "chain.coulomb_speed");
+        assert_eq!(of(r#""links": [{}, {"alpha": "1/0"}]"#), "links[1].alpha");
+        assert_eq!(of(r#""links": [{}], "metric": {}"#), "metric");
+        assert_eq!(of(r#""links": [{}], "definitions": {"link1_s": "1"}"#), "definitions.link1_s");
+        let coordinates = r#""coordinates": [{"name": "a", "velocity_bounds": [-1, 1], "periodic": true}]"#;
+        assert_eq!(of(&format!(r#""links": [{{}}, {{}}], {coordinates}"#)), "coordinates");
+        assert_eq!(of(&format!(r#""links": [{}]"#, vec!["{}"; MAX_LINKS + 1].join(","))), "links");
+    }
+
+    #[test]
+    fn what_the_file_says_is_added_and_kept() {
+        let text = r#"{"name": "arm", "links": [{}], "chain": {"friction": true}, "lagrangian": "-k*q1^2/2", "dissipation": "c*q1_dot^4",
+            "parameters": {"k": 3, "c": 0.5, "m1": {"default": 4, "unit": "kg"}}}"#;
+        let description: Description = serde_json::from_str(text).unwrap();
+        let system = description.system().unwrap();
+        let symbols: Vec<&str> = system.parameters.iter().filter(|p| p.learn).map(|p| p.symbol.as_ref()).collect();
+        assert!(symbols.contains(&"Izz1") && !symbols.contains(&"m1") && !symbols.contains(&"k"), "{symbols:?}");
+        let given = [("Izz1", 0.5), ("Fv1", 0.2)].map(|(name, x)| (name.to_string(), x.to_string()));
+        let instance = configure_system::<f64>(Cow::Owned(system), &given).unwrap();
+        close(&forces(&instance, [&[0.2], &[1.5], &[3.0]]), &[1.5 + 0.6 + 0.3 + 2.0 * 1.5_f64.powi(3)]);
+        let described = instance.system.described.as_ref().unwrap();
+        let again = described.with_defaults(&[("Izz1", 0.25)]);
+        assert!(again.definitions.is_empty() && again.links == description.links);
+        assert_eq!(again.parameters["Izz1"].default, Decimal("0.25".to_string()));
+        assert_eq!(again.system().unwrap().parameters.len(), instance.parameters.len());
     }
 }
