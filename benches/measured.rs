@@ -11,6 +11,8 @@
 //!
 //! And a made log of a seven-joint arm, learned by its torques.
 //!
+//! And the same log with the rows of the arm's links known.
+//!
 //! And made motion of three small systems, with tubes around its predictions.
 //!
 //! And a made recording with lost rows and a clock that jitters.
@@ -20,8 +22,8 @@
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
 //! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour, `-- --part arm7` the arm, some minutes, `-- --part tubes` the tubes, some minutes, `-- --part lost` the lost rows, some minutes;
-//! without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv`, `orbits.csv`, `arm7.csv`, `tubes.csv` and `lost.csv` into `target/measured`.
+//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour, `-- --part arm7` the arm, some minutes, `-- --part links` the arm by its rows, `-- --part tubes` the tubes, some minutes, `-- --part lost` the lost rows, some minutes;
+//! without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv`, `orbits.csv`, `arm7.csv`, `links.csv`, `tubes.csv` and `lost.csv` into `target/measured`.
 
 #[allow(dead_code)]
 #[path = "shared/arm.rs"]
@@ -76,7 +78,8 @@ const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits", "arm7", "tubes", "lost"];
+const PARTS: &[&str] =
+    &["rows", "noise", "films", "textbook", "determination", "orbits", "arm7", "links", "tubes", "lost"];
 
 /// Seeds of the small systems: those before them served to choose.
 const SEEDS: std::ops::Range<u64> = 20..40;
@@ -232,6 +235,7 @@ pub fn trial() {
     assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
     let place = tempfile::tempdir().expect("a folder");
     assert_eq!(arm7::compare(0..1, 8.0, place.path(), (Some(1), 1)).len(), 2 * 7);
+    assert_eq!(arm7::links(0..1, 4.0, place.path(), 64).len(), 7);
     let few = tubes::Motions { counts: [4, 20, 3], seconds: 2.0, ahead: 0.1 };
     assert_eq!(tubes::compare(few, scale).len(), 3 * 2);
     assert_eq!(lost::compare(0..1, (6, 4.0), Some(scale)).len(), 3);
@@ -282,6 +286,11 @@ fn main() {
         let rows = arm7::compare(0..3, 20.0, &folder, (None, THREADS));
         let csv = format!("seed,learned_from,joint,nmse,inertia\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("arm7.csv"), csv).expect("room for the results");
+    }
+    if parts.iter().any(|part| part == "links") {
+        let rows = arm7::links(0..3, 20.0, &folder, 20_000);
+        let csv = format!("seed,joint,nmse,inertia\n{}\n", rows.join("\n"));
+        std::fs::write(folder.join("links.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "tubes") {
         let small = Scale { epochs: Some(60), hidden: [48; 3], shooting_epochs: 0 };

@@ -1,11 +1,16 @@
-//! A seven-joint arm learned from one log of 20 s: by its torques, and by its accelerations beside.
+//! A seven-joint arm learned from one log of 20 s: by its torques, and by its accelerations beside; and identified by them, its rows of
+//! Denavit and Hartenberg being known.
 
-use super::arm::{Faults, JOINTS, Motion, RATE, log, mass_matrix, names, torques};
-use lnn::lagrangian::{EulerLagrange, Request, Terms, inverse_dynamics};
+use super::arm::{Faults, JOINTS, Motion, RATE, constants, log, mass_matrix, names, torques};
+use lnn::cli::parse_system;
+use lnn::identification::{IdentifyOptions, identify};
+use lnn::lagrangian::{EulerLagrange, Request, Terms, configure_system, inverse_dynamics};
 use lnn::linalg::{Workspace, eigenvalues};
 use lnn::network::{NetworkLagrangian, Structure};
 use lnn::pipeline::Fit;
-use lnn::recording::Targets;
+use lnn::recording::{Columns, Targets, read_recording};
+use lnn::scalar::Scalar;
+use std::borrow::Cow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -25,7 +30,7 @@ fn held_out(seed: u64, seconds: f64) -> [Vec<f64>; 4] {
 }
 
 /// Squared error of the torque of every joint over its variance.
-fn errors(network: &NetworkLagrangian<f64>, [q, v, a, torque]: &[Vec<f64>; 4]) -> Vec<f64> {
+fn errors(network: &dyn EulerLagrange<f64>, [q, v, a, torque]: &[Vec<f64>; 4]) -> Vec<f64> {
     let found = inverse_dynamics(network, q, v, a).expect("a finite model").external;
     let of = |i: usize| {
         let column = || torque.iter().skip(i).step_by(JOINTS);
@@ -39,7 +44,7 @@ fn errors(network: &NetworkLagrangian<f64>, [q, v, a, torque]: &[Vec<f64>; 4]) -
 }
 
 /// Mean of every `M_ii` over the exact one, and the least eigenvalue of `M`, over the held-out states.
-fn inertia(network: &NetworkLagrangian<f64>, [q, v, ..]: &[Vec<f64>; 4]) -> (Vec<f64>, f64) {
+fn inertia(network: &dyn EulerLagrange<f64>, [q, v, ..]: &[Vec<f64>; 4]) -> (Vec<f64>, f64) {
     let mut terms = Terms::default();
     network.terms(q, v, Request::MASS_MATRIX, &mut terms).expect("a finite model");
     let mut sums = [[0.0; 2]; JOINTS];
@@ -55,15 +60,14 @@ fn inertia(network: &NetworkLagrangian<f64>, [q, v, ..]: &[Vec<f64>; 4]) -> (Vec
     (sums.map(|[found, exact]| found / exact).to_vec(), least)
 }
 
-/// Forces of known states and accelerations that one core gives in a second, in single precision.
-fn rate(network: &NetworkLagrangian<f64>, states: usize) -> f64 {
-    let network = network.cast::<f32>();
+/// Forces of known states and accelerations that one core gives in a second.
+fn rate<S: Scalar>(model: &dyn EulerLagrange<S>, states: usize) -> f64 {
     let wave =
-        |phase: f64| -> Vec<f32> { (0..states * JOINTS).map(|k| (0.37 * k as f64 + phase).sin() as f32).collect() };
+        |phase: f64| -> Vec<S> { (0..states * JOINTS).map(|k| S::of_f64((0.37 * k as f64 + phase).sin())).collect() };
     let [q, v, a] = [0.0, 1.0, 2.0].map(wave);
     let time = |_| {
         let start = Instant::now();
-        inverse_dynamics(&network, &q, &v, &a).expect("a finite model");
+        inverse_dynamics(model, &q, &v, &a).expect("a finite model");
         start.elapsed().as_secs_f64()
     };
     states as f64 / (0..STATES.1).map(time).fold(f64::INFINITY, f64::min)
@@ -112,11 +116,73 @@ pub fn compare(
             println!("  M_ii over the exact one {}", shown.join(""));
             if targets == Targets::Forces {
                 let states = if epochs.is_some() { STATES.0 / 100 } else { STATES.0 };
-                println!("  {:.0} inverse dynamics a second and core", rate(network, states));
+                println!(
+                    "  {:.0} inverse dynamics a second and core, single precision",
+                    rate(&network.cast::<f32>(), states)
+                );
             }
             let joints = errors.iter().zip(&inertia).enumerate();
             rows.extend(joints.map(|(i, (e, m))| format!("{seed},{name},{},{e:.5},{m:.4}", i + 1)));
         }
+    }
+    rows
+}
+
+/// Identifies the arm by its rows from the first 16 s of 20; prints what the held-out motion says of it, and returns rows
+/// `seed,joint,nmse,inertia`.
+pub fn links(seeds: std::ops::Range<u64>, seconds: f64, folder: &Path, states: usize) -> Vec<String> {
+    let truth = constants();
+    let mut rows = Vec::new();
+    for seed in seeds {
+        let file = folder.join(format!("links{seed}.csv"));
+        let text = log(seconds, Faults::USUAL, seed);
+        let before: Vec<&str> = text
+            .lines()
+            .filter(|line| line.split(',').next().and_then(|t| t.parse().ok()).is_none_or(|t: f64| t < 0.8 * seconds))
+            .collect();
+        std::fs::write(&file, before.join("\n")).expect("room for a log");
+        let [coords, force] = ["q", "tau"].map(names);
+        let columns = Columns { coords, force, time: Some("t".to_string()), ..Columns::default() };
+        let reading = read_recording(&[file], &columns).expect("a log");
+        let system = parse_system(include_str!("../../examples/systems/seven_joints.toml")).expect("a system");
+        let arm = configure_system::<f64>(Cow::Owned(system.clone()), &[]).expect("defaults");
+        let start = Instant::now();
+        let found = identify(&arm, &reading.recording, &IdentifyOptions::default()).expect("forces");
+        let seconds_taken = start.elapsed().as_secs_f64();
+        let values: Vec<(String, String)> =
+            found.constants.iter().map(|c| (c.symbol.clone(), c.value.to_string())).collect();
+        let model =
+            configure_system::<f64>(Cow::Owned(system.clone()), &values).expect("values").build().expect("a model");
+        let unseen = held_out(seed, seconds);
+        let (errors, (inertia, least)) = (errors(model.as_ref(), &unseen), inertia(model.as_ref(), &unseen));
+        let exact = |name: &str| truth.iter().find(|(known, _)| known == name).map_or(f64::NAN, |(_, x)| *x);
+        let mut off: Vec<f64> = found
+            .combinations
+            .iter()
+            .map(|sum| {
+                let exact: f64 = sum.terms.iter().map(|(name, factor)| factor * exact(name)).sum();
+                (sum.value - exact).abs() / sum.standard_error
+            })
+            .collect();
+        off.sort_by(f64::total_cmp);
+        let within = off.iter().filter(|x| **x < 2.0).count();
+        let shown: Vec<String> = errors.iter().map(|e| format!("{:8.3}", 100.0 * e)).collect();
+        println!("seed {seed}, links: torques {} %, {seconds_taken:.1} s", shown.join(""));
+        let shown: Vec<String> = inertia.iter().map(|m| format!("{m:7.3}")).collect();
+        println!("  M_ii over the exact one {}, least eigenvalue of M {least:.1e}", shown.join(""));
+        println!(
+            "  {} sums of constants, {within} within two standard errors of the truth, the farthest {:.1}",
+            off.len(),
+            off.last().copied().unwrap_or(0.0)
+        );
+        let single = configure_system::<f32>(Cow::Owned(system), &values).expect("values").build().expect("a model");
+        println!(
+            "  {:.0} inverse dynamics a second and core, {:.0} in single precision",
+            rate(model.as_ref(), states),
+            rate(single.as_ref(), states)
+        );
+        let joints = errors.iter().zip(&inertia).enumerate();
+        rows.extend(joints.map(|(i, (e, m))| format!("{seed},{},{e:.6},{m:.4}", i + 1)));
     }
     rows
 }
