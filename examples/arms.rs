@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example arms -- double.csv` takes columns `run,t,theta1,theta2,theta1_dot,theta2_dot`, absolute angles in rad with pi
 //! hanging, or those of three arms, such as the recordings of the DynamicsLab's pendula (University of Washington). The last four runs are held
-//! back. From the others a Lagrangian with friction is learned as by `lnn fit --friction`, which takes long at 1 kHz, and the constants of
+//! back. From the others a Lagrangian with friction is learned as by `lnn fit --friction --targets smoothed`, and the constants of
 //! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. Without a file it makes runs of its own and learns little.
 
 use lnn::cli::parse_system;
@@ -10,7 +10,7 @@ use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
 use lnn::prelude::*;
 use lnn::random::RngStream;
-use lnn::recording::{Columns, RecordedTrajectory, Recording, read_recording};
+use lnn::recording::{Columns, RecordedTrajectory, Recording, Targets, read_recording};
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 use std::path::Path;
@@ -31,7 +31,9 @@ pub fn main() -> Outcome<()> {
         [file] => {
             let (recording, held) = read(Path::new(file))?;
             let found = identified(&recording)?;
-            show(&recording, &held, &found, Fit::recording(recording.clone()).friction(true).threads(2)).map(|_| ())
+            // A thousand samples a second tell accelerations well enough; through the motion the fit would take long.
+            let fit = Fit::recording(recording.clone()).targets(Targets::Smoothed).friction(true).threads(2);
+            show(&recording, &held, &found, fit).map(|_| ())
         }
         _ => Err("expected one file".into()),
     }
