@@ -320,7 +320,8 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         let term = |(at, (name, factor)): (usize, &(String, f64))| {
             let (sign, size) = if *factor < 0.0 { ("-", -factor) } else { ("+", *factor) };
             let sign = if at == 0 { String::new() } else { format!(" {sign} ") };
-            if size == 1.0 { format!("{sign}{name}") } else { format!("{sign}{}*{name}", rounded(size, 4)) }
+            let size = rounded(size, 4);
+            if size == "1.000" { format!("{sign}{name}") } else { format!("{sign}{size}*{name}") }
         };
         let [value, error] = with_error(sum.value, Some(sum.standard_error));
         vec![sum.terms.iter().enumerate().map(term).collect(), value, error, sum.unit.clone()]

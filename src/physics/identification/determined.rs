@@ -113,15 +113,17 @@ impl Determined {
         Self { covariance, errors, open, null: changes, effects }
     }
 
-    /// Sums of constants that no change without effect moves: the base parameters. Of each such change the last constant that it moves
-    /// gets no sum of its own, in the order of names; of a chain of links those are the masses and the moments along its axes, as
-    /// in Khalil and Dombre ("Modeling, Identification and Control of Robots", 2002).
+    /// Sums of constants that no change without effect moves: the base parameters of a robot (Khalil and Dombre, "Modeling, Identification and
+    /// Control of Robots", 2002). Each such change takes away one constant that it moves, of those with short names first, so that masses
+    /// go into moments.
     pub fn combinations(&self, names: &[&str], units: &[&str], x: &[f64]) -> Vec<Combination> {
         let m = x.len();
         let size = |row: &[f64], k: usize| row[k].abs() * if self.effects[k] > 0.0 { self.effects[k] } else { 1.0 };
         let mut open = self.null.clone();
         let mut done: Vec<(usize, Vec<f64>)> = Vec::new();
-        for k in (0..m).rev() {
+        let mut order: Vec<usize> = (0..m).rev().collect();
+        order.sort_by_key(|&k| names[k].len());
+        for k in order {
             let most = (0..open.len()).max_by(|&a, &b| size(&open[a], k).total_cmp(&size(&open[b], k)));
             let Some(at) = most else { break };
             let largest = (0..m).map(|j| size(&open[at], j)).fold(0.0, f64::max);
@@ -396,6 +398,8 @@ impl Examiner<'_> {
             whole <= ROUNDING * ROUNDING * apart
         };
         let (always, here): (Vec<&Vec<f64>>, Vec<&Vec<f64>>) = changes.iter().partition(|change| everywhere(change));
+        let single = |change: &&Vec<f64>| change.iter().filter(|x| **x != 0.0).count() == 1;
+        let (silent, always): (Vec<&Vec<f64>>, Vec<&Vec<f64>>) = always.into_iter().partition(single);
         let told = |changes: &[&Vec<f64>], (text, cure): (&str, &str)| {
             let largest = |change: &[f64]| change.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             let inside = |k: &usize| changes.iter().any(|change| change[*k].abs() > NO_PART * largest(change));
@@ -404,7 +408,14 @@ impl Examiner<'_> {
             Undetermined { constants, direction: Vec::new(), known: Vec::new(), relative_error: None, text, cure }
         };
         let all = [
-            (always, ("are held together by the equations, whatever the motion", "none: the sums are all that moves")),
+            (silent, ("have no effect on the forces, whatever the motion", "none: nothing depends on them")),
+            (
+                always,
+                (
+                    "are held together by the equations, whatever the motion",
+                    "none: their sums are all that the forces depend on",
+                ),
+            ),
             (here, ("are not told apart by this motion", "motion that goes farther, faster, or by other joints")),
         ];
         all.into_iter().filter(|(some, _)| !some.is_empty()).map(|(some, words)| told(&some, words)).collect()

@@ -145,7 +145,8 @@ impl States {
         let Some(mut best) = self.normal(problem, x, met) else { return false };
         let given = if met == Met::Forces { &self.force } else { &self.a };
         let size: f64 = given.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
-        let mut damping = 1e-3;
+        // Forces are often linear in the constants.
+        let mut damping = if met == Met::Forces { 1e-9 } else { 1e-3 };
         for _ in 0..ITERATIONS {
             let mut right = best.right.clone();
             let mut damped: Vec<f64> =
