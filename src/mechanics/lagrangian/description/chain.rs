@@ -228,11 +228,13 @@ impl Description {
         let [sa, ca] = sine_cosine(alpha);
         let place = [Term::number(a), along.scaled(-sa), along.scaled(ca)];
         let height = [0, 1, 2].map(|i| place[i].times(&base.gravity[i]));
-        let height = self.sum(own("u"), &[&height[..], &[base.height.clone()]].concat())?;
+        let height = self.sum(own("u"), &[&height[..], std::slice::from_ref(&base.height)].concat())?;
         let mut there = Vec::with_capacity(3);
         for i in 0..3 {
             let swung = cross(&base.turning, &place, i);
-            there.push(self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], &[base.moving[i].clone()]].concat())?);
+            there.push(
+                self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], std::slice::from_ref(&base.moving[i])].concat())?,
+            );
         }
         let there: Vector = there.try_into().unwrap_or_else(|_| [0.0; 3].map(Term::number));
         // R^T, first about x and then about z; the motion of the joint is along z.
