@@ -6,7 +6,7 @@ use lnn::cli::parse_system;
 use lnn::identification::{IdentifyOptions, identify};
 use lnn::lagrangian::{EulerLagrange, Request, Terms, configure_system, inverse_dynamics};
 use lnn::linalg::{Workspace, eigenvalues};
-use lnn::network::{NetworkLagrangian, Structure};
+use lnn::network::Structure;
 use lnn::pipeline::Fit;
 use lnn::recording::{Columns, Targets, read_recording};
 use lnn::scalar::Scalar;
