@@ -32,8 +32,8 @@ pub fn main() -> Outcome<()> {
             let (recording, held) = read(Path::new(file))?;
             let found = identified(&recording)?;
             // A thousand samples a second tell accelerations well enough; through the motion the fit would take long.
-            let fit = Fit::recording(recording.clone()).targets(Targets::Smoothed).friction(true).threads(2);
-            show(&recording, &held, &found, fit).map(|_| ())
+            let fit = Fit::recording(recording.clone()).targets(Targets::Smoothed).structure(Structure::Mechanical);
+            show(&recording, &held, &found, fit.friction(true).threads(2)).map(|_| ())
         }
         _ => Err("expected one file".into()),
     }

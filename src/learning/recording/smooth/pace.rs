@@ -119,7 +119,7 @@ fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Usual<'_>], sample: usize) -> i3
     for (k, all) in tried {
         let errors = all.iter().zip(told).zip(&mut missed).map(|((tried, usual), missed)| {
             let [variance, bias, change] = tried.at(sample);
-            (variance + missed.bias(bias, change, INDEPENDENT)) / (usual.error * usual.error)
+            (variance + missed.bias([variance, bias], change, INDEPENDENT)) / (usual.error * usual.error)
         });
         let square: f64 = errors.sum();
         if square > HOPELESS * best {

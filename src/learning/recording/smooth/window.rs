@@ -54,20 +54,34 @@ impl Quality {
 /// Squared bias that longer windows have at least: the most that a shorter one surely has.
 ///
 /// The bias of a window is estimated by the change that two more degrees make. Over several periods of the motion polynomials of either
-/// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Missed(f64);
+/// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it. Bias grows from
+/// window to window until then. What falls with the error itself was none: noise that neighbours share, such as an encoder's marks.
+#[derive(Clone, Copy, Debug)]
+pub struct Missed {
+    square: f64,
+    least: f64,
+}
+
+impl Default for Missed {
+    fn default() -> Self {
+        Self { square: 0.0, least: f64::INFINITY }
+    }
+}
 
 impl Missed {
-    /// Squared bias of the next longer window from its estimate by the change, see [`sure`].
-    pub fn bias(&mut self, square: f64, variance: f64, independent: f64) -> f64 {
+    /// Squared bias of the next longer window, whose variance and squared bias by the change are `error`, see [`sure`].
+    pub fn bias(&mut self, error: [f64; 2], variance: f64, independent: f64) -> f64 {
+        let [own, square] = error;
+        if own + square <= self.least {
+            *self = Self { square: 0.0, least: own + square };
+        }
         self.at_least(sure(square, variance, independent));
-        square.max(self.0)
+        square.max(self.square)
     }
 
     /// This window and all longer ones have at least this squared bias.
     fn at_least(&mut self, square: f64) {
-        self.0 = self.0.max(square);
+        self.square = self.square.max(square);
     }
 }
 
@@ -123,9 +137,12 @@ impl Course {
     /// Adds the accelerations by the next longer window, their squared bias estimated by the change of degree, and the variance of that change.
     fn push(&mut self, found: Accelerations, square: f64, change: f64) {
         let Accelerations { variance, independent, .. } = found;
-        self.missed.at_least(self.finest.missed_by(&found));
-        self.squares.push(variance + self.missed.bias(square, change, independent));
-        self.sure.push(variance + self.missed.0);
+        let beside = self.finest.missed_by(&found);
+        if variance + square > self.missed.least {
+            self.missed.at_least(beside);
+        }
+        self.squares.push(variance + self.missed.bias([variance, square], change, independent));
+        self.sure.push(variance + self.missed.square);
         let (last, least) = (self.squares[self.squares.len() - 1], self.squares[self.best]);
         self.past |= last > PAST * least;
         if !self.past && last <= least {
