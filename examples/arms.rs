@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example arms -- double.csv` takes columns `run,t,theta1,theta2,theta1_dot,theta2_dot`, absolute angles in rad with pi
 //! hanging, or those of three arms, such as the recordings of the DynamicsLab's pendula (University of Washington). The last four runs are held
-//! back. From the others a Lagrangian with friction is learned as by `lnn fit --friction --targets smoothed`, and the constants of
+//! back. From the others a Lagrangian is learned as by `lnn fit --targets smoothed --structure mechanical --friction`, and the constants of
 //! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. Without a file it makes runs of its own and learns little.
 
 use lnn::cli::parse_system;

@@ -37,6 +37,7 @@ macro_rules! page {
             "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[configuration]: crate::docs::configuration\n",
             "[system-files]: crate::docs::system_files\n",
+            "[links]: crate::docs::system_files#a-chain-of-links\n",
             "[summary]: crate::docs::summary\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
