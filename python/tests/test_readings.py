@@ -202,6 +202,29 @@ def test_sensors_outliers_and_files_are_identified(swung, shipped, tmp_path):
     assert abs(arm.constants["l1"].value - 1) < 0.01 and arm.explained
 
 
+def test_forces_tell_the_sums_of_the_constants_of_a_chain():
+    rows = "name = 'elbow'\n[[links]]\nalpha = 'pi/2'\n[[links]]\na = 0.4\n"
+    masses = {"m1": 2.0, "mx1": 0.6, "Izz1": 0.3, "m2": 1.0, "mx2": 0.2, "Izz2": 0.09}
+    arm = lnn.System.from_toml(rows, **masses)
+    t = np.arange(0.0, 6.0, 0.01)[:, None]
+    q = np.hstack([np.sin(2 * t) + 0.3 * np.cos(5 * t), np.cos(3 * t) - 0.4 * np.sin(4 * t)])
+    v = np.hstack([2 * np.cos(2 * t) - 1.5 * np.sin(5 * t), -3 * np.sin(3 * t) - 1.6 * np.cos(4 * t)])
+    a = np.hstack([-4 * np.sin(2 * t) - 7.5 * np.cos(5 * t), -9 * np.cos(3 * t) + 6.4 * np.sin(4 * t)])
+    terms = arm.terms(q, v)
+    force = np.einsum("kij,kj->ki", terms.mass_matrix, a) + terms.coriolis - terms.dl_dq
+    noise = np.random.default_rng(0).normal(0, 0.02, force.shape)
+    found = lnn.identify(q, lnn.System.from_toml(rows), force=force + noise, dt=0.01)
+    assert found.segments == 0 and found.undetermined and "m1" in found.undetermined[0].constants
+    truth = {**lnn.System.from_toml(rows, **masses).parameters}
+    assert any(len(one.terms) > 1 for one in found.combinations)
+    for one in found.combinations:
+        exact = sum(factor * truth[symbol] for symbol, factor in one.terms.items())
+        assert abs(one.value - exact) < 5 * one.standard_error + 1e-6, one
+    assert all(residual.rms < 0.03 < residual.spread for residual in found.residuals.values())
+    with pytest.raises(ValueError, match="targets"):
+        lnn.identify(q, lnn.System.from_toml(rows), targets="forces", dt=0.01)
+
+
 def test_ctrl_c_is_raised_when_a_reading_has_ended(swung):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     pressing = threading.Timer(0.2, os.kill, [os.getpid(), signal.SIGINT])

@@ -123,6 +123,7 @@ impl<S: Scalar> Trajectory<S> {
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] if the number of columns is not `2n`.
+    #[doc(hidden)]
     pub fn to_csv<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
         Ok(self.csv_header(columns)? + &self.csv_rows())
     }

@@ -40,7 +40,9 @@ mod tests;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
-pub use found::{Combination, Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
+pub use found::{Combination, Constant, Identified, Residual, Undetermined};
+#[doc(hidden)]
+pub use found::{Outlier, SensorConstant};
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
 pub(crate) use stages::{choose_steps, joined, spread_of};
