@@ -3,7 +3,7 @@
 //! `cargo run --release --example arms -- double.csv` takes columns `run,t,theta1,theta2,theta1_dot,theta2_dot`, absolute angles in rad with pi
 //! hanging, or those of three arms, such as the recordings of the DynamicsLab's pendula (University of Washington). The last four runs are held
 //! back. From the others a Lagrangian is learned as by `lnn fit --targets smoothed --structure mechanical --friction`, and the constants of
-//! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. Without a file it makes runs of its own and learns little.
+//! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. A seed of the network may follow the file. Without a file it makes runs of its own and learns little.
 
 use lnn::cli::parse_system;
 use lnn::identification::{Identified, IdentifyOptions, identify};
@@ -19,6 +19,8 @@ type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// Runs that nothing is learned from.
 const HELD_BACK: usize = 4;
+/// Share of the others that judges the network while it learns.
+const HELD_OUT: f64 = 0.1;
 /// Length of the segments of the arms in s: what friction does to them takes longer than the segments that are chosen by default.
 const SEGMENT: f64 = 0.25;
 /// Times ahead at which predictions are judged, in s.
@@ -28,14 +30,15 @@ pub fn main() -> Outcome<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     match &words[..] {
         [] => made().map(|_| ()),
-        [file] => {
+        [file, seed @ ..] if seed.len() < 2 => {
+            let seed = seed.first().map_or(Ok(0), |seed| seed.parse())?;
             let (recording, held) = read(Path::new(file))?;
             let found = identified(&recording)?;
-            // A thousand samples a second tell accelerations well enough; through the motion the fit would take long.
             let fit = Fit::recording(recording.clone()).targets(Targets::Smoothed).structure(Structure::Mechanical);
+            let fit = fit.options(|options| options.held_out = HELD_OUT).seed(seed);
             show(&recording, &held, &found, fit.friction(true).threads(2)).map(|_| ())
         }
-        _ => Err("expected one file".into()),
+        _ => Err("expected a file, and a seed if any".into()),
     }
 }
 
