@@ -2,15 +2,16 @@
 //!
 //! `cargo run --release --example arms -- double.csv` takes columns `run,t,theta1,theta2,theta1_dot,theta2_dot`, absolute angles in rad with pi
 //! hanging, or those of three arms, such as the recordings of the DynamicsLab's pendula (University of Washington). The last four runs are held
-//! back. From the others a Lagrangian is learned as by `lnn fit --targets smoothed --structure mechanical --friction`, and the constants of
-//! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. A seed of the network may follow the file. Without a file it makes runs of its own and learns little.
+//! back. From the others a Lagrangian is learned as by `lnn fit --structure mechanical --friction`, and the constants of
+//! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. A seed of the network may follow the file. Without a file it makes
+//! runs of its own and learns little.
 
 use lnn::cli::parse_system;
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
 use lnn::prelude::*;
 use lnn::random::RngStream;
-use lnn::recording::{Columns, RecordedTrajectory, Recording, Targets, read_recording};
+use lnn::recording::{Columns, RecordedTrajectory, Recording, read_recording};
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 use std::path::Path;
@@ -34,7 +35,7 @@ pub fn main() -> Outcome<()> {
             let seed = seed.first().map_or(Ok(0), |seed| seed.parse())?;
             let (recording, held) = read(Path::new(file))?;
             let found = identified(&recording)?;
-            let fit = Fit::recording(recording.clone()).targets(Targets::Smoothed).structure(Structure::Mechanical);
+            let fit = Fit::recording(recording.clone()).structure(Structure::Mechanical);
             let fit = fit.options(|options| options.held_out = HELD_OUT).seed(seed);
             show(&recording, &held, &found, fit.friction(true).threads(2)).map(|_| ())
         }
