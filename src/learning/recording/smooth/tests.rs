@@ -128,7 +128,6 @@ fn the_chosen_window_is_nearly_the_best() {
     }
 }
 
-/// Kepler's ellipse of eccentricity 0.7 around a centre of mass 1, semi-major axis 1: position and acceleration.
 #[test]
 fn noise_that_neighbours_share_is_no_bias_of_short_windows() {
     let mut motion = track(even(6000, 0.001), 2e-5, None, 3);
@@ -152,6 +151,7 @@ fn noise_that_neighbours_share_is_no_bias_of_short_windows() {
     }
 }
 
+/// Kepler's ellipse of eccentricity 0.7 around a centre of mass 1, semi-major axis 1: position and acceleration.
 fn kepler(t: f64) -> [[f64; 2]; 2] {
     let e: f64 = 0.7;
     let anomaly = (0..50).fold(t, |x, _| x - (x - e * x.sin() - t) / (1.0 - e * x.cos()));
