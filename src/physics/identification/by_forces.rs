@@ -14,8 +14,9 @@ use super::stages::{Fitted, unknowns};
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::noise;
 
-/// How often coordinates are weighed anew.
-const ROUNDS: usize = 3;
+/// How often coordinates are weighed anew at most, and relative change of all weights that ends it.
+const ROUNDS: usize = 6;
+const SETTLED: f64 = 0.01;
 /// Size of residuals over the noise up to which a form explains the forces.
 const EXPLAINED: f64 = 1.3;
 /// Residual over the spread of a force that is taken at least.
@@ -47,14 +48,19 @@ pub(super) fn identify(
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let mut sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
-    for _ in 0..=ROUNDS {
+    for _ in 0..ROUNDS {
         states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
         if !states.fit(problem, &mut x, Met::Forces) {
             return Err(IdentifyError::Singular);
         }
         let residuals = [states.force_residuals(problem, &x)];
-        sigma = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
+        let left: Vec<f64> = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
+        let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
+        sigma = left;
         tracing::debug!(?sigma, "residuals of force");
+        if settled {
+            break;
+        }
     }
     states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
     let normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;

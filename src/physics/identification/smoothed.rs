@@ -3,6 +3,7 @@
 use super::follow::{Follower, LANES, forces};
 use super::linear::{inverse_with, times};
 use super::solve::{Normal, Problem, mute, without_effect};
+use crate::linalg::dot;
 use crate::recording::smooth::Smoothed;
 
 /// States at most.
@@ -10,6 +11,8 @@ const MOST_STATES: usize = 12_000;
 /// Errors beyond so many standard deviations count linearly.
 const HUBER: f64 = 3.0;
 const ITERATIONS: usize = 60;
+/// Relative decrease of the sum of squares that is none.
+const CONVERGED: f64 = 1e-8;
 /// Part of the diagonal that keeps normal equations regular.
 const RIDGE: f64 = 1e-11;
 /// Effect of a constant on accelerations, over these and squared, that is rounding alone.
@@ -134,8 +137,17 @@ impl States {
 
     /// Residuals of force, `(states, n)`.
     pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<f64> {
-        let mut all = Vec::with_capacity(self.q.len());
-        self.residuals(problem, x, Met::Forces, |_, residuals, _| all.extend(residuals));
+        let n = problem.course.equations.n;
+        let values = problem.parameters(x);
+        let mut follower = Follower::new(&problem.course);
+        let (mut all, mut a) = (vec![0.0; self.q.len()], vec![0.0; LANES * n]);
+        for (first, residual) in all.chunks_mut(LANES * n).enumerate() {
+            let range = first * LANES * n..first * LANES * n + residual.len();
+            let state = (&self.q[range.clone()], &self.v[range.clone()]);
+            follower.accelerate(&values, state, &self.force[range.clone()], &mut a[..residual.len()]);
+            follower.missing_forces(&self.a[range], residual);
+        }
+        all.iter_mut().for_each(|r| *r = -*r);
         all
     }
 
@@ -154,11 +166,14 @@ impl States {
             mute(&without_effect(&x[..m], &best.matrix, NO_EFFECT * size), &mut damped, &mut right);
             let Some(inverse) = inverse_with(m, &damped, RIDGE) else { break };
             let mut change = times(m, &inverse, &right);
+            if dot(&change, &right) < CONVERGED * best.square {
+                break;
+            }
             change.resize(x.len(), 0.0);
             let moved = problem.moved(x, &change);
             match self.normal(problem, &moved, met) {
                 Some(tried) if tried.square < best.square => {
-                    let done = best.square - tried.square < 1e-8 * best.square;
+                    let done = best.square - tried.square < CONVERGED * best.square;
                     (*x, best) = (moved, tried);
                     damping = f64::max(damping / 10.0, 1e-10);
                     if done {
