@@ -70,8 +70,9 @@ impl Args {
             Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
             None => resolve(&name).map_err(Unusable::System),
         };
-        // A system of the catalogue that is formulas itself, such as one under constraints, keeps them with what was learned.
-        let description = description.or_else(|| system.as_ref().ok()?.description().cloned());
+        // A system of the catalogue that is formulas itself, such as one under constraints, keeps them with what was learned, and links
+        // are written out.
+        let description = system.as_ref().ok().and_then(|system| system.description().cloned()).or(description);
         let mut parameters = match (&start, goes_on) {
             (_, Some(saved)) => saved.parameters.clone(),
             (Some(start), _) if start.header.system == name => start.header.parameters.clone(),

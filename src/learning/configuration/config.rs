@@ -424,7 +424,7 @@ impl Network {
             even_in_v: self.even_in_v,
             learn_alpha: self.learn_alpha,
             known: match &self.known {
-                Some(Known::Description(description)) => Some(description.clone()),
+                Some(Known::Description(description)) => Some(Box::new(description.plain())),
                 // The file is read with the configuration.
                 Some(Known::File(_)) | None => None,
             },

@@ -168,6 +168,18 @@ fn torques_of_a_log_tell_the_sums_of_the_constants_of_an_arm() {
     assert!(written.contains("[[links]]") && !written.contains("[definitions]"), "{written}");
     let again = lnn(&["systems", "--system", &out]);
     assert_eq!(again.code, Some(0), "{}", again.stderr);
+    // Beside a network, and from a configuration that has the links itself: they are written out in what is kept.
+    let links = folder.file(
+        "links.toml",
+        "system = \"elbow\"\n[description]\nname = \"elbow\"\n[description.parameters]\nm2 = 0.5\n[[description.links]]\n[[description.links]]\na = 0.3\n",
+    );
+    let model = text(&folder.path("elbow"));
+    let learned = lnn(&["train", "--config", &links, "--out", &model, "--epochs", "1", "--hidden", "4"]);
+    assert_eq!(learned.code, Some(0), "{}", learned.stderr);
+    let kept = fs::read_to_string(folder.path("elbow").join("config.toml")).unwrap();
+    assert!(kept.contains("link2_L") && !kept.contains("links]]"), "{kept}");
+    let rolled = lnn(&["rollout", &model, "--state", "0.1,0.2,0,0", "--t-end", "0.1", "--dt", "0.1", "--out", "-"]);
+    assert_eq!(rolled.code, Some(0), "{}", rolled.stderr);
     // Sensors are a matter of the motion.
     lnn(&[&asked[..], &["--targets", "forces", "--offset", "q1"]].concat()).refused(2, &["--targets", "sensors"]);
     lnn(&["identify", &data, "--system", ARM, "--targets", "forces"]).refused(2, &["--targets", "known forces"]);

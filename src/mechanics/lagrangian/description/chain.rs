@@ -134,6 +134,11 @@ fn cross(a: &Vector, b: &Vector, i: usize) -> [Term; 2] {
 }
 
 impl Description {
+    /// The same with links written out; as it is if they are wrong, which its compilation says.
+    pub(crate) fn plain(&self) -> Self {
+        self.unfolded().unwrap_or_else(|_| self.clone())
+    }
+
     /// The same without links: their coordinates, parameters and formulas written out.
     pub(super) fn unfolded(&self) -> Result<Self, DescriptionError> {
         let fault = |key: &str, problem: String| Err(DescriptionError::new(key, problem));
