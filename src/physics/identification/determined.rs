@@ -13,6 +13,8 @@ const NULL: f64 = 1e-8;
 const OPEN: f64 = 1.0;
 /// Part of the effect of a change below which a constant has none in it: rounding.
 const PIVOT: f64 = 1e-5;
+/// Part of the largest change from which on another one is as large.
+const EQUAL: f64 = 0.99;
 /// Share of a direction below which a constant has no part in it.
 const NO_PART: f64 = 0.02;
 /// Largest power of a constant in a combination.
@@ -174,10 +176,11 @@ fn sparse(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut done: Vec<usize> = Vec::new();
     for at in 0..rows.len() {
         let open = (0..m).filter(|k| !done.contains(k));
-        let places = open.flat_map(|k| (at..rows.len()).map(move |row| (row, k)));
-        let Some((row, pivot)) = places.max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs())) else {
-            break;
-        };
+        let places: Vec<(usize, usize)> = open.flat_map(|k| (at..rows.len()).map(move |row| (row, k))).collect();
+        let size = |&(row, k): &(usize, usize)| rows[row][k].abs();
+        let largest = places.iter().map(size).fold(0.0, f64::max);
+        // Of equal ones the first, whatever rounding says.
+        let Some(&(row, pivot)) = places.iter().find(|place| size(place) >= EQUAL * largest) else { break };
         rows.swap(at, row);
         let value = rows[at][pivot];
         rows[at].iter_mut().for_each(|x| *x /= value);

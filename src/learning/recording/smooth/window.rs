@@ -55,16 +55,21 @@ impl Quality {
 ///
 /// The bias of a window is estimated by the change that two more degrees make. Over several periods of the motion polynomials of either
 /// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it. Bias grows from
-/// window to window until then. What falls with the error itself was none: noise that neighbours share, such as an encoder's marks.
+/// window to window until then. What falls with the error itself, before that has plainly risen, was none: noise that neighbours share, such as
+/// an encoder's marks.
 #[derive(Clone, Copy, Debug)]
 pub struct Missed {
     square: f64,
     least: f64,
+    risen: bool,
 }
+
+/// Squared error over the least that is plainly a rise.
+const RISEN: f64 = 1.5;
 
 impl Default for Missed {
     fn default() -> Self {
-        Self { square: 0.0, least: f64::INFINITY }
+        Self { square: 0.0, least: f64::INFINITY, risen: false }
     }
 }
 
@@ -72,11 +77,17 @@ impl Missed {
     /// Squared bias of the next longer window, whose variance and squared bias by the change are `error`, see [`sure`].
     pub fn bias(&mut self, error: [f64; 2], variance: f64, independent: f64) -> f64 {
         let [own, square] = error;
-        if own + square <= self.least {
-            *self = Self { square: 0.0, least: own + square };
+        self.risen |= own + square > RISEN * self.least;
+        if self.falls(own + square) {
+            *self = Self { square: 0.0, least: own + square, risen: false };
         }
         self.at_least(sure(square, variance, independent));
         square.max(self.square)
+    }
+
+    /// `true` if this squared error says that what was missed so far was noise.
+    fn falls(&self, error: f64) -> bool {
+        !self.risen && error <= self.least
     }
 
     /// This window and all longer ones have at least this squared bias.
@@ -138,7 +149,7 @@ impl Course {
     fn push(&mut self, found: Accelerations, square: f64, change: f64) {
         let Accelerations { variance, independent, .. } = found;
         let beside = self.finest.missed_by(&found);
-        if variance + square > self.missed.least {
+        if !self.missed.falls(variance + square) {
             self.missed.at_least(beside);
         }
         self.squares.push(variance + self.missed.bias([variance, square], change, independent));
