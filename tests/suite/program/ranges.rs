@@ -64,7 +64,7 @@ fn the_arm_obeys_the_laws_of_mechanics() {
 #[test]
 fn a_model_that_learned_nothing_is_stated_to_be_determined_in_nothing() {
     let folder = Folder::new();
-    let data = folder.file("arm.csv", arm::log(5.0, Faults::USUAL, 0));
+    let data = folder.file("arm.csv", arm::log(8.0, Faults::USUAL, 0));
     let [coordinates, forces] = ["q", "tau"].map(|prefix| arm::names(prefix).join(","));
     let more = ["--coords", &coordinates, "--periodic", &coordinates, "--force", &forces, "--structure", "mechanical"];
     for friction in [&["--friction"][..], &[]] {
