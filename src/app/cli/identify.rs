@@ -43,8 +43,7 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
-    /// What is met: the motion, or the known forces, whose residuals are linear in the constants of a chain of links [default: forces of a
-    /// chain of links, else the motion].
+    /// What the constants are fitted to: the motion, or the known forces [default: the forces of a chain of links, else the motion].
     #[arg(long, value_enum, value_name = "WHAT")]
     targets: Option<Met>,
     /// Known forces between the samples [default: what meets the motion best].
@@ -389,7 +388,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
             vec![trajectory, row.to_string(), rounded(o.time, 6), o.coordinate.clone(), rounded(o.size, 3)]
         });
         let headers = ["trajectory", "row", "t", "coordinate", "over usual"];
-        let advice = if args.robust { "" } else { "; --robust lets them move little" };
+        let advice = if args.robust || found.segments == 0 { "" } else { "; --robust lets them move little" };
         let samples = pluralize(found.outlier_count, "sample", "samples");
         text +=
             &format!("\n{samples} far from the motion{advice}\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));

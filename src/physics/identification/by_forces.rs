@@ -1,8 +1,8 @@
 //! Constants by known forces: least squares on the residuals of force of smoothed motion.
 //!
-//! `r = M a + c - dL/dq + dD/dv - Q` is taken in the forces, without solving for accelerations, so that a mass matrix may be singular on the
-//! way. Each coordinate is weighed by what is left of its forces. Of a Lagrangian that is linear in its constants one step is enough,
-//! however many there are.
+//! The residual is `r = M a + c - dL/dq + dD/dv - Q`. It needs no accelerations to be solved for, so the mass matrix may be singular during
+//! the search. The weight of a coordinate is one over the size of its residuals. If the equations are linear in the constants, a single
+//! step suffices for given weights.
 
 use super::IdentifyError;
 use super::follow::{Follower, LANES, Segment};
@@ -10,15 +10,14 @@ use super::found::{Identified, Outlier, Residual};
 use super::quality::{outliers, usual, whiteness};
 use super::smoothed::{Met, States};
 use super::solve::Problem;
-use super::stages::{Fitted, unknowns};
+use super::stages::{EXPLAINED, Fitted, unknowns};
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::noise;
+use crate::recording::{deviation, rms};
 
 /// How often coordinates are weighed anew at most, and relative change of all weights that ends it.
 const ROUNDS: usize = 6;
 const SETTLED: f64 = 0.01;
-/// Size of residuals over the noise up to which a form explains the forces.
-const EXPLAINED: f64 = 1.3;
 /// Residual over the spread of a force that is taken at least.
 const LEAST: f64 = 1e-9;
 /// Change of slopes, relative to them, that is rounding.
@@ -38,12 +37,7 @@ pub(super) fn identify(
     if count == 0 {
         return Err(IdentifyError::Lost);
     }
-    let column = |values: &[f64], i: usize| values.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>();
-    let deviation = |values: &[f64]| {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
-    };
-    let spread: Vec<f64> = (0..n).map(|i| deviation(&column(&states.force, i))).collect();
+    let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
     // A coordinate that nothing drives is weighed as the others are.
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let mut sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
@@ -70,8 +64,7 @@ pub(super) fn identify(
     let blocks: Vec<Vec<f64>> = residuals.chunks(LANES * n).map(<[f64]>::to_vec).collect();
     let expected = noises(problem, states, &fitted.x);
     let left = |i: usize| {
-        let own = column(&residuals, i);
-        let rms = (own.iter().map(|r| r * r).sum::<f64>() / own.len() as f64).sqrt();
+        let rms = rms(residuals.iter().skip(i).step_by(n).copied());
         let (autocorrelation, white) = whiteness(&blocks, n, i);
         let coordinate = recording.coordinates[i].clone();
         Residual { coordinate, rms, noise: expected[i].max(least[i]), spread: spread[i], autocorrelation, white }
@@ -106,20 +99,14 @@ fn noises(problem: &Problem<'_>, states: &States, x: &[f64]) -> Vec<f64> {
     let tracks =
         || problem.course.recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
     let mut squares = vec![0.0; n];
-    let values = problem.parameters(x);
-    let mut follower = Follower::new(&problem.course);
-    let mut a = vec![0.0; LANES * n];
-    for first in (0..states.q.len()).step_by(LANES * n) {
-        let range = first..(first + LANES * n).min(states.q.len());
-        let state = (&states.q[range.clone()], &states.v[range.clone()]);
-        follower.accelerate(&values, state, &[], &mut a[..range.len()]);
+    states.batches(problem, x, |follower, range, _| {
         let errors = states.a_error[range].chunks_exact(n);
         for (mass, errors) in follower.mass().chunks_exact(n * n).zip(errors) {
             for (square, row) in squares.iter_mut().zip(mass.chunks_exact(n)) {
                 *square += row.iter().zip(errors).map(|(m, e)| (m * e).powi(2)).sum::<f64>();
             }
         }
-    }
+    });
     let of =
         |(i, square): (usize, f64)| noise(tracks(), n, i).sigma.hypot((square / states.places.len() as f64).sqrt());
     squares.into_iter().enumerate().map(of).collect()

@@ -115,10 +115,10 @@ impl Determined {
         Self { covariance, errors, open, null: changes, effects }
     }
 
-    /// Sums of constants that no change without effect moves: the base parameters of a robot (Khalil and Dombre, "Modeling, Identification and
-    /// Control of Robots", 2002). Each such change takes away one constant that it moves, of those with short names first, so that masses
-    /// go into moments.
-    pub fn combinations(&self, names: &[&str], units: &[&str], x: &[f64]) -> Vec<Combination> {
+    /// Sums of constants that determine the forces: the base parameters of a robot (Khalil and Dombre, "Modeling, Identification and Control of
+    /// Robots", 2002). Every change of the constants without effect removes one of them from the list, and adds it to the sums of others.
+    /// Constants with short names are removed first, so that masses are added to moments.
+    pub fn base_parameters(&self, names: &[&str], units: &[&str], x: &[f64]) -> Vec<Combination> {
         let m = x.len();
         let size = |row: &[f64], k: usize| row[k].abs() * if self.effects[k] > 0.0 { self.effects[k] } else { 1.0 };
         let mut open = self.null.clone();

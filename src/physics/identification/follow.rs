@@ -127,14 +127,14 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Residuals of force `M a - h - Q` of the states evaluated last, `(lanes, n)`.
-    pub fn missing_forces(&self, a: &[f64], into: &mut [f64]) {
+    /// The known forces less those that accelerations ask for, `Q + h - M a`, at the states evaluated last: `(lanes, n)`.
+    pub fn lacking_forces(&self, a: &[f64], into: &mut [f64]) {
         let n = self.course.equations.n;
         let rows = self.mass.chunks_exact(n).zip(&self.rest).zip(into).enumerate();
-        rows.for_each(|(at, ((row, rest), into))| *into = linalg::dot(row, &a[at / n * n..][..n]) - rest);
+        rows.for_each(|(at, ((row, rest), into))| *into = rest - linalg::dot(row, &a[at / n * n..][..n]));
     }
 
-    /// Slopes of these residuals by positions, velocities and constants, accelerations held fixed: `(lanes, n, 2n + chosen)`.
+    /// Slopes of `M a - h - Q` by positions, velocities and constants, accelerations held fixed: `(lanes, n, 2n + chosen)`.
     pub fn force_slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
         let n = self.course.equations.n;
         self.by_state.resize(q.len() * (2 * n + self.course.chosen), 0.0);

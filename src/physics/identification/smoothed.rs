@@ -5,6 +5,7 @@ use super::linear::{inverse_with, times};
 use super::solve::{Normal, Problem, mute, without_effect};
 use crate::linalg::dot;
 use crate::recording::smooth::Smoothed;
+use std::ops::Range;
 
 /// States at most.
 const MOST_STATES: usize = 12_000;
@@ -77,31 +78,46 @@ impl States {
         self.q.len() / n
     }
 
-    /// Residuals of what is met with their slopes by the constants, batch by batch: `visit(first number, residuals, slopes)`.
-    fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+    /// Calls `visit` with every batch of states: what follows it, its place among the numbers, and its accelerations by constants `x`.
+    pub fn batches(
+        &self,
+        problem: &Problem<'_>,
+        x: &[f64],
+        mut visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
+    ) {
         let n = problem.course.equations.n;
         let values = problem.parameters(x);
         let mut follower = Follower::new(&problem.course);
-        let (mut a, mut residual) = (vec![0.0; LANES * n], vec![0.0; LANES * n]);
+        let mut a = vec![0.0; LANES * n];
         for first in (0..self.q.len()).step_by(LANES * n) {
             let range = first..(first + LANES * n).min(self.q.len());
+            let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);
-            let (a, residual) = (&mut a[..range.len()], &mut residual[..range.len()]);
-            let measured = &self.a[range.clone()];
             follower.accelerate(&values, state, &self.force[range.clone()], a);
+            visit(&mut follower, range, a);
+        }
+    }
+
+    /// Residuals of what is met with their slopes by the constants, batch by batch: `visit(first number, residuals, slopes)`.
+    fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+        let values = problem.parameters(x);
+        let mut residual = Vec::new();
+        self.batches(problem, x, |follower, range, a| {
+            let (first, measured) = (range.start, &self.a[range.clone()]);
+            let (q, v) = (&self.q[range.clone()], &self.v[range]);
+            residual.resize(a.len(), 0.0);
             let slopes = match met {
                 Met::Accelerations => {
-                    residual.iter_mut().zip(measured.iter().zip(&*a)).for_each(|(r, (measured, a))| *r = measured - a);
-                    follower.slopes(&values, (state.0, state.1, a))
+                    residual.iter_mut().zip(measured.iter().zip(a)).for_each(|(r, (measured, a))| *r = measured - a);
+                    follower.slopes(&values, (q, v, a))
                 }
                 Met::Forces => {
-                    follower.missing_forces(measured, residual);
-                    residual.iter_mut().for_each(|r| *r = -*r);
-                    follower.force_slopes(&values, (state.0, state.1, measured))
+                    follower.lacking_forces(measured, &mut residual);
+                    follower.force_slopes(&values, (q, v, measured))
                 }
             };
-            visit(first, residual, slopes);
-        }
+            visit(first, &residual, slopes);
+        });
     }
 
     /// Normal equations of what is met, with the right-hand sides of batches of states; `None` where no residual is finite.
@@ -137,17 +153,8 @@ impl States {
 
     /// Residuals of force, `(states, n)`.
     pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<f64> {
-        let n = problem.course.equations.n;
-        let values = problem.parameters(x);
-        let mut follower = Follower::new(&problem.course);
-        let (mut all, mut a) = (vec![0.0; self.q.len()], vec![0.0; LANES * n]);
-        for (first, residual) in all.chunks_mut(LANES * n).enumerate() {
-            let range = first * LANES * n..first * LANES * n + residual.len();
-            let state = (&self.q[range.clone()], &self.v[range.clone()]);
-            follower.accelerate(&values, state, &self.force[range.clone()], &mut a[..residual.len()]);
-            follower.missing_forces(&self.a[range], residual);
-        }
-        all.iter_mut().for_each(|r| *r = -*r);
+        let mut all = vec![0.0; self.q.len()];
+        self.batches(problem, x, |follower, range, _| follower.lacking_forces(&self.a[range.clone()], &mut all[range]));
         all
     }
 

@@ -10,7 +10,7 @@ use super::{Between, IdentifyError, IdentifyOptions, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
-use crate::recording::{Recording, Targets};
+use crate::recording::{Recording, Targets, deviation};
 
 /// Samples in a row that are needed.
 const LEAST_SAMPLES: usize = 12;
@@ -31,8 +31,8 @@ const WORSE: f64 = 1.5;
 const GAIN: f64 = 0.01;
 /// Segments from which on their scatter tells how far errors are to be widened.
 const MANY: usize = 8;
-/// Size of residuals over the noise up to which a form explains the motion.
-const EXPLAINED: f64 = 1.3;
+/// Size of residuals over the noise up to which a form explains what was measured.
+pub(super) const EXPLAINED: f64 = 1.3;
 /// Standard deviations by which the pulls of segments may scatter more than noise does, if a form explains the motion.
 const ALIKE: f64 = 4.0;
 const ITERATIONS: usize = 40;
@@ -171,7 +171,9 @@ pub fn identify(
 /// What is met.
 fn met(instance: &SystemInstance<f64>, recording: &Recording, options: &IdentifyOptions) -> Result<Met, IdentifyError> {
     let driven = recording.is_driven();
-    let sensors = [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
+    // Both belong to motion that is followed.
+    let follows = options.segment.is_some()
+        || [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
     let refused = |expected: &str, found: &str| {
         let (expected, found) = (expected.to_string(), found.to_string());
         Err(IdentifyError::Option { what: "targets", expected, found })
@@ -179,11 +181,13 @@ fn met(instance: &SystemInstance<f64>, recording: &Recording, options: &Identify
     match options.targets {
         Some(Targets::Motion) => Ok(Met::Accelerations),
         Some(Targets::Forces) if !driven => refused("motion, of a recording without known forces", "forces"),
-        Some(Targets::Forces) if sensors => refused("motion, beside unknown constants of sensors", "forces"),
+        Some(Targets::Forces) if follows => {
+            refused("motion, beside unknown constants of sensors or a length of segments", "forces")
+        }
         Some(Targets::Forces) => Ok(Met::Forces),
         Some(Targets::Measured) => refused("motion or forces", "measured"),
         Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),
-        None if instance.system.is_chain() && driven && !sensors => Ok(Met::Forces),
+        None if instance.system.is_chain() && driven && !follows => Ok(Met::Forces),
         None => Ok(Met::Accelerations),
     }
 }
@@ -237,21 +241,13 @@ fn sensors(recording: &Recording, options: &IdentifyOptions) -> Result<Vec<Senso
 /// Standard deviation of a coordinate over all samples; 1 for one that rests.
 pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
     let n = recording.n();
-    let all = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n));
-    let count = recording.samples().max(1) as f64;
-    let mean = all().sum::<f64>() / count;
-    let square = all().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
-    if square > 0.0 { square.sqrt() } else { 1.0 }
+    let spread = deviation(recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n)));
+    if spread > 0.0 { spread } else { 1.0 }
 }
 
 /// Samples of the first segments: some of the times in which the fastest coordinate changes, or as many as are wanted if these are fewer.
 fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) -> Result<usize, IdentifyError> {
-    let size = |values: &[f64], i: usize| {
-        let own = || values.iter().skip(i).step_by(n);
-        let count = own().count().max(1) as f64;
-        let mean = own().sum::<f64>() / count;
-        (own().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
-    };
+    let size = |values: &[f64], i: usize| deviation(values.iter().skip(i).step_by(n));
     let paces = (0..n).map(|i| size(&states.v, i) / size(&states.a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
     let pace = paces.fold(f64::INFINITY, f64::min);
     let samples = if pace.is_finite() { PACES * pace / step } else { 20.0 };
@@ -476,7 +472,7 @@ fn usual_samples(segments: &[Segment]) -> usize {
     samples.get(samples.len() / 2).copied().unwrap_or(0)
 }
 
-/// Constants and sensors with their errors, and what is open; what is left of the motion is not said yet.
+/// The part of the result about constants and sensors; the caller adds the residuals.
 pub(super) fn unknowns(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
@@ -509,7 +505,7 @@ pub(super) fn unknowns(
         // What sums are known says what is open.
         Met::Forces if problem.is_linear(&fitted.segments) => {
             let units: Vec<&str> = (0..m).map(|k| parameter(k).unit.as_ref()).collect();
-            (examiner.together(&determined.null), determined.combinations(&names, &units, &fitted.x))
+            (examiner.together(&determined.null), determined.base_parameters(&names, &units, &fitted.x))
         }
         _ => {
             let open = determined.open.iter();

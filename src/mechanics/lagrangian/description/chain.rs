@@ -194,9 +194,9 @@ impl Description {
                     return fault(&format!("links[{k}].{key}"), format!("expected a finite number, found {x}"));
                 }
             }
-            sums.push(Term::name(plain.link((k + 1, link, before), &mut base, chain.armature)?));
+            sums.push(Term::name(plain.add_link((k + 1, link, before), &mut base, chain.armature)?));
             if chain.friction {
-                losses.extend(plain.rub((k + 1, link), speed)?);
+                losses.extend(plain.add_friction((k + 1, link), speed)?);
             }
         }
         let whole = |own: Vec<Term>, more: &Option<String>| {
@@ -211,7 +211,7 @@ impl Description {
     }
 
     /// Adds a link: the name of its part of the Lagrangian, and `base` moved on to it.
-    fn link(
+    fn add_link(
         &mut self,
         (number, link, [a, alpha]): (usize, &LinkDescription, [f64; 2]),
         base: &mut Base,
@@ -224,8 +224,8 @@ impl Description {
             sine_cosine(link.theta.0).map(Term::number)
         } else {
             let angle = formula(&[q.clone(), Term::number(link.theta.0)]);
-            self.name(own("s"), format!("sin({angle})"))?;
-            self.name(own("c"), format!("cos({angle})"))?;
+            self.define_part(own("s"), format!("sin({angle})"))?;
+            self.define_part(own("c"), format!("cos({angle})"))?;
             ["s", "c"].map(|what| Term::name(own(what)))
         };
         let along =
@@ -234,14 +234,11 @@ impl Description {
         let place = [Term::number(a), along.scaled(-sa), along.scaled(ca)];
         let height = [0, 1, 2].map(|i| place[i].times(&base.gravity[i]));
         let height = self.sum(own("u"), &[&height[..], std::slice::from_ref(&base.height)].concat())?;
-        let mut there = Vec::with_capacity(3);
-        for i in 0..3 {
+        let mut carried = |i: usize| {
             let swung = cross(&base.turning, &place, i);
-            there.push(
-                self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], std::slice::from_ref(&base.moving[i])].concat())?,
-            );
-        }
-        let there: Vector = there.try_into().unwrap_or_else(|_| [0.0; 3].map(Term::number));
+            self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], std::slice::from_ref(&base.moving[i])].concat())
+        };
+        let there = [carried(0)?, carried(1)?, carried(2)?];
         // R^T, first about x and then about z; the motion of the joint is along z.
         let mut turned = |what: &str, from: &Vector, joint: Option<&Term>| -> Result<Vector, DescriptionError> {
             let [y, z] = [[ca, sa], [-sa, ca]].map(|[y, z]| [from[1].scaled(y), from[2].scaled(z)]);
@@ -267,38 +264,41 @@ impl Description {
                 terms.push(inertia.times(&w[i]).times(&w[j]).scaled(if i == j { 0.5 } else { 1.0 }));
             }
         }
-        let (inertia, about) = if link.prismatic { ("kg", "kg") } else { ("kg m^2", "kg m^2") };
         let mut constants = vec![("m".to_string(), "kg", 1.0)];
         for (i, x) in AXES.iter().enumerate() {
             constants.push((format!("m{x}"), "kg m", 0.0));
-            constants.extend(AXES[i..].iter().map(|y| (format!("I{x}{y}"), about, if x == y { 0.1 } else { 0.0 })));
+            constants.extend(AXES[i..].iter().map(|y| (format!("I{x}{y}"), "kg m^2", if x == y { 0.1 } else { 0.0 })));
         }
         if armature {
             terms.push(constant("Ia").times(&speed).times(&speed).scaled(0.5));
-            constants.push(("Ia".to_string(), inertia, 0.0));
+            constants.push(("Ia".to_string(), if link.prismatic { "kg" } else { "kg m^2" }, 0.0));
         }
-        self.constants(number, &constants);
+        self.add_constants(number, &constants);
         *base = Base { turning: w, moving: v, gravity: g, height };
-        self.name(own("L"), formula(&terms))?;
+        self.define_part(own("L"), formula(&terms))?;
         Ok(own("L"))
     }
 
     /// Terms of Rayleigh's function of a joint: `Fv q_dot^2/2 + Fc s ln cosh(q_dot/s)`.
-    fn rub(&mut self, (number, link): (usize, &LinkDescription), speed: f64) -> Result<[Term; 2], DescriptionError> {
+    fn add_friction(
+        &mut self,
+        (number, link): (usize, &LinkDescription),
+        speed: f64,
+    ) -> Result<[Term; 2], DescriptionError> {
         let units = if link.prismatic { ["N s/m", "N"] } else { ["N m s", "N m"] };
         let velocity = format!("{}_dot", self.coordinates[number - 1].name);
         let dry = format!("link{number}_dry");
         // ln cosh x = |x| + ln(1 + exp(-2 |x|)) - ln 2, which no speed overflows.
         let size = format!("abs({velocity}/{speed})");
-        self.name(dry.clone(), format!("{speed}*({size} + ln1p(exp(-2*{size})))"))?;
-        self.constants(number, &[("Fv".to_string(), units[0], 0.0), ("Fc".to_string(), units[1], 0.0)]);
+        self.define_part(dry.clone(), format!("{speed}*({size} + ln1p(exp(-2*{size})))"))?;
+        self.add_constants(number, &[("Fv".to_string(), units[0], 0.0), ("Fc".to_string(), units[1], 0.0)]);
         let constant = |what: &str| Term::name(format!("{what}{number}"));
         let viscous = Term { factor: 0.5, names: [constant("Fv").names, vec![velocity.clone(), velocity]].concat() };
         Ok([viscous, constant("Fc").times(&Term::name(dry))])
     }
 
     /// Unknown constants of a link, unless the file says more of them.
-    fn constants(&mut self, number: usize, constants: &[(String, &str, f64)]) {
+    fn add_constants(&mut self, number: usize, constants: &[(String, &str, f64)]) {
         for (name, unit, value) in constants {
             let own = || ParameterDescription {
                 default: Decimal(value.to_string()),
@@ -324,13 +324,13 @@ impl Description {
             [] => Ok(Term::number(0.0)),
             [single] if single.names.len() < 2 => Ok(single.clone()),
             _ => {
-                self.name(name.clone(), formula(&all))?;
+                self.define_part(name.clone(), formula(&all))?;
                 Ok(Term::name(name))
             }
         }
     }
 
-    fn name(&mut self, name: String, text: String) -> Result<(), DescriptionError> {
+    fn define_part(&mut self, name: String, text: String) -> Result<(), DescriptionError> {
         match self.definitions.insert(name.clone(), text) {
             Some(_) => Err(DescriptionError::new(format!("definitions.{name}"), "the name is taken by `[[links]]`")),
             None => Ok(()),
