@@ -18,6 +18,7 @@ pub(super) struct StateTerms<'a, R> {
 }
 
 /// Fills what is needed.
+#[inline]
 pub(super) fn evaluate<L: Lagrangian, R: Real>(
     system: &L,
     parameters: &[R],
@@ -111,6 +112,7 @@ fn first_order<L: Lagrangian, R: Real>(
 }
 
 /// Everything from one evaluation with the second derivatives by the velocities and along `(v, 0)`; `N = H + 1`.
+#[inline]
 fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     system: &L,
     parameters: &[R],

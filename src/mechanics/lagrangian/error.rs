@@ -160,16 +160,18 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// Rows of a field `(batch, width)` that are not finite.
+/// Adds the rows of a field `(batch, width)` that are not finite.
 #[inline]
-pub(super) fn not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize) -> Vec<MechanicsError> {
-    if all_finite(field) { Vec::new() } else { rows_not_finite(what, field, width) }
+pub(super) fn not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, found: &mut Vec<MechanicsError>) {
+    if !all_finite(field) {
+        rows_not_finite(what, field, width, found);
+    }
 }
 
 #[cold]
-fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize) -> Vec<MechanicsError> {
+fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, found: &mut Vec<MechanicsError>) {
     let rows = field.chunks(width.max(1)).enumerate().filter(|(_, row)| !all_finite(row));
-    rows.map(|(row, _)| MechanicsError::NotFinite { row, what }).collect()
+    found.extend(rows.map(|(row, _)| MechanicsError::NotFinite { row, what }));
 }
 
 /// `true` if every number is finite; no branch before the end.
@@ -192,10 +194,12 @@ mod tests {
         field[131] = f64::NAN;
         field[129] = f64::INFINITY;
         field[299] = f64::NAN;
-        let found = not_finite("momentum", &field, 3);
+        let mut found = Vec::new();
+        not_finite("momentum", &field, 3, &mut found);
         let bad = |row| MechanicsError::NotFinite { row, what: "momentum" };
         assert_eq!(found, [bad(43), bad(99)]);
-        assert_eq!(not_finite("momentum", &field[..129], 3), []);
+        not_finite("momentum", &field[..129], 3, &mut found);
+        assert_eq!(found.len(), 2);
         let mut terms = Terms::<f64>::default();
         terms.prepend_failures(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
         terms.prepend_failures(found);

@@ -55,24 +55,6 @@ impl<S: Scalar> Terms<S> {
         }
     }
 
-    /// Accelerations and multipliers under forces; rows that fail are `NaN` and added to the failures.
-    fn accelerate(
-        &mut self,
-        n: usize,
-        force: &[S],
-        drift: &[S],
-        (acceleration, multipliers): (&mut [S], &mut [S]),
-        workspace: &mut Workspace<S>,
-    ) {
-        let motion = Motion {
-            size: (n, self.constraints),
-            mass: &self.mass_matrix,
-            constraints: &self.constraint_matrix,
-            drift,
-        };
-        accelerate(motion, force, (acceleration, multipliers), workspace, &mut self.failures);
-    }
-
     /// Adds `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field; with constraints in the terms,
     /// accelerations, multipliers and forces of constraint.
     ///
@@ -114,12 +96,7 @@ impl<S: Scalar> Terms<S> {
             let m = self.constraints;
             expect("constraint rows", batch * m * n, self.constraint_matrix.len())?;
             expect("constraint drifts", batch * m, self.constraint_drift.len())?;
-            let (mut acceleration, mut multipliers, drift) = (
-                std::mem::take(&mut self.acceleration),
-                std::mem::take(&mut self.multipliers),
-                std::mem::take(&mut self.constraint_drift),
-            );
-            for (field, size) in [(&mut acceleration, batch * n), (&mut multipliers, batch * m)] {
+            for (field, size) in [(&mut self.acceleration, batch * n), (&mut self.multipliers, batch * m)] {
                 field.clear();
                 field.resize(size, S::nan());
             }
@@ -131,8 +108,14 @@ impl<S: Scalar> Terms<S> {
                 expect("generalized forces", batch * n, self.force.len())?;
                 update(&mut right, &self.force, |right, force| *right += force);
             }
-            self.accelerate(n, &right, &drift, (&mut acceleration, &mut multipliers), workspace);
-            (self.acceleration, self.multipliers, self.constraint_drift) = (acceleration, multipliers, drift);
+            let motion = Motion {
+                size: (n, m),
+                mass: &self.mass_matrix,
+                constraints: &self.constraint_matrix,
+                drift: &self.constraint_drift,
+            };
+            let found = (&mut self.acceleration[..], &mut self.multipliers[..]);
+            accelerate(motion, &right, found, workspace, &mut self.failures);
             self.sum_constraint_forces(n);
             workspace.give_vector(right);
         }
@@ -152,7 +135,7 @@ impl<S: Scalar> Terms<S> {
         ];
         let mut found = Vec::new();
         for &(what, field, width) in &fields {
-            found.append(&mut not_finite(what, field, width));
+            not_finite(what, field, width, &mut found);
         }
         self.prepend_failures(found);
         self.outcome()
@@ -184,12 +167,19 @@ impl<S: Scalar> Terms<S> {
             return shape("accelerations", size, self.acceleration.len());
         }
         self.failures.clear();
-        let found = not_finite("external force", external, n);
+        let mut found = Vec::new();
+        not_finite("external force", external, n, &mut found);
         let mut change = workspace.take_vector();
         change.clear();
         change.resize(size, S::nan());
         let mut pull = vec![zero; self.multipliers.len()];
-        self.accelerate(n, external, &[], (&mut change, &mut pull), workspace);
+        let motion = Motion {
+            size: (n, self.constraints),
+            mass: &self.mass_matrix,
+            constraints: &self.constraint_matrix,
+            drift: &[],
+        };
+        accelerate(motion, external, (&mut change, &mut pull), workspace, &mut self.failures);
         update(&mut self.acceleration, &change, |a, change| *a += change);
         update(&mut self.multipliers, &pull, |multiplier, change| *multiplier += change);
         self.sum_constraint_forces(n);
@@ -324,7 +314,9 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
             generalized.push(inertia + terms.coriolis[k * n + i] - terms.dl_dq[k * n + i]);
         }
     }
-    terms.prepend_failures(not_finite("generalized force", &generalized, n));
+    let mut found = Vec::new();
+    not_finite("generalized force", &generalized, n, &mut found);
+    terms.prepend_failures(found);
     terms.prepend_failures(failed);
     let (mut friction, failures) = (terms.force, terms.failures);
     for row in failures.iter().filter_map(MechanicsError::row) {

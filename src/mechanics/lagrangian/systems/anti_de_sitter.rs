@@ -109,6 +109,7 @@ impl Lagrangian for AdsGeodesic {
     fn coordinates(&self) -> usize {
         self.n
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [radius] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         R::half() * (radius / q[self.n - 1]).sqr() * (squares(&v[1..]) - v[0].sqr())

@@ -97,6 +97,7 @@ impl Lagrangian for SchwarzschildGeodesic {
     fn coordinates(&self) -> usize {
         4
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [mass] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (r, f) = (q[1], redshift(mass, q[1]));
@@ -243,6 +244,7 @@ impl Lagrangian for KerrGeodesic {
     fn coordinates(&self) -> usize {
         4
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         Forms::new(parameters, q, v).map_or(R::constant(Scalar::nan()), |form| R::half() * form.interval(v))
     }

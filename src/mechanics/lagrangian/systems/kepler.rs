@@ -44,6 +44,7 @@ impl Lagrangian for Kepler {
     fn coordinates(&self) -> usize {
         2
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [mu] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         R::half() * (v[0].sqr() + v[1].sqr()) + mu / (q[0].sqr() + q[1].sqr()).sqrt()

@@ -45,6 +45,7 @@ impl Lagrangian for HarmonicOscillator {
     fn coordinates(&self) -> usize {
         1
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [m, k] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         R::half() * (m * v[0].sqr() - k * q[0].sqr())
@@ -95,6 +96,7 @@ impl Lagrangian for HenonHeiles {
     fn coordinates(&self) -> usize {
         2
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [lambda] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (xx, yy) = (q[0].sqr(), q[1].sqr());

@@ -69,6 +69,7 @@ impl Lagrangian for DoublePendulum {
     fn coordinates(&self) -> usize {
         2
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [m1, m2, l1, l2, g] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (u1, u2) = (l1 * v[0], l2 * v[1]);
@@ -145,6 +146,7 @@ impl Lagrangian for TriplePendulum {
     fn coordinates(&self) -> usize {
         3
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let Some((loads, lengths, g)) = loads(parameters) else { return R::constant(crate::scalar::Scalar::nan()) };
         chain_lagrangian(&loads, &lengths, g, q, v)
@@ -211,6 +213,7 @@ impl Lagrangian for NPendulum {
     fn coordinates(&self) -> usize {
         self.n
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let Some((loads, lengths, g)) = self.loads(parameters) else {
             return R::constant(crate::scalar::Scalar::nan());
@@ -346,6 +349,7 @@ impl Lagrangian for SpringPendulum {
     fn coordinates(&self) -> usize {
         2
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [m, k, l0, g] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (r, theta) = (q[0], q[1]);

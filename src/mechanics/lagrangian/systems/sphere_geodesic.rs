@@ -79,6 +79,7 @@ impl Lagrangian for SphereGeodesic {
     fn coordinates(&self) -> usize {
         2
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [m, radius] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         R::half() * m * radius.sqr() * (v[0].sqr() + (q[0].sin() * v[1]).sqr())

@@ -44,6 +44,7 @@ impl Lagrangian for ConstantForce {
     fn coordinates(&self) -> usize {
         1
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [m, force] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         R::half() * m * v[0].sqr() + force * q[0]
@@ -119,6 +120,7 @@ impl Lagrangian for ChargedParticle {
     fn coordinates(&self) -> usize {
         3
     }
+    #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let [m, charge, c, b, e] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let potential = R::half() * b * (q[0] * v[1] - q[1] * v[0]) + e * q[0];
