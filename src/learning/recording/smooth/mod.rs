@@ -20,6 +20,7 @@ use noise::along;
 use pace::Usual;
 use signal::{Fits, Signal};
 use thiserror::Error;
+use window::best;
 
 /// Settings of derivatives; those that are not given are chosen from the data.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,23 +174,31 @@ impl Smoothing {
         let step = median(&mut usual);
         let longest = tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
         let short = |needed| SmoothError::Short { track: "the longest trajectory".into(), samples: longest, needed };
-        let coordinates = (0..n).map(|i| {
+        let noises = (0..n).map(|i| {
             let position = match &options.noise {
                 Some(given) => Noise { sigma: given[i], order: 0, resolved: true },
                 None => noise(tracks.iter().map(|t| (t.times.as_slice(), t.q.as_slice())), n, i),
             };
             let velocity = velocities.then(|| noise(tracks.iter().map(|t| (t.times.as_slice(), t.v.as_slice())), n, i));
-            let ratio = velocity.and_then(|velocity| ratio(position, velocity, step));
-            let signal = Signal { tracks, clocks: &clocks, n, i, sigma: position.sigma, ratio, degree: options.degree };
-            let (window, own) = match options.window {
-                Some(window) => (window, vec![window; tracks.len()]),
-                None => signal.best().ok_or_else(|| short(options.degree + 3))?,
-            };
-            let quality = signal.quality(window, &own).ok_or_else(|| short(window))?;
-            let seconds = (window - 1) as f64 * step;
-            Ok((Chosen { noise: position, velocity_noise: velocity, quality, seconds }, own))
+            (position, velocity)
         });
-        let (coordinates, own) = coordinates.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        let noises: Vec<_> = noises.collect();
+        let signals = noises.iter().enumerate().map(|(i, &(position, velocity))| {
+            let ratio = velocity.and_then(|velocity| ratio(position, velocity, step));
+            Signal { tracks, clocks: &clocks, n, i, sigma: position.sigma, ratio, degree: options.degree }
+        });
+        let signals: Vec<_> = signals.collect();
+        let windows = match options.window {
+            Some(window) => vec![(window, vec![window; tracks.len()]); n],
+            None => best(&signals).ok_or_else(|| short(options.degree + 3))?,
+        };
+        let chosen =
+            signals.iter().zip(noises).zip(&windows).map(|((signal, (noise, velocity_noise)), (window, own))| {
+                let quality = signal.quality(*window, own).ok_or_else(|| short(*window))?;
+                Ok(Chosen { noise, velocity_noise, quality, seconds: (window - 1) as f64 * step })
+            });
+        let coordinates = chosen.collect::<Result<_, _>>()?;
+        let own = windows.into_iter().map(|(_, own)| own).collect();
         Ok(Self { degree: options.degree, coordinates, own, step, varying: options.window.is_none() })
     }
 

@@ -93,6 +93,16 @@ impl Signal<'_> {
         length: impl Fn(usize) -> usize,
         mut visit: impl FnMut(&Estimate, &LocalFit, usize, usize),
     ) -> f64 {
+        self.visit_places(length, |fit, range, track, at| visit(&self.estimate(fit, track, range, at), fit, track, at))
+    }
+
+    /// Calls `visit` with the rows at the places of [`visit`](Self::visit), the samples of their window, the trajectory and the sample: rows
+    /// that serve every coordinate with the same ratio of noises.
+    pub fn visit_places(
+        &self,
+        length: impl Fn(usize) -> usize,
+        mut visit: impl FnMut(&LocalFit, Range<usize>, usize, usize),
+    ) -> f64 {
         let total: usize = self.tracks.iter().map(RecordedTrajectory::len).sum();
         let centres = CENTRES.min(total);
         let mut fits = Fits::default();
@@ -111,7 +121,7 @@ impl Signal<'_> {
             let Some(at) = self.clocks[number].centre(&track.times, place - start, window) else { continue };
             let range = self.window(number, at, window);
             let fit = self.fit(&mut fits, number, range.clone(), (at, window));
-            visit(&self.estimate(fit, number, range, at), fit, number, at);
+            visit(fit, range, number, at);
             visited += 1;
         }
         visited as f64 / centres.max(1) as f64

@@ -221,75 +221,110 @@ impl Signal<'_> {
             acceleration: root(square_a - variance[2]),
         })
     }
+}
 
-    /// The usual window and that of every trajectory.
-    ///
-    /// On a trajectory the best window is the one whose accelerations have the least squared bias and variance together (Fan and Gijbels,
-    /// Local Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree). The usual one has the least mean over
-    /// the samples of the logarithm of that error: by its size itself a single fast trajectory would choose for all. Trajectories on which
-    /// the usual one is nearly as good as their best keep it. None if fewer than half the samples are on trajectories long enough.
-    pub fn best(&self) -> Option<(usize, Vec<usize>)> {
-        let longest = self.tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
-        let mut courses = vec![Course::default(); self.tracks.len()];
-        let (mut tried, mut best, mut past) = (Vec::new(), None::<(usize, f64)>, false);
-        for window in lengths((self.degree + 3) | 1, longest) {
-            if !self.try_window(window, &mut courses) {
-                break;
-            }
-            let mean = self.mean(&courses, tried.len());
-            past |= best.is_some_and(|(_, least)| mean > least + PAST.ln());
-            if !past && best.is_none_or(|(_, least)| mean < least) {
-                best = Some((tried.len(), mean));
-            }
-            tried.push(window);
-            if past && courses.iter().all(|course| course.past || course.squares.len() < tried.len()) {
-                break;
-            }
-        }
-        let (usual, _) = best?;
-        Some((tried[usual], courses.iter().map(|course| tried[course.own(usual)]).collect()))
+/// The search for the windows of one signal.
+struct Search<'a> {
+    signal: &'a Signal<'a>,
+    /// Those of the trajectories.
+    courses: Vec<Course>,
+    /// Number of the usual window with the least mean so far, and that mean.
+    best: Option<(usize, f64)>,
+    past: bool,
+    /// `true` if no longer window is of use.
+    ended: bool,
+}
+
+impl<'a> Search<'a> {
+    fn new(signal: &'a Signal<'a>) -> Self {
+        let courses = vec![Course::default(); signal.tracks.len()];
+        Self { signal, courses, best: None, past: false, ended: false }
     }
 
-    /// Adds the errors of a window to the courses of the trajectories that are long enough; `false` if these hold fewer than half the samples.
-    fn try_window(&self, window: usize, courses: &mut [Course]) -> bool {
-        let noise = self.sigma * self.sigma;
-        let mut sums = vec![Sums::default(); courses.len()];
-        let share = self.visit(
+    /// Adds the errors of a window to the courses of the trajectories that are long enough, of signals whose noises have the same ratio;
+    /// `false` if these hold fewer than half the samples.
+    fn try_window(window: usize, alike: &mut [&mut Self]) -> bool {
+        let Some(signal) = alike.first().map(|search| search.signal) else { return true };
+        let mut sums: Vec<_> =
+            alike.iter().map(|search| (search.signal, vec![Sums::default(); signal.tracks.len()])).collect();
+        let share = signal.visit_places(
             |_| window,
-            |estimate, fit, track, at| {
-                let sums = &mut sums[track];
-                // Windows that would reach over an end are all the one at the end.
-                if sums.values.last().is_none_or(|(last, _)| *last != at) {
-                    sums.values.push((at, estimate.values[2]));
+            |fit, range, track, at| {
+                for (signal, sums) in &mut sums {
+                    let (noise, sums) = (signal.sigma * signal.sigma, &mut sums[track]);
+                    let estimate = signal.estimate(fit, track, range.clone(), at);
+                    // Windows that would reach over an end are all the one at the end.
+                    if sums.values.last().is_none_or(|(last, _)| *last != at) {
+                        sums.values.push((at, estimate.values[2]));
+                    }
+                    sums.count += 1.0;
+                    sums.variance += noise * fit.variance[2];
+                    sums.square += estimate.changes[2] * estimate.changes[2];
+                    sums.change_variance += noise * fit.change_variance[2];
                 }
-                sums.count += 1.0;
-                sums.variance += noise * fit.variance[2];
-                sums.square += estimate.changes[2] * estimate.changes[2];
-                sums.change_variance += noise * fit.change_variance[2];
             },
         );
         if share < 0.5 {
             return false;
         }
-        for ((sums, course), track) in
-            sums.into_iter().zip(courses).zip(self.tracks).filter(|((s, _), _)| s.count > 0.0)
-        {
-            let [variance, square, change] = [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
-            // Neighbours within half a window have the same errors.
-            let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
-            course.push(Accelerations { values: sums.values, variance, independent }, square - change, change);
+        for (search, (signal, sums)) in alike.iter_mut().zip(sums) {
+            let tracks = sums.into_iter().zip(&mut search.courses).zip(signal.tracks);
+            for ((sums, course), track) in tracks.filter(|((s, _), _)| s.count > 0.0) {
+                let [variance, square, change] =
+                    [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
+                // Neighbours within half a window have the same errors.
+                let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
+                course.push(Accelerations { values: sums.values, variance, independent }, square - change, change);
+            }
         }
         true
     }
 
     /// Mean over the samples of the logarithm of the squared error by window number `k`.
-    fn mean(&self, courses: &[Course], k: usize) -> f64 {
+    fn mean(&self, k: usize) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for (course, track) in courses.iter().zip(self.tracks) {
+        for (course, track) in self.courses.iter().zip(self.signal.tracks) {
             if let Some(square) = course.at(k) {
                 (sum, count) = (sum + track.len() as f64 * square.ln(), count + track.len() as f64);
             }
         }
         sum / count
     }
+
+    /// Compares window number `k`, the last that was tried, with those before.
+    fn compare(&mut self, k: usize) {
+        let mean = self.mean(k);
+        self.past |= self.best.is_some_and(|(_, least)| mean > least + PAST.ln());
+        if !self.past && self.best.is_none_or(|(_, least)| mean < least) {
+            self.best = Some((k, mean));
+        }
+        self.ended = self.past && self.courses.iter().all(|course| course.past || course.squares.len() <= k);
+    }
+}
+
+/// The usual window of every signal and that of each of its trajectories. The signals have the same trajectories.
+///
+/// On a trajectory the best window is the one whose accelerations have the least squared bias and variance together (Fan and Gijbels,
+/// Local Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree). The usual one has the least mean over
+/// the samples of the logarithm of that error: by its size itself a single fast trajectory would choose for all. Trajectories on which
+/// the usual one is nearly as good as their best keep it. None if fewer than half the samples are on trajectories long enough.
+pub fn best(signals: &[Signal<'_>]) -> Option<Vec<(usize, Vec<usize>)>> {
+    let Signal { tracks, degree, .. } = signals.first()?;
+    let longest = tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
+    let mut searches: Vec<Search<'_>> = signals.iter().map(Search::new).collect();
+    let mut tried = Vec::new();
+    for window in lengths((degree + 3) | 1, longest) {
+        let mut open: Vec<&mut Search<'_>> = searches.iter_mut().filter(|search| !search.ended).collect();
+        let mut alike = open.chunk_by_mut(|a, b| a.signal.ratio == b.signal.ratio);
+        if !alike.all(|alike| Search::try_window(window, alike)) {
+            break;
+        }
+        open.into_iter().for_each(|search| search.compare(tried.len()));
+        tried.push(window);
+    }
+    let windows = |search: &Search<'_>| {
+        let (usual, _) = search.best?;
+        Some((tried[usual], search.courses.iter().map(|course| tried[course.own(usual)]).collect()))
+    };
+    searches.iter().map(windows).collect()
 }
