@@ -7,6 +7,7 @@ mod recording_split;
 mod sampling;
 mod shell;
 
+pub(crate) use dataset::Weighting;
 pub use dataset::{Dataset, DatasetError, Datasets};
 #[doc(hidden)]
 pub use dataset::{Noise, StateEstimate};

@@ -1,7 +1,7 @@
 //! Learning from arrays of states: the quick preset's choices, changed by a builder.
 
 use crate::configuration::{Config, ConfigError, Precision};
-use crate::data::{Dataset, DatasetError, Datasets};
+use crate::data::{Dataset, DatasetError, Datasets, Weighting};
 use crate::lagrangian::{EulerLagrange, FormulaConstraints, FormulaError};
 use crate::network::file::{Header, ModelFile, ModelFileError};
 use crate::network::{NetworkError, NetworkLagrangian, Structure};
@@ -235,6 +235,9 @@ impl<'a> Trainer<'a> {
         (config.data.training, config.data.validation, config.data.test) =
             (training.len(), validation.len(), test.len());
         let scale = training.physical_scale();
+        let floor = config.data.acceleration_weighting;
+        let training =
+            if floor > 0.0 { Weighting { floor, scale: &scale, errors: &[] }.relative(training)? } else { training };
         let periodic = (0..n).map(|i| angles.contains(&i)).collect();
         let architecture = config.architecture_with(names.iter().map(String::as_str), periodic, scale)?;
         architecture.validate()?;
@@ -296,7 +299,9 @@ mod tests {
         assert_eq!(learned.history.len(), 10);
         let again = trainer.clone().threads(2).train().unwrap();
         assert_eq!(again.model.weights(), learned.model.weights());
-        assert_ne!(trainer.seed(1).train().unwrap().model.weights(), learned.model.weights());
+        assert_ne!(trainer.clone().seed(1).train().unwrap().model.weights(), learned.model.weights());
+        let weighted = trainer.configure(|config| config.data.acceleration_weighting = 0.1).train().unwrap();
+        assert_ne!(weighted.model.weights(), learned.model.weights());
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("model.safetensors");
         learned.save(&path).unwrap();
