@@ -196,7 +196,7 @@ pub fn made() -> Outcome<()> {
     let model = earth(&truth)?.build()?;
     let mut rng = RngStream::Trajectories.generator(0);
     let mut tracks = Vec::new();
-    for k in 0..6 {
+    for k in 0..3 {
         // Circles of 26,560 km, 55 degrees from the equator, seen from the turning Earth.
         let (radius, tilt) = (2.656e7, 55.0_f64.to_radians());
         let speed = (gm / radius).sqrt();

@@ -71,7 +71,7 @@ impl Folder {
 }
 
 /// Epochs of a training that is interrupted early on.
-const EPOCHS: usize = 1000;
+const EPOCHS: usize = 400;
 
 fn config(epochs: usize) -> Config {
     let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
