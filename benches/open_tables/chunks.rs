@@ -422,6 +422,45 @@ fn accelerations(chunk: &States, n: usize, dt: f64) -> Vec<f64> {
     found
 }
 
+/// States of the chunks whose accelerations `a` are known: the polynomial through one sample less gives the same to within the median of
+/// their sizes. Where a force changes within a step, or angles turn fast near a pole, it gives others, and a few of those that are far too large
+/// would outweigh all the rest.
+fn known(chunks: &[States], a: &[f64], n: usize, dt: f64) -> Vec<usize> {
+    let length = |a: &mut dyn Iterator<Item = f64>| a.map(|a| a * a).sum::<f64>().sqrt();
+    let mut sizes: Vec<f64> = a.chunks_exact(n).map(|a| length(&mut a.iter().copied())).collect();
+    let (_, median, _) = sizes.select_nth_unstable_by(a.len() / n / 2, f64::total_cmp);
+    let within = |(chunk, a): (&States, &[f64])| -> Vec<bool> {
+        let [first, last] = [0, 1].map(|from| {
+            let rows = from * n..(from + CHUNK - 1) * n;
+            accelerations(&States { q: chunk.q[rows.clone()].to_vec(), v: chunk.v[rows].to_vec() }, n, dt)
+        });
+        let other = |k: usize| if k <= CHUNK / 2 { &first[k * n..][..n] } else { &last[(k - 1) * n..][..n] };
+        let apart = |(k, a): (usize, &[f64])| length(&mut a.iter().zip(other(k)).map(|(a, b)| a - b));
+        a.chunks_exact(n).enumerate().map(|row| apart(row) <= *median).collect()
+    };
+    let within = chunks.iter().zip(a.chunks_exact(CHUNK * n)).flat_map(within);
+    within.enumerate().filter(|(_, within)| *within).map(|(row, _)| row).collect()
+}
+
+/// Constraints that all chunks obey, by name.
+fn constraints(chunks: &[States], n: usize, dt: f64) -> Option<Vec<(String, String)>> {
+    let track = |(k, chunk): (usize, &States)| RecordedTrajectory {
+        name: format!("chunk {k}"),
+        times: (0..CHUNK).map(|k| k as f64 * dt).collect(),
+        q: chunk.q.clone(),
+        v: chunk.v.clone(),
+        a: vec![],
+        force: vec![],
+    };
+    let tracks = chunks.iter().enumerate().map(track).collect();
+    let coordinates = (1..=n).map(|i| format!("q{i}")).collect();
+    let recording = Recording { coordinates, periodic: vec![false; n], tracks };
+    let samples = MotionSamples::exact(&recording).expect("velocities");
+    let found = find_constraints(&samples, ConstraintSearch { degree: 2, velocity_degree: 1 }).ok()?;
+    let of_system = found.constraints.into_iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
+    Some(of_system.enumerate().map(|(k, found)| (format!("found {k}"), found.formula)).collect())
+}
+
 /// Means of the errors over the motions, arithmetic and geometric, `z` and `z'` sample by sample.
 fn errors(pairs: impl Iterator<Item = (Vec<[Vec<f64>; 2]>, Vec<[Vec<f64>; 2]>)>) -> [f64; 2] {
     let length = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
@@ -461,44 +500,18 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
     let n = if cartesian { chunks[0].q.len() / CHUNK } else { row.exact.coordinates() };
     let part = |of: &dyn Fn(&States) -> Vec<f64>| chunks.iter().flat_map(of).collect::<Vec<f64>>();
     let a = part(&|chunk| accelerations(chunk, n, row.dt));
-    let states = Dataset::new(n, part(&|c| c.q.clone()), part(&|c| c.v.clone()), a).expect("finite states");
-    let names: Vec<String> = (1..=n).map(|i| format!("q{i}")).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let constraints = || {
-        let tracks = chunks.iter().enumerate().map(|(k, chunk)| RecordedTrajectory {
-            name: format!("chunk {k}"),
-            times: (0..CHUNK).map(|k| k as f64 * row.dt).collect(),
-            q: chunk.q.clone(),
-            v: chunk.v.clone(),
-            a: vec![],
-            force: vec![],
-        });
-        let recording = Recording {
-            coordinates: names.iter().map(|name| name.to_string()).collect(),
-            periodic: vec![false; n],
-            tracks: tracks.collect(),
-        };
-        let samples = MotionSamples::exact(&recording).expect("velocities");
-        let found = find_constraints(&samples, ConstraintSearch { degree: 2, velocity_degree: 1 }).ok()?;
-        let of_system = found.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
-        let formulas: Vec<(&str, &str)> = of_system.map(|found| ("found", found.formula.as_str())).collect();
-        Some(ExpressionConstraints::new(&names, &[], &formulas).expect("formulas that read back"))
-    };
-    let held = if cartesian {
-        let constraints = constraints()?;
-        Some(Constrained::new(Mechanics::new(Free(n), []), constraints, []).expect("the same coordinates"))
-    } else {
-        None
-    };
-    let states = match held.as_ref().and_then(|held| EulerLagrange::<f64>::manifold(held)) {
-        Some(manifold) => states.on(manifold).expect("finite rows"),
-        None => states,
-    };
+    let known = known(&chunks, &a, n, row.dt);
+    let rows = |of: &[f64]| known.iter().flat_map(|&row| &of[row * n..(row + 1) * n]).copied().collect::<Vec<f64>>();
+    let states = Dataset::new(n, rows(&part(&|c| c.q.clone())), rows(&part(&|c| c.v.clone())), rows(&a));
+    let states = states.expect("finite states");
+    let formulas = if cartesian { constraints(&chunks, n, row.dt)? } else { Vec::new() };
+    let formulas: Vec<(&str, &str)> =
+        formulas.iter().map(|(name, formula)| (name.as_str(), formula.as_str())).collect();
     let epochs = (budget.steps * BATCH).div_ceil(states.len() * 8 / 10);
     let trained = |structure| {
         let angles = if cartesian { vec![] } else { row.exact.angles() };
-        let trainer = Trainer::new(&states).angles(&angles).structure(structure).hidden(&budget.hidden);
-        trainer.batch(BATCH).epochs(epochs).seed(seed).threads(2).train().ok()
+        let trainer = Trainer::new(&states).angles(&angles).constraints(&formulas).structure(structure);
+        trainer.hidden(&budget.hidden).batch(BATCH).epochs(epochs).seed(seed).threads(2).train().ok()
     };
     // In Cartesian coordinates the mass matrix may be constant: validation decides.
     let structures: &[_] =
@@ -515,13 +528,7 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
         .collect();
     let time = (SAMPLES - 1) as f64 * row.dt;
     let options = Options { energy: false, rtol: 1e-8, atol: 1e-8, ..Options::new(time, row.dt) };
-    let predicted = match held {
-        Some(_) => {
-            let model = Constrained::new(learned.model, constraints()?, []).expect("the same coordinates");
-            rollout_many(&model, &starts, &options, 2)
-        }
-        None => rollout_many(&learned.model, &starts, &options, 2),
-    };
+    let predicted = rollout_many(&*learned.motion().ok()?, &starts, &options, 2);
     let pairs = data.motions.iter().zip(&predicted).map(|(exact, predicted)| {
         let exact = exact.rows(row.exact.coordinates()).map(|(q, v)| row.exact.cartesian(q, v)).collect();
         let motion = &predicted.trajectory;
