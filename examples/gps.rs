@@ -188,7 +188,7 @@ fn show(found: &Identified) {
     println!("{} segments of {} s, residual {rms:.3} m", found.segments, found.segment_seconds);
 }
 
-/// Six satellites for a day, every 15 minutes, to 5 cm.
+/// Three satellites for a day, every 15 minutes, to 5 cm.
 pub fn made() -> Outcome<()> {
     let truth = [&KNOWN[..], &POLE].concat();
     let known = |symbol: &str| truth.iter().find(|(name, _)| *name == symbol).map_or(f64::NAN, |(_, x)| *x);

@@ -1,7 +1,9 @@
 //! What a request costs, and what is skipped when it is not made: evaluations and training steps of network Lagrangians
 //! in turns, beside their bare matrix products and the time to read the weights.
 //!
-//! `cargo bench --bench cost` takes some minutes and prints Markdown tables; `-- --smoke` seconds.
+//! `cargo bench --bench cost` takes some minutes and prints Markdown tables; `-- --smoke` seconds. `-- --count SYSTEM N` evaluates one state of
+//! a system of the catalogue N times, its acceleration and all its terms, for a tool that counts instructions (`valgrind --tool=callgrind`): two
+//! counts give that of a state.
 
 #[path = "../shared/networks.rs"]
 mod networks;
@@ -12,7 +14,7 @@ mod turns;
 
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::lagrangian::{EulerLagrange, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Request, Terms, configure};
 use lnn::network::{Architecture, Initialization, NetworkLagrangian, initial_weights};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::rollout::{rollout_many, rollout_together};
@@ -253,7 +255,25 @@ fn ensembles(options: &Options) {
 }
 
 fn main() {
-    run(std::env::args().any(|argument| argument == "--smoke"));
+    let arguments: Vec<String> = std::env::args().collect();
+    match arguments.iter().position(|argument| argument == "--count").map(|at| &arguments[at + 1..]) {
+        Some([name, count, ..]) => repeat(name, count.parse().expect("a number of evaluations")),
+        _ => run(arguments.iter().any(|argument| argument == "--smoke")),
+    }
+}
+
+/// Evaluates one state within the bounds of a system, its acceleration and all its terms.
+fn repeat(name: &str, count: usize) {
+    let configured = configure::<f64>(name, &[]).expect("a system of the catalogue");
+    let bounds = configured.system.validation(configured.coordinates);
+    let within =
+        |bounds: &[(f64, f64)]| -> Vec<f64> { bounds.iter().map(|(low, high)| low + 0.37 * (high - low)).collect() };
+    let (q, mut v) = (within(&bounds.positions), within(&bounds.velocities));
+    configured.impose_constraint(&q, &mut v).expect("a state of the system");
+    let (model, mut terms) = (configured.build().expect("the defaults are valid"), Terms::default());
+    for request in [Request::ACCELERATION, Request::ALL] {
+        (0..count).for_each(|_| model.terms(black_box(&q), &v, request, &mut terms).expect("a regular state"));
+    }
 }
 
 /// Prints all tables; in seconds and without meaning for `smoke`.

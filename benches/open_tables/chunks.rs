@@ -493,7 +493,7 @@ struct Budget {
 const BATCH: usize = 128;
 
 /// Learns a row in generalized or in Cartesian coordinates and predicts.
-fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> Option<([f64; 2], f64)> {
+fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> Option<([f64; 2], f64, usize)> {
     let started = Instant::now();
     let own = |states: &States| if cartesian { row.cartesian(states) } else { states.clone() };
     let chunks: Vec<States> = data.chunks.iter().map(own).collect();
@@ -537,20 +537,20 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
             rows.map(|(q, v)| if cartesian { [q.to_vec(), v.to_vec()] } else { row.exact.cartesian(q, v) }).collect();
         (exact, states)
     });
-    Some((errors(pairs), started.elapsed().as_secs_f64()))
+    Some((errors(pairs), started.elapsed().as_secs_f64(), states.len()))
 }
 
 fn table(rows: &[&Row], seeds: u64, coordinates: &[bool], budget: &Budget) {
-    println!("system       coordinates   seed  arithmetic   geometric   seconds");
+    println!("system       coordinates   seed  arithmetic   geometric   seconds   states");
     for row in rows {
         for &cartesian in coordinates {
             for seed in 0..seeds {
                 let data = row.data(budget.chunks, seed);
                 let name = if cartesian { "cartesian" } else { "generalized" };
                 match run(row, &data, cartesian, seed, budget) {
-                    Some(([mean, geometric], seconds)) => {
+                    Some(([mean, geometric], seconds, states)) => {
                         println!(
-                            "{:<12} {name:<12} {seed:>5} {mean:>11.1e} {geometric:>11.1e} {seconds:>9.1}",
+                            "{:<12} {name:<12} {seed:>5} {mean:>11.1e} {geometric:>11.1e} {seconds:>9.1} {states:>8}",
                             row.name
                         );
                     }

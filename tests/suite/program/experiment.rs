@@ -22,9 +22,9 @@ fn every_experiment_of_the_paper_runs() {
     let all = said_by(&lnn(&[&["all", "--list"], &arguments[..]].concat()));
     for experiment in lnn::experiments::experiments() {
         assert!(listed.contains(experiment.name) && listed.contains(experiment.paper));
-        // Of the experiments that take longest, some rows that differ in kind.
+        // Of the experiments that take longest, some rows; the next test reads a hole in Cartesian coordinates.
         let only = match experiment.name {
-            "black-holes" => "quick, kerr",
+            "black-holes" => "spherical",
             "boundary" => "the paper's choices",
             _ => "",
         };
@@ -49,12 +49,6 @@ fn every_experiment_of_the_paper_runs() {
         assert!(report.len() < 2_000_000, "{}: {}", experiment.name, report.len());
         if experiment.name == "black-holes" {
             assert!(fs::read_to_string(folder.join("readings.csv")).unwrap().contains("innermost stable orbit"));
-            for run in runs.iter().filter(|run| run.label.contains("cartesian")) {
-                for (picture, head) in [("orbits.svg", &b"<svg"[..]), ("sky.png", b"\x89PNG")] {
-                    let bytes = fs::read(folder.join(&run.name).join(picture)).unwrap();
-                    assert!(bytes.starts_with(head), "{}/{picture}", run.name);
-                }
-            }
         }
         // Relativistic runs are held to their signature, not to positive eigenvalues.
         if experiment.name == "ads4-geodesic" {
@@ -76,7 +70,12 @@ fn a_hole_of_ones_own_is_read_like_those_of_the_experiment() {
     let out_dir = ["--threads", "1", "--out", out.path().to_str().unwrap()];
     let printed = said_by(&lnn(&[&["black-holes"], &hole[..], &out_dir].concat()));
     assert!(printed.contains("quick, reissner-nordstrom-cartesian, Q = 0.5"), "{printed}");
-    let readings = fs::read_to_string(out.path().join("black-holes-smoke/readings.csv")).unwrap();
+    let folder = out.path().join("black-holes-smoke");
+    let readings = fs::read_to_string(folder.join("readings.csv")).unwrap();
+    for (picture, head) in [("orbits.svg", &b"<svg"[..]), ("sky.png", b"\x89PNG")] {
+        let run = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).find(|path| path.is_dir()).unwrap();
+        assert!(fs::read(run.join(picture)).unwrap().starts_with(head), "{picture}");
+    }
     assert!(readings.contains("parameter Q") && !readings.contains("kerr"), "{readings}");
     let refused = lnn(&[&["old-tricks"], &hole[..4], &out_dir].concat());
     let told = String::from_utf8_lossy(&refused.stderr);

@@ -265,7 +265,7 @@ fn numbers_of_configurations_are_bounded() {
     ];
     let small: Vec<_> = small.collect();
     for (table, key) in keys {
-        // The one with a length among its coordinates, where one is needed; the quickest otherwise.
+        // A system with a length among its coordinates where the key is about one, otherwise the one that is evaluated in the least time.
         let system = if key == "radial_unit" { "spring-pendulum" } else { "harmonic-oscillator" };
         for value in ["0", "-1", "1e308", "1e-308", "4294967296", "9223372036854775807", "nan"] {
             let mut content = format!("system = \"{system}\"\n");
