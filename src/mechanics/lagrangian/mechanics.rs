@@ -4,8 +4,9 @@ use super::derivatives::{StateTerms, evaluate};
 use super::taylor::Taylor;
 use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
-use crate::scalar::{Dd, Real, Scalar};
+use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError, Tracer};
+use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Batches from this size on are replayed from a recorded program; a chunk of lanes is not worth it below.
@@ -294,22 +295,58 @@ fn record<'t, S: Scalar>(
     fields.concat()
 }
 
+/// The code of an [`Evaluator`], which this crate compiles once for each scalar: a crate with a Lagrangian of its own compiles the code of
+/// that Lagrangian alone.
+struct Routines<S> {
+    terms: fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>,
+    metric_jets: fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>,
+    wide_metric_jets: fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<Dd>>, MechanicsError>,
+}
+
+impl<S: Scalar> Routines<S> {
+    const ALL: Self =
+        Self { terms: Evaluator::terms, metric_jets: Evaluator::metric_jets, wide_metric_jets: Evaluator::metric_jets };
+
+    fn get() -> &'static Self {
+        S::routines().downcast_ref().expect("every scalar holds its own routines")
+    }
+}
+
+macro_rules! compiled {
+    ($($scalar:ty)*) => {$(
+        impl Compiled for $scalar {
+            // Inlined elsewhere it would take the routines along.
+            #[inline(never)]
+            fn routines() -> &'static dyn Any {
+                &Routines::<Self>::ALL
+            }
+        }
+    )*};
+}
+compiled!(f32 f64 Dd);
+
+impl<F: Foreign> Compiled for AnyFloat<F> {
+    fn routines() -> &'static dyn Any {
+        &Routines::<Self>::ALL
+    }
+}
+
 impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
     fn coordinates(&self) -> usize {
         Lagrangian::coordinates(&self.system)
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        self.evaluator.terms(&self.system, q, v, request, terms)
+        (Routines::get().terms)(&self.evaluator, &self.system, q, v, request, terms)
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        self.evaluator.metric_jets(&self.system, q, v)
+        (Routines::get().metric_jets)(&self.evaluator, &self.system, q, v)
     }
 
     fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
         let worth = S::epsilon().to_f64() > Dd::epsilon().to_f64()
             && Lagrangian::coordinates(&self.system) <= REPLAY_COORDINATES;
-        worth.then(|| self.evaluator.metric_jets(&self.system, q, v)).transpose()
+        worth.then(|| (Routines::get().wide_metric_jets)(&self.evaluator, &self.system, q, v)).transpose()
     }
 }

@@ -20,6 +20,15 @@ pub struct NetworkLagrangian<S> {
     model: Model<S>,
     /// Workspaces that no call holds at the moment.
     idle: Mutex<Vec<Workspace<S>>>,
+    code: Code<S>,
+}
+
+/// What evaluates a network, by reference: it is compiled where networks are made, so that a crate that receives one from a training does
+/// not compile it again.
+#[derive(Clone, Copy, Debug)]
+struct Code<S> {
+    terms: fn(&NetworkLagrangian<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>,
+    metric_jets: fn(&NetworkLagrangian<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>,
 }
 
 #[derive(Debug)]
@@ -137,8 +146,13 @@ impl<S: Scalar> NetworkLagrangian<S> {
         if weights.len() != expected {
             return Err(NetworkError::Weights { expected, found: weights.len() });
         }
-        let model = architecture.model();
-        Ok(Self { architecture, weights, model, idle: Mutex::new(Vec::new()) })
+        Ok(Self::of_valid(architecture, weights))
+    }
+
+    fn of_valid(architecture: Architecture, weights: Vec<S>) -> Self {
+        let (model, idle) = (architecture.model(), Mutex::new(Vec::new()));
+        let code = Code { terms: Self::evaluate_terms, metric_jets: Self::evaluate_metric_jets };
+        Self { architecture, weights, model, idle, code }
     }
 
     /// Shape of the network.
@@ -154,8 +168,40 @@ impl<S: Scalar> NetworkLagrangian<S> {
     #[doc(hidden)]
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
-        let model = self.architecture.model();
-        NetworkLagrangian { architecture: self.architecture.clone(), weights, model, idle: Mutex::new(Vec::new()) }
+        NetworkLagrangian::of_valid(self.architecture.clone(), weights)
+    }
+
+    fn evaluate_terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let n = self.architecture.coordinates;
+        let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
+        if !q.len().is_multiple_of(n) {
+            return shape("coordinates", q.len().next_multiple_of(n), q.len());
+        }
+        if v.len() != q.len() {
+            return shape("velocities", q.len(), v.len());
+        }
+        terms.clear();
+        let mut workspace = self
+            .idle
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .pop()
+            .unwrap_or_else(|| Workspace::new(&self.model));
+        let depth = request.depth();
+        for states in q.chunks(STATES * n).zip(v.chunks(STATES * n)) {
+            workspace.append(self, states, (request, depth), terms);
+        }
+        let outcome = terms.complete(n, v, request, &mut workspace.linalg);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        outcome
+    }
+
+    fn evaluate_metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        let weights: Vec<Taylor<'static, S>> = self.weights.iter().map(|&w| Taylor::constant(w)).collect();
+        let mut wrapped = q.to_vec();
+        self.model.wrap(&mut wrapped);
+        let n = self.architecture.coordinates;
+        metric_jets(n, (&wrapped, v), |q, v| self.architecture.lagrangian(&weights, q, v))
     }
 }
 
@@ -212,36 +258,11 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        let n = self.architecture.coordinates;
-        let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
-        if !q.len().is_multiple_of(n) {
-            return shape("coordinates", q.len().next_multiple_of(n), q.len());
-        }
-        if v.len() != q.len() {
-            return shape("velocities", q.len(), v.len());
-        }
-        terms.clear();
-        let mut workspace = self
-            .idle
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .pop()
-            .unwrap_or_else(|| Workspace::new(&self.model));
-        let depth = request.depth();
-        for states in q.chunks(STATES * n).zip(v.chunks(STATES * n)) {
-            workspace.append(self, states, (request, depth), terms);
-        }
-        let outcome = terms.complete(n, v, request, &mut workspace.linalg);
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
-        outcome
+        (self.code.terms)(self, q, v, request, terms)
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        let weights: Vec<Taylor<'static, S>> = self.weights.iter().map(|&w| Taylor::constant(w)).collect();
-        let mut wrapped = q.to_vec();
-        self.model.wrap(&mut wrapped);
-        let n = self.architecture.coordinates;
-        metric_jets(n, (&wrapped, v), |q, v| self.architecture.lagrangian(&weights, q, v))
+        (self.code.metric_jets)(self, q, v)
     }
 
     fn conserves_energy(&self) -> bool {

@@ -10,9 +10,11 @@
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
 //! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
 
-use super::StepCounts;
 use super::dense::{Interpolant, Rhs, Step};
+use super::run::{self, Keep};
 use super::trajectory::Times;
+use super::{Force, Options, RolloutError, StepCounts};
+use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OVector};
@@ -75,8 +77,17 @@ pub struct Ran<S, E> {
     pub(super) ended: Option<EarlyEnd<E>>,
 }
 
-/// The scalars that roll-outs work in: `f32` and `f64`.
+/// The scalars that roll-outs work in: `f32` and `f64`. The methods are compiled in this crate, once for each.
 pub trait Integrable: Scalar {
+    #[doc(hidden)]
+    fn roll_out(
+        model: &dyn EulerLagrange<Self>,
+        force: Option<&dyn Force<Self>>,
+        start: (&[Self], &[Self]),
+        options: &Options<Self>,
+        keep: &mut Keep<'_, Self>,
+    ) -> (StepCounts, Option<RolloutError>);
+
     #[doc(hidden)]
     fn integrate<E>(
         task: &Integration<'_, Self>,
@@ -90,6 +101,16 @@ macro_rules! integrable {
     ($($float:ty)*) => {
         $(
             impl Integrable for $float {
+                fn roll_out(
+                    model: &dyn EulerLagrange<Self>,
+                    force: Option<&dyn Force<Self>>,
+                    start: (&[Self], &[Self]),
+                    options: &Options<Self>,
+                    keep: &mut Keep<'_, Self>,
+                ) -> (StepCounts, Option<RolloutError>) {
+                    run::integrate(model, force, start, options, keep)
+                }
+
                 fn integrate<E>(
                     task: &Integration<'_, Self>,
                     f: &mut Rhs<'_, Self, E>,

@@ -3,7 +3,6 @@
 
 use super::force::pieces;
 use super::gauss::{Tableau, lagrange};
-use super::run::integrate;
 use super::trajectory::CHUNK;
 use super::{Force, Integrable, Options, RolloutError, StepCounts, Trajectory};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -57,7 +56,7 @@ pub(super) fn hand_over<S: Integrable>(
         piece.v.clear();
         more
     };
-    let (statistics, stop) = integrate(model, force, start, options, &mut |t, q, v| {
+    let (statistics, stop) = S::roll_out(model, force, start, options, &mut |t, q, v| {
         piece.push(t, q, v);
         if piece.len() == CHUNK {
             willing = give(&mut piece);

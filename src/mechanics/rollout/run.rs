@@ -87,7 +87,7 @@ pub(super) fn adaptive_or_fixed<S: Integrable>(
     v: &[S],
     options: &Options<S>,
 ) -> Rollout<S> {
-    collected(model, options, |keep| integrate(model, force, (q, v), options, keep))
+    collected(model, options, |keep| S::roll_out(model, force, (q, v), options, keep))
 }
 
 /// By the structure-preserving methods, perhaps under a force from outside.

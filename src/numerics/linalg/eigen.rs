@@ -57,11 +57,11 @@ fn run<S: Scalar>(
     if batch == 0 {
         return Ok(());
     }
-    let finite = if large_systems::serves::<S>(n) {
-        for (row, (m, w)) in matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate() {
-            let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
-            large_systems::eigh(n, m, w, u);
-        }
+    let by_faer = matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate().all(|(row, (m, w))| {
+        let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
+        large_systems::eigh(n, m, w, u)
+    });
+    let finite = if by_faer {
         false
     } else if const { size_of::<S>() < size_of::<f64>() } {
         split::<S, { 2 * LANES }>(n, matrices, values, vectors, &mut workspace.block)

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::batch::{Retry, Workspace};
 use super::solve::{Systems, examine, is_harmless, suspicious};
-use crate::scalar::{Real, Scalar, Slice, SliceMut, vectorized};
+use crate::scalar::{Real, Scalar, vectorized};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::perm::PermRef;
@@ -29,24 +29,12 @@ impl<S: Scalar> Systems<'_, S> {
                 failures.push((row, failure));
             }
         };
-        let doubtful = match (S::slice(self.matrices), S::slice_mut(solutions)) {
-            (Slice::F32(matrices), SliceMut::F32(x)) => eliminate(self.n, self.m, matrices, self.right.map(f32s), x),
-            (Slice::F64(matrices), SliceMut::F64(x)) => eliminate(self.n, self.m, matrices, self.right.map(f64s), x),
-            _ => return false,
-        };
+        let Some(doubtful) = S::eliminate(self.n, self.m, self.matrices, self.right, solutions) else { return false };
         for row in doubtful {
             judge(row, &mut solutions[row * self.n * self.m..][..self.n * self.m], failures, second);
         }
         true
     }
-}
-
-fn f32s<S: Scalar>(x: &[S]) -> &[f32] {
-    if let Slice::F32(x) = S::slice(x) { x } else { &[] }
-}
-
-fn f64s<S: Scalar>(x: &[S]) -> &[f64] {
-    if let Slice::F64(x) = S::slice(x) { x } else { &[] }
 }
 
 /// Factors of one matrix, and what solving with them needs.
@@ -112,7 +100,7 @@ fn largest<F: Scalar>(bound: F, x: &[F]) -> F {
 }
 
 /// Solves all systems, each refined once where it is due; returns the rows whose matrices must be examined.
-fn eliminate<F: Scalar + RealField>(
+pub(super) fn eliminate<F: Scalar + RealField>(
     n: usize,
     m: usize,
     matrices: &[F],
@@ -192,27 +180,19 @@ fn refine<F: Scalar>(m: usize, x: &mut [F], step: &[F]) {
 /// Size above which faer's tridiagonal method beats Jacobi on lanes.
 const EIGEN: usize = 32;
 
-/// `true` if faer has an eigensolver for this scalar and this size.
-pub(super) fn serves<S: Scalar>(n: usize) -> bool {
-    n > EIGEN && !matches!(S::slice(&[]), Slice::Other(_))
+/// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix, `NaN` if faer gives up; `false` if the lanes
+/// are faster, or faer does not have this scalar.
+pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) -> bool {
+    n > EIGEN && S::eigh(n, matrix, values, vectors)
 }
 
-/// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix; `NaN` if faer gives up.
-pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) {
-    match (S::slice(matrix), S::slice_mut(values), S::slice_mut(vectors)) {
-        (Slice::F32(m), SliceMut::F32(w), SliceMut::F32(u)) => through_faer(n, m, w, u, f32::NAN),
-        (Slice::F64(m), SliceMut::F64(w), SliceMut::F64(u)) => through_faer(n, m, w, u, f64::NAN),
-        _ => {}
-    }
-}
-
-fn through_faer<F: RealField + Copy>(n: usize, matrix: &[F], values: &mut [F], vectors: &mut [F], nan: F) {
+pub(super) fn decompose<F: Scalar + RealField>(n: usize, matrix: &[F], values: &mut [F], vectors: &mut [F]) {
     // Row-major and lower triangle: column-major and upper triangle of the same symmetric matrix.
     let matrix = MatRef::from_column_major_slice(matrix, n, n);
     if vectors.is_empty() {
         match matrix.self_adjoint_eigenvalues(Side::Lower) {
             Ok(found) => values.copy_from_slice(&found),
-            Err(_) => values.fill(nan),
+            Err(_) => values.fill(<F as Scalar>::nan()),
         }
         return;
     }
@@ -225,6 +205,6 @@ fn through_faer<F: RealField + Copy>(n: usize, matrix: &[F], values: &mut [F], v
                 }
             }
         }
-        Err(_) => values.fill(nan),
+        Err(_) => values.fill(<F as Scalar>::nan()),
     }
 }

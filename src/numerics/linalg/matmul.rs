@@ -4,96 +4,9 @@
 //! Products of a few rows with a transposed matrix, `C = alpha A B^T`, by dot products: the rows of both are contiguous, so that
 //! nothing is packed. A blocked product packs `B^T` whatever the number of rows, which takes longer than to multiply few.
 
-use crate::scalar::{Real, Scalar, Simd, Slice, SliceMut, WithSimd, in_vectors, update};
+use crate::scalar::{MatMut, MatRef, Scalar, Simd, WithSimd, in_vectors};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
-
-/// A matrix view over row-major storage, possibly transposed.
-#[derive(Clone, Copy, Debug)]
-pub struct MatRef<'a, S> {
-    data: &'a [S],
-    rows: usize,
-    cols: usize,
-    stride: usize,
-    transposed: bool,
-}
-
-/// A mutable matrix view over row-major storage.
-#[derive(Debug)]
-pub struct MatMut<'a, S> {
-    data: &'a mut [S],
-    rows: usize,
-    cols: usize,
-    stride: usize,
-}
-
-/// Numbers a `rows x cols` row-major matrix with `stride` between its rows occupies.
-fn extent(rows: usize, cols: usize, stride: usize) -> usize {
-    if rows == 0 || cols == 0 { 0 } else { (rows - 1) * stride + cols }
-}
-
-impl<'a, S> MatRef<'a, S> {
-    /// `rows x cols` matrix stored row after row without gaps.
-    ///
-    /// # Panics
-    /// If `data` is shorter than `rows * cols`.
-    pub fn new(data: &'a [S], rows: usize, cols: usize) -> Self {
-        Self::with_stride(data, rows, cols, cols)
-    }
-    /// `rows x cols` matrix whose rows start `stride >= cols` apart.
-    ///
-    /// # Panics
-    /// If `data` is too short or `stride < cols`.
-    pub fn with_stride(data: &'a [S], rows: usize, cols: usize, stride: usize) -> Self {
-        assert!(stride >= cols && data.len() >= extent(rows, cols, stride), "matrix view past the end of its storage");
-        Self { data, rows, cols, stride, transposed: false }
-    }
-    /// The transpose; nothing is moved.
-    #[must_use]
-    pub fn t(self) -> Self {
-        Self { transposed: !self.transposed, ..self }
-    }
-    /// The rows `from..to` as seen.
-    ///
-    /// # Panics
-    /// If there are fewer.
-    #[must_use]
-    pub(crate) fn row_range(self, from: usize, to: usize) -> Self {
-        assert!(from <= to && to <= self.rows(), "rows past the end of a matrix view");
-        let Self { data, stride, .. } = self;
-        if self.transposed {
-            Self { data: &data[from.min(data.len())..], cols: to - from, ..self }
-        } else {
-            Self { data: &data[(from * stride).min(data.len())..], rows: to - from, ..self }
-        }
-    }
-    /// Number of rows as seen.
-    pub fn rows(&self) -> usize {
-        if self.transposed { self.cols } else { self.rows }
-    }
-    /// Number of columns as seen.
-    pub fn cols(&self) -> usize {
-        if self.transposed { self.rows } else { self.cols }
-    }
-}
-
-impl<'a, S> MatMut<'a, S> {
-    /// `rows x cols` matrix stored row after row without gaps.
-    ///
-    /// # Panics
-    /// If `data` is shorter than `rows * cols`.
-    pub fn new(data: &'a mut [S], rows: usize, cols: usize) -> Self {
-        Self::with_stride(data, rows, cols, cols)
-    }
-    /// `rows x cols` matrix whose rows start `stride >= cols` apart.
-    ///
-    /// # Panics
-    /// If `data` is too short or `stride < cols`.
-    pub fn with_stride(data: &'a mut [S], rows: usize, cols: usize, stride: usize) -> Self {
-        assert!(stride >= cols && data.len() >= extent(rows, cols, stride), "matrix view past the end of its storage");
-        Self { data, rows, cols, stride }
-    }
-}
 
 /// `C = alpha A B`, or `C += alpha A B` if `accumulate`; one thread.
 ///
@@ -106,26 +19,11 @@ pub fn gemm<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'
     if c.rows == 0 || c.cols == 0 {
         return;
     }
-    let MatMut { data, rows, cols, stride } = c;
-    match (S::slice_mut(data), S::slice(a.data), S::slice(b.data)) {
-        (SliceMut::F32(c), Slice::F32(x), Slice::F32(y)) => {
-            fast(MatMut { data: c, rows, cols, stride }, accumulate, alpha.cast(), over(a, x), over(b, y));
-        }
-        (SliceMut::F64(c), Slice::F64(x), Slice::F64(y)) => {
-            fast(MatMut { data: c, rows, cols, stride }, accumulate, alpha.cast(), over(a, x), over(b, y));
-        }
-        (SliceMut::Other(c), _, _) => plain(MatMut { data: c, rows, cols, stride }, accumulate, alpha, a, b),
-        _ => unreachable!("one scalar type has one kind of slice"),
-    }
-}
-
-/// The same view over storage whose type is known.
-fn over<'a, S, T>(view: MatRef<'a, S>, data: &'a [T]) -> MatRef<'a, T> {
-    MatRef { data, rows: view.rows, cols: view.cols, stride: view.stride, transposed: view.transposed }
+    S::product(c, accumulate, alpha, a, b);
 }
 
 /// The product by faer, or by dot products where that is faster.
-fn fast<'a, T: faer::traits::ComplexField + Scalar>(
+pub(super) fn fast<'a, T: faer::traits::ComplexField + Scalar>(
     c: MatMut<'a, T>,
     accumulate: bool,
     alpha: T,
@@ -133,7 +31,7 @@ fn fast<'a, T: faer::traits::ComplexField + Scalar>(
     b: MatRef<'a, T>,
 ) {
     if (c.rows <= FEW_ROWS || c.cols == 1) && b.transposed && !a.transposed {
-        let shape = (c.rows, c.cols, a.cols);
+        let shape = (c.rows, c.cols, a.cols());
         let rows = |m: MatRef<'a, T>| Rows { numbers: m.data, stride: m.stride };
         return SmallBatch { a: rows(a), b: rows(b), c: c.data, stride: c.stride, shape, alpha, accumulate }.run();
     }
@@ -146,30 +44,6 @@ fn fast<'a, T: faer::traits::ComplexField + Scalar>(
         faer::MatMut::from_column_major_slice_with_stride_mut(c.data, c.cols, c.rows, c.stride).transpose_mut();
     let accum = if accumulate { Accum::Add } else { Accum::Replace };
     matmul(target, accum, view(a), view(b), alpha, Par::Seq);
-}
-
-/// The product by loops, for scalars without a kernel: row `i` of `C` gathers rows of `B`.
-fn plain<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, S>, b: MatRef<'_, S>) {
-    let at = |m: &MatRef<'_, S>, i: usize, j: usize| {
-        if m.transposed { m.data[j * m.stride + i] } else { m.data[i * m.stride + j] }
-    };
-    for i in 0..c.rows {
-        let row = &mut c.data[i * c.stride..i * c.stride + c.cols];
-        if !accumulate {
-            row.fill(<S as Real>::zero());
-        }
-        for k in 0..a.cols() {
-            let factor = alpha * at(&a, i, k);
-            if b.transposed {
-                for (j, target) in row.iter_mut().enumerate() {
-                    *target += factor * b.data[j * b.stride + k];
-                }
-            } else {
-                let source = &b.data[k * b.stride..k * b.stride + b.cols];
-                update(row, source, |target, value| *target += factor * value);
-            }
-        }
-    }
 }
 
 /// Rows up to which dot products are faster than a blocked product.

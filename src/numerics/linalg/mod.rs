@@ -19,6 +19,7 @@
 //! ```
 
 mod batch;
+mod compiled;
 mod condition;
 mod eigen;
 mod elimination;
@@ -29,6 +30,8 @@ mod signature;
 mod singular;
 mod solve;
 
+#[doc(hidden)]
+pub use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
 #[doc(hidden)]
@@ -38,7 +41,7 @@ pub use inertia::Inertia;
 #[doc(hidden)]
 pub use inertia::{Scaled, adjugate, inertia, is_positive_definite, leading_minors};
 #[doc(hidden)]
-pub use matmul::{MatMut, MatRef, gemm};
+pub use matmul::gemm;
 #[doc(hidden)]
 pub use signature::{
     SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_one_negative, has_signature,

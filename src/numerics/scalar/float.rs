@@ -93,7 +93,7 @@ impl<F: Float> num_traits::One for AnyFloat<F> {
 }
 
 /// Demands of the engine on a number that is not its own.
-pub(super) trait Foreign: Float + FloatConst + Debug + Display + Send + Sync + 'static {}
+pub trait Foreign: Float + FloatConst + Debug + Display + Send + Sync + 'static {}
 impl<F: Float + FloatConst + Debug + Display + Send + Sync + 'static> Foreign for F {}
 
 /// Methods that `Float` has under the same name.

@@ -20,6 +20,7 @@ mod dd;
 mod float;
 mod lanes;
 mod loops;
+mod matrix;
 mod primitive;
 mod sum;
 
@@ -27,17 +28,20 @@ pub use dd::Dd;
 #[doc(hidden)]
 pub use dd::UnreadableNumber;
 #[doc(hidden)]
-pub use float::AnyFloat;
+pub use float::{AnyFloat, Foreign};
 #[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
+#[doc(hidden)]
+pub use loops::vectorized;
 pub(crate) use loops::{
     Column, Simd, WithSimd, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
 };
 #[doc(hidden)]
-pub use loops::{Slice, SliceMut, vectorized};
+pub use matrix::{MatMut, MatRef, Matrices};
 #[doc(hidden)]
 pub use sum::{Dots, Sum};
 
+use std::any::Any;
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -221,11 +225,21 @@ pub trait Real:
     }
 }
 
+/// What a higher module compiles in this crate for each scalar: code that is generic over the scalar takes it from here, and no crate that
+/// calls such code compiles it again.
+#[doc(hidden)]
+pub trait Compiled {
+    /// A type of the module that evaluates Lagrangians.
+    fn routines() -> &'static dyn Any;
+}
+
 /// An innermost floating-point number: `f32`, `f64`, [`Dd`] or an [`AnyFloat`].
 pub trait Scalar:
     Real<Scalar = Self>
     + Lanes
     + Dots
+    + Matrices
+    + Compiled
     + PartialEq
     + PartialOrd
     + Default
@@ -272,16 +286,6 @@ pub trait Scalar:
     /// The exponent `e` with `2^e <= |self| < 2^(e+1)`; `i32::MIN` for zero.
     fn ilogb(self) -> i32;
 
-    /// A slice by its concrete type.
-    #[inline(always)]
-    fn slice(values: &[Self]) -> Slice<'_, Self> {
-        Slice::Other(values)
-    }
-    /// A mutable slice by its concrete type.
-    #[inline(always)]
-    fn slice_mut(values: &mut [Self]) -> SliceMut<'_, Self> {
-        SliceMut::Other(values)
-    }
     /// Leading and trailing part: their exact sum is the number.
     fn parts(self) -> (f64, f64);
     /// Converts between innermost numbers; widening is exact, narrowing rounds to nearest.

@@ -1,6 +1,6 @@
 //! `f32` and `f64` as [`Real`] and [`Scalar`].
 
-use super::{Real, Scalar, Slice, SliceMut};
+use super::{Real, Scalar};
 
 /// Beyond it angles are reduced by the portable library: system libraries lose digits next to multiples of `pi/2`.
 const LARGE_ANGLE: f64 = 1048576.0;
@@ -122,14 +122,6 @@ macro_rules! impl_primitive {
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
-            }
-            #[inline(always)]
-            fn slice(values: &[Self]) -> Slice<'_, Self> {
-                values.into()
-            }
-            #[inline(always)]
-            fn slice_mut(values: &mut [Self]) -> SliceMut<'_, Self> {
-                values.into()
             }
             #[inline(always)]
             fn parts(self) -> (f64, f64) {
