@@ -1,6 +1,6 @@
 //! The names that most programs need: `use lnn::prelude::*;`.
 
-pub use crate::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms};
+pub use crate::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
 pub use crate::network::{NetworkLagrangian, Structure};
 #[cfg(feature = "rollout")]
 pub use crate::rollout::{Motion, Options, Trajectory, rollout};

@@ -1,10 +1,12 @@
 //! Text of configuration files: reading, complete configurations, lines of keys.
 
 use crate::cli::{CliError, input};
+use crate::pipeline::from_table;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
 
 /// Largest configuration that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -14,14 +16,20 @@ const MAX_BYTES: u64 = 1 << 20;
 /// # Errors
 /// Line, from 1, and what is wrong there.
 pub fn parse<T: DeserializeOwned>(text: &str) -> Result<T, (usize, String)> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let refused = |error: &toml::de::Error| line(text, error.span().map_or(0, |span| span.start));
-    let reader = toml::Deserializer::parse(text).map_err(|error| (refused(&error), error.message().to_string()))?;
-    serde_path_to_error::deserialize(reader).map_err(|error| {
-        let (path, inner) = (error.path().to_string(), error.inner());
-        let key = if path == "." { String::new() } else { format!("{path}: ") };
-        (refused(inner), format!("{key}{}", inner.message()))
+    from_table(Value::Table(table(text)?)).map_err(|(path, problem)| {
+        let key = if path.is_empty() { String::new() } else { format!("{path}: ") };
+        (line_of(&lines(text), &path).unwrap_or(1), format!("{key}{problem}"))
     })
+}
+
+/// Parses a table.
+///
+/// # Errors
+/// Line, from 1, and what is wrong there.
+pub fn table(text: &str) -> Result<Table, (usize, String)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let place = |error: &toml::de::Error| line(text, error.span().map_or(0, |span| span.start));
+    text.parse().map_err(|error| (place(&error), error.message().to_string()))
 }
 
 /// Line, from 1, of a place in a text.

@@ -216,7 +216,7 @@ pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
     let (name, text) = config::read_text(file)?;
     let wrong = |problem: &str| CliError::usage(format_args!("{name}: {problem}"));
     let table: toml::Table =
-        config::parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
+        config::table(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
     let Some(found) = table.get("constraints").cloned() else { return Err(wrong("expected a table [constraints]")) };
     let formulas: BTreeMap<String, String> =
         found.try_into().map_err(|_| wrong("constraints: expected formulas by name"))?;

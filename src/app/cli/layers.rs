@@ -6,6 +6,7 @@ use crate::cli::config::{self, Lines, line_of};
 use crate::configuration::table::{Below, find_key};
 use crate::configuration::{ConfigError, Key, PENALTY, join};
 use crate::names::unknown;
+use crate::pipeline::from_table;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt;
@@ -125,7 +126,7 @@ impl Layers {
     fn of(keys: &'static [Key], file: Option<(String, &str)>, options: Vec<Entry>) -> Result<Self, CliError> {
         let mut layers = Self { keys, file: None, lines: Lines::new(), entries: Vec::new(), unknown: Vec::new() };
         if let Some((name, text)) = file {
-            let table: Table = config::parse(text)
+            let table = config::table(text)
                 .map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
             layers.lines = config::lines(text);
             layers.file = Some(name);
@@ -234,7 +235,7 @@ impl Layers {
         let mut mistakes = self.unknown.clone();
         let mut entries: Vec<&Entry> = self.entries.iter().collect();
         loop {
-            let (path, message) = match read::<T>(merged(&base, &entries, &mut mistakes)) {
+            let (path, message) = match from_table::<T>(merged(&base, &entries, &mut mistakes)) {
                 Ok(value) => return Ok((value, mistakes)),
                 Err(refusal) => refusal,
             };
@@ -245,7 +246,7 @@ impl Layers {
             let without = |k: usize| {
                 let others: Vec<&Entry> =
                     entries.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, entry)| *entry).collect();
-                read::<T>(merged(&base, &others, &mut Vec::new())).err()
+                from_table::<T>(merged(&base, &others, &mut Vec::new())).err()
             };
             let culprit = match suspects.as_slice() {
                 [] => return Err(CliError::data(format_args!("{path}: {message}"))),
@@ -327,15 +328,6 @@ impl Layers {
 /// `true` if a path is another one or leads to it.
 fn covers(outer: &str, inner: &str) -> bool {
     outer.is_empty() || inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-}
-
-/// The value of a configuration, or path and message of what is refused.
-fn read<T: DeserializeOwned>(value: Value) -> Result<T, (String, String)> {
-    serde_path_to_error::deserialize(value).map_err(|error| {
-        let path = error.path().to_string();
-        let path = path.trim_end_matches('?').trim_end_matches('.');
-        (path.to_string(), error.inner().message().to_string())
-    })
 }
 
 /// The base with these values.

@@ -8,7 +8,7 @@ use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory
 use crate::pipeline::experiment_report::{ExperimentReport, Results, conclude};
 use crate::pipeline::readings::{READINGS, read_hole};
 use crate::pipeline::train::{RunOptions, train};
-use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch};
+use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch, from_table};
 use crate::report::Curve;
 use crate::storage::in_order;
 use crate::training::{StopReason, TrainingError};
@@ -221,10 +221,12 @@ pub(crate) fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<Kept
         return Ok(KeptRecord::Damaged(CONFIG, problem.to_string()));
     };
     let config = String::from_utf8_lossy(&config);
-    Ok(match toml::from_str::<Config>(&config) {
+    let read = config.parse::<toml::Table>().map_err(|error| error.message().to_string());
+    let read = read.and_then(|table| from_table::<Config>(table.into()).map_err(|(_, problem)| problem));
+    Ok(match read {
         _ if config == toml => KeptRecord::Finished(record),
         Ok(_) => KeptRecord::OtherConfiguration,
-        Err(error) => KeptRecord::Damaged(CONFIG, error.message().to_string()),
+        Err(problem) => KeptRecord::Damaged(CONFIG, problem),
     })
 }
 

@@ -126,11 +126,9 @@ fn fit_in<S: Scalar>(
         _ => architecture,
     };
     architecture.validate()?;
+    let around: Vec<usize> = architecture.form.radial.first().map(|r| r.coordinates.clone()).unwrap_or_default();
     let floor = config.data.acceleration_weighting;
-    if floor > 0.0 {
-        let around: Vec<usize> = architecture.form.radial.first().map(|r| r.coordinates.clone()).unwrap_or_default();
-        data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
-    }
+    data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
     let ranges = data.training[0].ranges();
     // Every phase learns from the same states.
     data.training = vec![data.training.swap_remove(0); config.phases.len()];

@@ -402,8 +402,11 @@ impl Weighting<'_> {
         (sizes, uncertain)
     }
 
-    /// The states with the weights `f m/(f m + |a| + e)`, `m` the mean of `|a|` and `e` the error.
+    /// The states with the weights `f m/(f m + |a| + e)`, `m` the mean of `|a|` and `e` the error; as they are for `f = 0`.
     pub fn relative<S: Scalar>(&self, set: Dataset<S>) -> Result<Dataset<S>, DatasetError> {
+        if self.floor == 0.0 {
+            return Ok(set);
+        }
         let (sizes, uncertain) = self.of(&set);
         let floor = self.floor * sizes.iter().sum::<f64>() / sizes.len() as f64;
         // Without any acceleration every state counts the same.
@@ -412,8 +415,11 @@ impl Weighting<'_> {
     }
 
     /// The states with the weights `1/(|a| + f m + e)`, `m` the median of `|a|` among [`ALIKE`] states about as far from the centre of
-    /// these coordinates.
+    /// these coordinates; as they are for `f = 0`.
     pub fn by_distance<S: Scalar>(&self, set: Dataset<S>, around: &[usize]) -> Result<Dataset<S>, DatasetError> {
+        if self.floor == 0.0 {
+            return Ok(set);
+        }
         let n = self.scale.len();
         let (sizes, uncertain) = self.of(&set);
         let distance = |k: usize| around.iter().map(|&i| set.q()[k * n + i].to_f64().powi(2)).sum::<f64>();

@@ -114,13 +114,13 @@ pub(crate) fn sample_all_until<S: Scalar>(
         let (states, floor) = (config.data.training, config.data.acceleration_weighting);
         let set = if let Some(shell) = config.data.shell()? {
             let set = in_shell(system, &shell, (&field, &phase.position), states, (&mut rng, interrupt))?;
-            if floor > 0.0 { weigh_by_distance(set, system, &shell, floor)? } else { set }
+            weigh_by_distance(set, system, &shell, floor)?
         } else {
             let moving = (config.data.trajectory_fraction * states as f64).round() as usize;
             let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, (&mut rng, interrupt))?;
             let set = fill(drawn, &field, bounds, &phase.log_uniform, states, (&mut rng, interrupt))?;
             let scale = set.physical_scale();
-            if floor > 0.0 { Weighting { floor, scale: &scale, errors: &[] }.relative(set)? } else { set }
+            Weighting { floor, scale: &scale, errors: &[] }.relative(set)?
         };
         let off = config.data.rescaled_fraction;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();

@@ -235,9 +235,8 @@ impl<'a> Trainer<'a> {
         (config.data.training, config.data.validation, config.data.test) =
             (training.len(), validation.len(), test.len());
         let scale = training.physical_scale();
-        let floor = config.data.acceleration_weighting;
-        let training =
-            if floor > 0.0 { Weighting { floor, scale: &scale, errors: &[] }.relative(training)? } else { training };
+        let weighting = Weighting { floor: config.data.acceleration_weighting, scale: &scale, errors: &[] };
+        let training = weighting.relative(training)?;
         let periodic = (0..n).map(|i| angles.contains(&i)).collect();
         let architecture = config.architecture_with(names.iter().map(String::as_str), periodic, scale)?;
         architecture.validate()?;

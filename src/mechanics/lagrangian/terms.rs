@@ -142,6 +142,16 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
+/// One field of the terms that a model computes.
+fn field<S: Scalar>(
+    compute: &mut dyn FnMut(&mut Terms<S>) -> Result<(), MechanicsError>,
+    field: fn(Terms<S>) -> Vec<S>,
+) -> Result<Vec<S>, MechanicsError> {
+    let mut terms = Terms::default();
+    compute(&mut terms)?;
+    Ok(field(terms))
+}
+
 /// A Lagrangian in motion: one written down or learned, with values for its parameters, in physical units.
 ///
 /// Two methods make a model: [`coordinates`](Self::coordinates) and [`terms`](Self::terms). A type that wraps another model adds
@@ -182,9 +192,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// # Errors
     /// As of [`terms`](Self::terms).
     fn acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
-        let mut terms = Terms::default();
-        self.terms(q, v, Request::ACCELERATION, &mut terms)?;
-        Ok(terms.acceleration)
+        field(&mut |terms| self.terms(q, v, Request::ACCELERATION, terms), |terms| terms.acceleration)
     }
 
     /// Mass matrices `M = d2L/dv dv` of a batch, `(batch, n, n)`.
@@ -192,9 +200,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// # Errors
     /// As of [`terms`](Self::terms).
     fn mass_matrix(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
-        let mut terms = Terms::default();
-        self.terms(q, v, Request::MASS_MATRIX, &mut terms)?;
-        Ok(terms.mass_matrix)
+        field(&mut |terms| self.terms(q, v, Request::MASS_MATRIX, terms), |terms| terms.mass_matrix)
     }
 
     /// Momenta `p = dL/dv` of a batch, `(batch, n)`.
@@ -202,9 +208,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// # Errors
     /// As of [`terms`](Self::terms).
     fn momentum(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
-        let mut terms = Terms::default();
-        self.terms(q, v, Request::MOMENTUM, &mut terms)?;
-        Ok(terms.momentum)
+        field(&mut |terms| self.terms(q, v, Request::MOMENTUM, terms), |terms| terms.momentum)
     }
 
     /// Energies `E = p.v - L` of a batch, `(batch)`.
@@ -212,9 +216,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// # Errors
     /// As of [`terms`](Self::terms).
     fn energy(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
-        let mut terms = Terms::default();
-        self.terms(q, v, Request::ENERGY, &mut terms)?;
-        Ok(terms.energy)
+        field(&mut |terms| self.terms(q, v, Request::ENERGY, terms), |terms| terms.energy)
     }
 
     /// The metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.

@@ -231,14 +231,12 @@ struct Search<'a> {
     /// Number of the usual window with the least mean so far, and that mean.
     best: Option<(usize, f64)>,
     past: bool,
-    /// `true` if no longer window is of use.
-    ended: bool,
 }
 
 impl<'a> Search<'a> {
     fn new(signal: &'a Signal<'a>) -> Self {
         let courses = vec![Course::default(); signal.tracks.len()];
-        Self { signal, courses, best: None, past: false, ended: false }
+        Self { signal, courses, best: None, past: false }
     }
 
     /// Adds the errors of a window to the courses of the trajectories that are long enough, of signals whose noises have the same ratio;
@@ -298,7 +296,11 @@ impl<'a> Search<'a> {
         if !self.past && self.best.is_none_or(|(_, least)| mean < least) {
             self.best = Some((k, mean));
         }
-        self.ended = self.past && self.courses.iter().all(|course| course.past || course.squares.len() <= k);
+    }
+
+    /// `true` if no window is of use beyond so many.
+    fn has_ended(&self, windows: usize) -> bool {
+        self.past && self.courses.iter().all(|course| course.past || course.squares.len() < windows)
     }
 }
 
@@ -314,7 +316,8 @@ pub fn best(signals: &[Signal<'_>]) -> Option<Vec<(usize, Vec<usize>)>> {
     let mut searches: Vec<Search<'_>> = signals.iter().map(Search::new).collect();
     let mut tried = Vec::new();
     for window in lengths((degree + 3) | 1, longest) {
-        let mut open: Vec<&mut Search<'_>> = searches.iter_mut().filter(|search| !search.ended).collect();
+        let mut open: Vec<&mut Search<'_>> =
+            searches.iter_mut().filter(|search| !search.has_ended(tried.len())).collect();
         let mut alike = open.chunk_by_mut(|a, b| a.signal.ratio == b.signal.ratio);
         if !alike.all(|alike| Search::try_window(window, alike)) {
             break;
