@@ -1,4 +1,4 @@
-//! Makes `examples/data/pendulum.csv`: what somebody's measurement of a double pendulum might look like.
+//! Makes `examples/data/pendulum.csv`: a measurement of a double pendulum, with friction and noise.
 //!
 //! Four runs of five seconds, friction in both joints, angles 100 times a second with a noise of 0.5 % of their rms.
 //! Without arguments it compares the file with what it would write; `-- --write` writes it.

@@ -1,4 +1,4 @@
-//! A learned Lagrangian in somebody else's solver: the Dop853 of the crate `differential-equations`.
+//! A learned Lagrangian in another crate's solver: the Dop853 of the crate `differential-equations`.
 //!
 //! Whatever a network has learned, its motion keeps the energy of what it has learned.
 

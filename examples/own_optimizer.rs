@@ -1,4 +1,4 @@
-//! A network trained by a solver of one's own, by argmin's, and by batches with this crate's optimisers, all on the same problem.
+//! A network trained by a user's solver, by argmin's, and by batches with this crate's optimisers, all on the same problem.
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, Problem, Solver, State};
 use argmin::solver::conjugategradient::{NonlinearConjugateGradient, beta::PolakRibierePlus};

@@ -1,4 +1,4 @@
-//! A Lagrangian of one's own in a solver of one's own: a pendulum hanging from a cart, by the Dopri5 of `ode_solvers`.
+//! A user's Lagrangian in a user's solver: a pendulum hanging from a cart, by the Dopri5 of `ode_solvers`.
 //!
 //! Energy and horizontal momentum are conserved; both are compared with their values at the start.
 

@@ -1,11 +1,11 @@
 //! `lnn certify`: where the mass matrix is proven to have its signature.
 
 use crate::certificate::{Certificate, CertificateError, Options, Signature, certify_network, certify_system};
-use crate::cli::chosen::{self, learned_system};
+use crate::cli::format::TableOrJson;
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, seconds, thread_count, threads, whole};
-use crate::cli::shown::TableOrJson;
 use crate::cli::source::SystemOrModel;
+use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             (header.system, header.columns, options, found)
         }
         None => {
-            let system = chosen::system(args.subject.system.as_deref().unwrap_or_default())?;
+            let system = system_arg::system(args.subject.system.as_deref().unwrap_or_default())?;
             let configured = configure_system::<f64>(system, &args.subject.param).map_err(CliError::usage)?;
             let n = configured.coordinates;
             let columns = configured.system.columns(n);

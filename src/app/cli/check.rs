@@ -5,7 +5,7 @@ use crate::cli::{CliError, output};
 use crate::configuration::Precision;
 use crate::names::{WIDTH, percent, percentage, pluralize, rounded, wrap_text};
 use crate::pipeline::{FitOptions, PreparedFit};
-use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
+use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Warning, survey};
 use crate::recording::{LARGE_ERROR, Targets};
 use crate::report::text_table;
 use serde::Serialize;
@@ -114,7 +114,7 @@ fn describe(Found { survey: found, obstacle }: &Found) -> String {
     ];
     text += &section(&text_table(&titles, &rows));
 
-    let rows: Vec<Vec<String>> = found.suspicious.iter().take(LINES).map(suspicion).collect();
+    let rows: Vec<Vec<String>> = found.suspicious.iter().take(LINES).map(warning).collect();
     if !rows.is_empty() {
         text += &section(&text_table(&["suspicious", "row", "coordinate", "value [its unit]", "what"], &rows));
         let _ = more(&mut text, found.suspicious_count, ("place", "places"));
@@ -228,7 +228,7 @@ fn more(text: &mut String, all: usize, (one, many): (&str, &str)) -> std::fmt::R
 }
 
 /// One suspicious place.
-fn suspicion(s: &Suspicion) -> Vec<String> {
+fn warning(s: &Warning) -> Vec<String> {
     let size = short(s.size);
     let what = match s.kind {
         Kind::Outlier => format!("outlier, off by {size}"),
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn suspicions_are_told_in_words() {
-        let frozen = Suspicion {
+        let frozen = Warning {
             track: "run 1".into(),
             row: 7,
             coordinate: "x".into(),
@@ -293,8 +293,8 @@ mod tests {
             value: 0.25,
             size: 40.0,
         };
-        assert_eq!(suspicion(&frozen), ["run 1", "7", "x", "0.2500", "40 equal values: a frozen sensor?"]);
-        let shifted = Suspicion { kind: Kind::Jump, size: 0.012_345, ..frozen };
-        assert_eq!(suspicion(&shifted)[4], "all later positions are shifted by 0.01235");
+        assert_eq!(warning(&frozen), ["run 1", "7", "x", "0.2500", "40 equal values: a frozen sensor?"]);
+        let shifted = Warning { kind: Kind::Jump, size: 0.012_345, ..frozen };
+        assert_eq!(warning(&shifted)[4], "all later positions are shifted by 0.01235");
     }
 }

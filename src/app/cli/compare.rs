@@ -1,7 +1,7 @@
 //! `lnn compare`: what two Lagrangians have in common beyond factor and gauge.
 
+use crate::cli::format::TableOrJson;
 use crate::cli::probe::{Bound, Probe, bound};
-use crate::cli::shown::TableOrJson;
 use crate::cli::source::parameter;
 use crate::cli::symmetries::degrees;
 use crate::cli::{CliError, number, output};

@@ -2,7 +2,7 @@
 
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::number::{bounds, positive, seed, thread_count, threads, tolerance, whole};
-use crate::cli::place::{self, Wanted};
+use crate::cli::output_dir::{self, Wanted};
 use crate::cli::results::Writer;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output, source};
@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let usual = file.parent().unwrap_or(Path::new("")).join("evaluation");
     let (out, inputs) = (args.out.as_deref(), [file.as_path()]);
     let wanted = Wanted { out, usual: &usual, overwrite: args.overwrite, inputs: &inputs, writer: Writer::Evaluator };
-    let folder = place::open(&wanted)?;
+    let folder = output_dir::open(&wanted)?;
 
     let seed = args.seed.unwrap_or(learned.header.seed);
     let usual = EvaluationOptions::new(&system, learned.domain(), seed)?;

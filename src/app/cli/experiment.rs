@@ -6,7 +6,7 @@ use crate::cli::number::{thread_count, threads, whole};
 use crate::cli::shard::Shard;
 use crate::cli::source::parameter;
 use crate::cli::watch::watch;
-use crate::cli::{CliError, chosen, interrupt, output};
+use crate::cli::{CliError, interrupt, output, system_arg};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{WIDTH, pluralize, wrap_text};
@@ -110,7 +110,7 @@ impl Chosen {
     #[allow(clippy::type_complexity)]
     fn own_system(&self) -> Result<Option<(SystemInstance<f64>, BTreeMap<String, f64>)>, CliError> {
         let Some(name) = &self.system else { return Ok(None) };
-        let configured = configure_system::<f64>(chosen::system(name)?, &self.param).map_err(CliError::usage)?;
+        let configured = configure_system::<f64>(system_arg::system(name)?, &self.param).map_err(CliError::usage)?;
         require_stationary(&configured)?;
         let symbols = configured.system.parameters.iter().map(|p| p.symbol.to_string());
         let values: BTreeMap<String, f64> = symbols.zip(configured.parameters.iter().copied()).collect();

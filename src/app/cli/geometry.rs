@@ -1,7 +1,7 @@
 //! `lnn geometry`: metric, connection and curvature of points, full digits.
 
+use crate::cli::format::{CHUNK, TableOrJson, report_failures};
 use crate::cli::number::{Precision, count, list};
-use crate::cli::shown::{CHUNK, TableOrJson, report_failures};
 use crate::cli::source::{Source, SystemOrModel};
 use crate::cli::states::parse_table;
 use crate::cli::surfaces::Line;

@@ -3,7 +3,7 @@
 use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::source::parameter;
-use crate::cli::{CliError, chosen, output, parse_system};
+use crate::cli::{CliError, output, parse_system, system_arg};
 use crate::identification::{Between, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{number, pluralize, rounded};
@@ -124,7 +124,7 @@ fn of_the_system(argument: clap::Arg) -> clap::Arg {
 /// # Errors
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let system = chosen::system(&args.system)?;
+    let system = system_arg::system(&args.system)?;
     if let Some(out) = &args.out {
         if out.extension().is_none_or(|end| end != "toml") {
             return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", out.display())));

@@ -1,9 +1,9 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
 use crate::cli::constraints::constrained;
+use crate::cli::format::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::inverse::inverse;
 use crate::cli::number::{Precision, list};
-use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::source::{Source, SystemOrModel};
 use crate::cli::{CliError, States, input, output, parse_states, states};
 use crate::lagrangian::{EulerLagrange, LeastNorm, ManifoldRows, ReducedMass, Request, Terms};

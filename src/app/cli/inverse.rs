@@ -1,6 +1,6 @@
 //! `lnn inspect --inverse`: the forces that make known accelerations.
 
-use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
+use crate::cli::format::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::source::Source;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, input, json, output, states};

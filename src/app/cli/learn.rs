@@ -3,7 +3,7 @@
 use crate::cli::folder::Folder;
 use crate::cli::learned::model_file;
 use crate::cli::number::threads;
-use crate::cli::place::{self, Wanted};
+use crate::cli::output_dir::{self, Wanted};
 use crate::cli::results::Writer;
 use crate::cli::resume::{forget, how_to_go_on, keeping};
 use crate::cli::run_args::RunArgs;
@@ -34,13 +34,13 @@ pub struct Learned {
 /// Opens the directory of a run that begins; `inputs` are the files that it reads beside the model it starts from.
 ///
 /// # Errors
-/// As of [`place::open`].
+/// As of [`output_dir::open`].
 pub fn open(args: &RunArgs, config: &Config, inputs: &[&Path]) -> Result<Folder, CliError> {
     let usual = PathBuf::from("runs").join(&config.system);
     let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
     let inputs: Vec<&Path> = inputs.iter().copied().chain(start.as_deref()).collect();
     let (out, overwrite, writer) = (args.out.as_deref(), args.overwrite, Writer::Learner);
-    place::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
+    output_dir::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
 }
 
 /// A run that learns in a directory.

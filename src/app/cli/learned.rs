@@ -1,8 +1,8 @@
 //! A model file with the network it describes and the system it learned.
 
 use crate::cli::CliError;
-use crate::cli::chosen::{self, learned_system};
 use crate::cli::input::is_standard;
+use crate::cli::system_arg::{self, learned_system};
 use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system, configure_values, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
@@ -92,7 +92,7 @@ impl<S: Scalar> Learned<S> {
     /// # Errors
     /// A usage error for an unknown system, a wrong parameter, or other columns.
     pub fn beside(&self, name: &str, given: &[(String, String)]) -> Result<SystemInstance<f64>, CliError> {
-        let configured = configure_system(chosen::system(name)?, given).map_err(CliError::usage)?;
+        let configured = configure_system(system_arg::system(name)?, given).map_err(CliError::usage)?;
         let columns = configured.system.columns(configured.coordinates);
         if columns != self.header.columns {
             let (found, expected) = (columns.join(","), self.header.columns.join(","));

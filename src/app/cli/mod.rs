@@ -7,7 +7,6 @@
 mod certify;
 mod charges;
 mod check;
-mod chosen;
 mod compare;
 mod config;
 mod constraints;
@@ -22,6 +21,7 @@ mod fit_config;
 mod flags;
 mod folder;
 mod forces;
+mod format;
 mod formula;
 mod geometry;
 mod identify;
@@ -34,12 +34,12 @@ mod layers;
 mod learn;
 mod learned;
 mod manual;
-mod misunderstood;
 mod motion;
+mod motion_source;
 mod number;
 mod output;
+mod output_dir;
 mod page;
-mod place;
 mod plain_name;
 mod print_config;
 mod probe;
@@ -52,14 +52,13 @@ mod run_args;
 mod shadow;
 mod shadow_facts;
 mod shard;
-mod shown;
 mod source;
 mod spool;
 mod states;
-mod subject;
 mod surfaces;
 mod sweep;
 mod symmetries;
+mod system_arg;
 mod systems;
 mod tensors;
 mod train;
@@ -67,14 +66,14 @@ mod train_config;
 mod tube;
 mod watch;
 
-pub use chosen::parse_system;
 pub use config::parse as parse_config;
+use error::argument_error;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
+pub use system_arg::parse_system;
 
 use crate::names::{WIDTH, one_line, wrap_text};
 use clap::{CommandFactory, Parser, Subcommand};
-use misunderstood::misunderstood;
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
@@ -169,7 +168,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// The usage error that the program ends with. Asking for help or for the version is none.
 pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<(), CliError> {
     match Cli::try_parse_from(arguments) {
-        Err(error) if error.exit_code() != 0 => Err(misunderstood(&error)),
+        Err(error) if error.exit_code() != 0 => Err(argument_error(&error)),
         _ => Ok(()),
     }
 }
@@ -219,7 +218,7 @@ fn answer(error: &clap::Error) -> ExitCode {
             ExitCode::from(2)
         }
         _ => {
-            let failed = misunderstood(error);
+            let failed = argument_error(error);
             report(&failed);
             failed.exit_code()
         }

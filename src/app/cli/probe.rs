@@ -1,10 +1,10 @@
 //! A Lagrangian that is looked into: a system or a model, the states on which it is looked at, functions of its coordinates.
 
 use crate::cli::CliError;
-use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::{Learned, held};
 use crate::cli::number::{bounds, positive};
 use crate::cli::source::Source;
+use crate::cli::system_arg::{self, learned_system};
 use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::names::unknown;
 use crate::symmetry::{
@@ -68,7 +68,7 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
 
 /// `true` for a file or directory that is none of a system.
 fn is_model(text: &str) -> bool {
-    Path::new(text).exists() && !chosen::is_file(text)
+    Path::new(text).exists() && !system_arg::is_file(text)
 }
 
 impl Probe {
@@ -97,7 +97,7 @@ impl Probe {
     /// # Errors
     /// As [`Probe::system`].
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
-        let system = chosen::system(name)?;
+        let system = system_arg::system(name)?;
         let Source { model, columns, .. } = Source::configured(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
         let n = configured.coordinates;

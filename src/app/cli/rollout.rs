@@ -5,10 +5,10 @@ use crate::cli::constraints::constrained;
 use crate::cli::files::require_free;
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
+use crate::cli::motion_source::MotionSource;
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::probe::Probe;
 use crate::cli::source::parameter;
-use crate::cli::subject::Subject;
 use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
@@ -115,12 +115,11 @@ impl clap::ValueEnum for Integrator {
 /// A usage error for a state of the wrong length; a data error for a bad model, a file that cannot be written, or a
 /// motion that ends before its time, the samples up to there being written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let subject = match &args.model {
-        Some(path) => Subject::model(path)?,
-        None => Subject::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
+    let mut source = match &args.model {
+        Some(path) => MotionSource::model(path)?,
+        None => MotionSource::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
     };
-    let mut subject = subject;
-    let columns = subject.columns.clone();
+    let columns = source.columns.clone();
     let columns = &columns;
     if args.state.len() != columns.len() {
         let (expected, found) = (columns.len(), args.state.len());
@@ -133,7 +132,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let (q, v) = args.state.split_at(columns.len() / 2);
     if let Some(file) = &args.constraints {
-        subject.model = constrained(subject.model, columns, file, (q, v))?;
+        source.model = constrained(source.model, columns, file, (q, v))?;
     }
     let method = args.method;
     if args.step.is_some() && !method.is_structure_preserving() {
@@ -145,7 +144,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         rtol: args.rtol,
         atol: args.atol,
         step: args.step,
-        domain: subject.domain.clone().filter(|_| !args.beyond_range),
+        domain: source.domain.clone().filter(|_| !args.beyond_range),
         ..Options::new(args.t_end, args.dt)
     };
     options.check(q.len()).map_err(|e| refused(&e))?;
@@ -153,7 +152,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
     }
     let files = args.forces.files().chain(args.tube.files());
-    let inputs: Vec<_> = files.chain(subject.file.as_deref()).chain(args.constraints.as_deref()).collect();
+    let inputs: Vec<_> = files.chain(source.file.as_deref()).chain(args.constraints.as_deref()).collect();
     if !standard {
         require_free(&args.out, &inputs, args.overwrite)?;
     }
@@ -164,20 +163,20 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         require_free(plot, &inputs, args.overwrite)?;
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
-    let force = args.forces.force(&columns[..q.len()], &subject.forces, args.t_start, args.t_end)?;
+    let force = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
     if args.charges && force.is_some() {
         return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
     }
     let span = (args.t_start, args.t_end);
-    let tube = args.tube.tube((subject.model.as_ref(), args.model.as_deref()), &columns[..q.len()], span)?;
+    let tube = args.tube.tube((source.model.as_ref(), args.model.as_deref()), &columns[..q.len()], span)?;
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     let header = header.csv_header(columns).map_err(CliError::data)?;
     target.append(&tube.as_ref().map_or(header.clone(), |tube| tube.header(&header)))?;
-    let chosen = LeastNorm(subject.model.as_ref());
-    let network: &dyn EulerLagrange<f64> = if args.least_norm { &chosen } else { subject.model.as_ref() };
+    let chosen = LeastNorm(source.model.as_ref());
+    let network: &dyn EulerLagrange<f64> = if args.least_norm { &chosen } else { source.model.as_ref() };
     if args.least_norm {
-        note_open_directions(subject.model.as_ref(), q, v);
+        note_open_directions(source.model.as_ref(), q, v);
     }
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let moving = Interruptible::new(network, &stop);
@@ -189,7 +188,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             None => t.energy_balance(network),
         })
     });
-    let mut watch = Watch::new(subject.range(), columns);
+    let mut watch = Watch::new(source.range(), columns);
     let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
     let mut take = |piece: &Trajectory<f64>| {
         watch.add(piece);
@@ -218,9 +217,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(refused(error));
     }
     target.finish()?;
-    let time_unit = subject.time_unit.as_deref();
+    let time_unit = source.time_unit.as_deref();
     if let Some(plot) = &args.plot {
-        watch.plot(plot, &format!("{}: roll-out", subject.name), time_unit.unwrap_or_default(), tube.as_ref())?;
+        watch.plot(plot, &format!("{}: roll-out", source.name), time_unit.unwrap_or_default(), tube.as_ref())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
@@ -247,7 +246,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         None => None,
     };
     let facts = Facts {
-        system: &subject.name,
+        system: &source.name,
         samples: result.samples,
         t_end: args.t_end,
         time_unit,

@@ -72,7 +72,7 @@ impl RunArgs {
     /// Usage errors for a schedule that cannot be scaled and for the file, a data error for one that cannot be read.
     pub fn finish(&self, config: &mut Config) -> Result<(), CliError> {
         if let Some(Known::File(file)) = &config.network.known {
-            let system = crate::cli::chosen::system(file)?;
+            let system = crate::cli::system_arg::system(file)?;
             let Some(described) = &system.described else {
                 let problem = "expected the file of a system, ending in .toml";
                 return Err(CliError::usage(format_args!("network.known: {problem}, found {file:?}")));

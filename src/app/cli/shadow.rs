@@ -6,7 +6,7 @@ use crate::cli::number::{number, thread_count, threads, weight, whole};
 use crate::cli::progress::Progress;
 use crate::cli::shadow_facts::{Facts, View};
 use crate::cli::source::{Source, parameter};
-use crate::cli::{CliError, chosen, interrupt, output};
+use crate::cli::{CliError, interrupt, output, system_arg};
 use crate::lagrangian::{EulerLagrange, Interruptible, MechanicsError};
 use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
@@ -128,9 +128,8 @@ impl Args {
         if let Some(name) = &self.system {
             let configured = match &learned {
                 Some(learned) => learned.beside(name, &self.param)?,
-                None => {
-                    crate::lagrangian::configure_system(chosen::system(name)?, &self.param).map_err(CliError::usage)?
-                }
+                None => crate::lagrangian::configure_system(system_arg::system(name)?, &self.param)
+                    .map_err(CliError::usage)?,
             };
             let source = Source::<f64>::configured(configured.system.clone(), &self.param)?;
             (system, columns) = (configured.system.name.to_string(), source.columns);
@@ -139,7 +138,7 @@ impl Args {
         }
         if let Some(Learned { header, network }) = learned {
             if models.is_empty() {
-                unit = chosen::learned_system(&header).ok().map(|system| system.time_unit.to_string());
+                unit = system_arg::learned_system(&header).ok().map(|system| system.time_unit.to_string());
             }
             (system, columns) = (header.system, header.columns);
             models.push(("learned", Box::new(network)));
@@ -190,7 +189,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let exact = if args.model.is_none() { FAR * camera.distance } else { tracing.far };
     tracing.far = args.far.unwrap_or(exact);
     let model = args.model.as_deref().map(model_file).transpose()?;
-    let file = args.system.as_ref().filter(|name| chosen::is_file(name)).map(PathBuf::from);
+    let file = args.system.as_ref().filter(|name| system_arg::is_file(name)).map(PathBuf::from);
     let inputs: Vec<_> = model.iter().chain(&file).map(PathBuf::as_path).collect();
     require_free(&args.out, &inputs, args.overwrite)?;
     check_target(&args.out).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;

@@ -1,7 +1,7 @@
 //! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
 
 use crate::cli::learned::Learned;
-use crate::cli::{CliError, chosen, forces, output};
+use crate::cli::{CliError, forces, output, system_arg};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{EulerLagrange, configure_system};
 use crate::pipeline::usual_force;
@@ -28,7 +28,7 @@ impl<S: Scalar> Source<S> {
     /// # Errors
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
-        Self::configured(chosen::system(name)?, given)
+        Self::configured(system_arg::system(name)?, given)
     }
 
     /// A system; its parameters, defaults included, are read in the precision of `S`.

@@ -1,7 +1,7 @@
 //! `lnn sweep`: trainings over the values of some keys of a configuration, whole or in shares; finished runs are not run again.
 
+use crate::cli::error::argument_error;
 use crate::cli::experiment::{Orders, Work, merge, perform, print_list, share};
-use crate::cli::misunderstood::misunderstood;
 use crate::cli::number::{thread_count, whole};
 use crate::cli::shard::Shard;
 use crate::cli::{CliError, train_config};
@@ -91,7 +91,7 @@ impl Args {
         let configured = |choice: Vec<(String, String)>| {
             let set = choice.iter().map(|(key, value)| format!("--set={key}={value}").into());
             let words = ["train".into(), "--config".into(), self.file.clone().into_os_string()];
-            let training = Training::try_parse_from(words.into_iter().chain(set)).map_err(|e| misunderstood(&e))?;
+            let training = Training::try_parse_from(words.into_iter().chain(set)).map_err(|e| argument_error(&e))?;
             let (config, _) = training.args.resolve(None)?;
             Ok((choice, config))
         };

@@ -1,7 +1,7 @@
 //! `lnn symmetries`: what a Lagrangian conserves.
 
+use crate::cli::format::TableOrJson;
 use crate::cli::probe::{Bound, Probe, bound, tolerance};
-use crate::cli::shown::TableOrJson;
 use crate::cli::source::SystemOrModel;
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
@@ -84,7 +84,7 @@ struct Found {
     points: usize,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    quadratic: Option<Second>,
+    quadratic: Option<SecondOrder>,
 }
 
 #[derive(Debug, Serialize)]
@@ -95,7 +95,7 @@ struct Families {
 }
 
 #[derive(Debug, Serialize)]
-struct Second {
+struct SecondOrder {
     /// New conserved quantities; null if there is no gap.
     count: Option<usize>,
     /// All of these functions, known ones included.
@@ -105,7 +105,7 @@ struct Second {
     singular_values: Vec<f64>,
 }
 
-impl From<Quadratic> for Second {
+impl From<Quadratic> for SecondOrder {
     fn from(found: Quadratic) -> Self {
         let with_known = found.separation.count;
         Self {
@@ -295,7 +295,7 @@ fn factor(x: f64) -> String {
     if (size - 1.0).abs() < 1e-6 { sign.to_string() } else { format!("{sign} {}", digits(size)) }
 }
 
-impl Second {
+impl SecondOrder {
     fn text(&self) -> String {
         match self.count {
             None => "\nquantities quadratic in the momenta: no gap, so that their number is unknown\n".to_string(),

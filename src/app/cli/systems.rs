@@ -1,6 +1,6 @@
 //! `lnn systems`: what can be learned.
 
-use crate::cli::{CliError, chosen, output};
+use crate::cli::{CliError, output, system_arg};
 use crate::lagrangian::system::{Bounds, Coordinate, Parameter, Size, System};
 use crate::lagrangian::{constrained_systems, systems};
 use serde_json::{Value, json};
@@ -19,7 +19,7 @@ pub struct Args {
 
 /// Prints the catalogue.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let one = args.system.as_deref().map(chosen::system).transpose()?;
+    let one = args.system.as_deref().map(system_arg::system).transpose()?;
     let all: Vec<Cow<'static, System>> = match one {
         Some(system) => vec![system],
         None => {

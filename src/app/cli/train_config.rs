@@ -5,7 +5,7 @@ use crate::cli::layers::{Entry, Layers, Mistake};
 use crate::cli::number::finite;
 use crate::cli::print_config::{PrintFormat, commented, training_reference};
 use crate::cli::run_args::{RunArgs, fill_periods, imply, structure};
-use crate::cli::{CliError, chosen, output, source};
+use crate::cli::{CliError, output, source, system_arg};
 use crate::configuration::Config;
 use crate::data::SamplingError;
 use crate::lagrangian::system::System;
@@ -146,17 +146,17 @@ impl Args {
 
     /// Files that are read.
     pub fn inputs(&self) -> Vec<&Path> {
-        let system = self.system.as_deref().filter(|system| chosen::is_file(system)).map(Path::new);
+        let system = self.system.as_deref().filter(|system| system_arg::is_file(system)).map(Path::new);
         self.run.config.iter().map(PathBuf::as_path).chain(system).collect()
     }
 
     /// The system that the arguments name; whether there is one of this name is found out later.
     fn requested(&self) -> Result<Option<Named>, CliError> {
         let Some(argument) = self.system.as_deref() else { return Ok(None) };
-        if !chosen::is_file(argument) {
+        if !system_arg::is_file(argument) {
             return Ok(Some(Named { name: argument.to_string(), description: None }));
         }
-        let system = chosen::system(argument)?;
+        let system = system_arg::system(argument)?;
         let description = system.described.as_ref().map(|described| described.description.clone());
         Ok(Some(Named { name: system.name.to_string(), description }))
     }

@@ -75,7 +75,7 @@ impl TubeArgs {
         let windows = self.windows(path, coordinates, end - start)?;
         let predictions = predict_by_motion(model, &windows, threads(None));
         let tube = Tube::new(&windows, &predictions, coordinates.len(), share).map_err(|error| match error {
-            TubeError::Few { found, needed } => CliError::data(format_args!(
+            TubeError::TooFewWindows { found, needed } => CliError::data(format_args!(
                 "--tube {share}: expected at least {needed} whole motions of {} s that the model has not learned from, found {found}; \
                  --tube-data names more",
                 end - start

@@ -82,16 +82,16 @@ impl Checkpoints {
     ) -> Result<(Arc<CheckpointManager>, Option<Snapshot<S>>), PipelineError> {
         let config = self.identity.clone().unwrap_or_else(|| config.to_string());
         let identity = Fingerprint { config, data };
-        let keeper = Arc::new(CheckpointManager::new(Arc::clone(&self.files), &self.directory, self.every, identity));
+        let manager = Arc::new(CheckpointManager::new(Arc::clone(&self.files), &self.directory, self.every, identity));
         if self.begin != Begin::Anew {
-            match keeper.restore(parameters, states) {
+            match manager.restore(parameters, states) {
                 Ok(Restored { content, fallback }) => {
                     if let Some(problem) = fallback {
                         let (newest, previous) = (self.directory.join(LATEST), self.directory.join(PREVIOUS));
                         let place = newest.display();
                         watch.say(Event::Note(&format!("{place}: {problem}; going on from {}", previous.display())));
                     }
-                    return Ok((keeper, Some(content)));
+                    return Ok((manager, Some(content)));
                 }
                 Err(source) if self.begin == Begin::Resume => {
                     return Err(PipelineError::Checkpoint { directory: self.directory.clone(), source });
@@ -100,6 +100,6 @@ impl Checkpoints {
             }
         }
         self.remove()?;
-        Ok((keeper, None))
+        Ok((manager, None))
     }
 }

@@ -140,10 +140,10 @@ fn fit_in<S: Scalar>(
     let sizes = (Layout::new(&architecture).parameters, data.training[0].len());
     let opened = options.checkpoints.as_ref();
     let opened = opened.map(|checkpoints| checkpoints.open::<S>(&toml, checksums(measured, &data), sizes, watch));
-    let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
+    let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
     let shots = restored.clone().filter(Snapshot::is_shooting);
     let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
-    let resumed = ResumeOptions { checkpoints: keeper.clone(), start };
+    let resumed = ResumeOptions { checkpoints: manager.clone(), start };
     let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), resumed)?;
     let mut shot = None;
     if let (Targets::Motion, StopReason::Finished) = (targets, &trained.stop) {
@@ -161,7 +161,7 @@ fn fit_in<S: Scalar>(
             seed: config.seed,
         };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));
-        let resumed = ResumeOptions { checkpoints: keeper, start };
+        let resumed = ResumeOptions { checkpoints: manager, start };
         let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), resumed)?;
         trained.weights.clone_from(&fitted.weights);
         trained.stop.clone_from(&fitted.stop);

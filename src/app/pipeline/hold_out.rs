@@ -1,4 +1,4 @@
-//! Judgement of a model of recorded motion: predictions of motion that was held out, and the balance of its energy.
+//! Evaluation of a model of recorded motion: predictions of motion that was held out, and the balance of its energy.
 
 use crate::analysis::{
     PredictionError, Predictions, ValidTimes, Window, coordinate_errors, predict_by_constant_velocity,

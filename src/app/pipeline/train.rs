@@ -220,9 +220,9 @@ fn train_in<S: Scalar>(
         .checkpoints
         .as_ref()
         .map(|checkpoints| checkpoints.open::<S>(&toml, data.checksums(), (parameters, config.data.training), watch));
-    let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
+    let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
     let start = restored.or_else(|| before.map(Snapshot::beginning_with));
-    let resumed = ResumeOptions { checkpoints: keeper, start };
+    let resumed = ResumeOptions { checkpoints: manager, start };
     let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), resumed)?;
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.

@@ -14,7 +14,7 @@ use crate::shooting::settings::Shooting;
 use crate::training::checkpoint::{Clock, PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
 use crate::training::phase::{Epochs, StopReason, run_epochs};
-use crate::training::solver::{EpochSolver, Hooks, Run, Saver};
+use crate::training::solver::{CheckpointWriter, EpochSolver, Hooks, Run};
 use crate::training::trainer::{ResumeOptions, TrainingError};
 use std::sync::Arc;
 use thiserror::Error;
@@ -235,14 +235,15 @@ pub fn resume<S: Scalar>(
     let segments = (training.len(), training.samples());
     let problem = ShootingProblem { shots, training, validation };
     let ResumeOptions { checkpoints, start } = session;
-    let (saver, in_progress) = match start {
-        Some(Snapshot { seconds, outcome, in_progress }) => {
-            (checkpoints.map(|checkpoints| Saver { checkpoints, outcome, seconds: Some(seconds) }), in_progress)
-        }
+    let (writer, in_progress) = match start {
+        Some(Snapshot { seconds, outcome, in_progress }) => (
+            checkpoints.map(|checkpoints| CheckpointWriter { checkpoints, outcome, seconds: Some(seconds) }),
+            in_progress,
+        ),
         None => (None, None),
     };
     // Checkpoints count them with those of the training that gave the weights, the history of the fit does not.
-    let epochs_before = saver.as_ref().map_or(0, |saver| saver.outcome.history.len());
+    let epochs_before = writer.as_ref().map_or(0, |writer| writer.outcome.history.len());
     let others = || estimate("checkpoint".to_string(), format!("{} segments", segments.0), "others");
     let mut learner = ShootingLearner::new(&problem, settings.start_share, settings.curvature_every);
     let mut in_progress = in_progress.filter(|in_progress| in_progress.learner.is_some());
@@ -265,7 +266,7 @@ pub fn resume<S: Scalar>(
         steps: None,
         clock,
         hooks: hooks.clone(),
-        saver,
+        writer,
     };
     let rng = RngStream::Segments.generator(task.seed);
     let solver = EpochSolver::new(learner, settings.optimizer(), settings.rates(), rng, segments.0).within(run);

@@ -3,7 +3,7 @@
 use crate::configuration::table::{count, from_zero, table};
 use crate::configuration::{ConfigError, Faults, MOST_EPOCHS, MOST_RATE, OnFailure, Optimizer, Ranges as _};
 use crate::optimizers::{Method, Schedule};
-use crate::training::solver::RateCourse;
+use crate::training::solver::LearningRateSchedule;
 
 /// Samples of a segment and integration steps of it at most.
 const MOST_STEPS: usize = 1 << 16;
@@ -75,9 +75,9 @@ impl Shooting {
     }
 
     /// Half a cosine from the rate to 0.
-    pub(crate) fn rates(&self) -> RateCourse {
+    pub(crate) fn rates(&self) -> LearningRateSchedule {
         let &Self { epochs, rate, .. } = self;
-        RateCourse { epochs, rate, eta_min: 0.0, schedule: Schedule::Cosine, t_max: 1.0 }
+        LearningRateSchedule { epochs, rate, eta_min: 0.0, schedule: Schedule::Cosine, t_max: 1.0 }
     }
 
     /// Checks every range.

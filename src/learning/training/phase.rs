@@ -49,7 +49,7 @@ impl<I: State> Observe<I> for Log {
     }
 }
 
-/// Runs all epochs of a solver from `weights`, or those that are left of the run `underway`, on a thread of its pool: to
+/// Runs all epochs of a solver from `weights`, or those that are left of the run `in_progress`, on a thread of its pool: to
 /// hand work from there to the pool wakes nobody up.
 ///
 /// # Errors

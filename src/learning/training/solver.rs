@@ -84,7 +84,7 @@ pub enum StepError {
 
 /// Epochs and the course of their learning rate.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RateCourse {
+pub(crate) struct LearningRateSchedule {
     /// Passes through the samples.
     pub epochs: usize,
     /// Learning rate at the start.
@@ -97,7 +97,7 @@ pub(crate) struct RateCourse {
     pub t_max: f64,
 }
 
-impl From<&Phase> for RateCourse {
+impl From<&Phase> for LearningRateSchedule {
     fn from(phase: &Phase) -> Self {
         let &Phase { epochs, rate, eta_min, schedule, t_max, .. } = phase;
         Self { epochs, rate, eta_min, schedule, t_max }
@@ -108,7 +108,7 @@ impl From<&Phase> for RateCourse {
 pub(crate) struct EpochSolver<S, L> {
     learner: L,
     optimizer: Optimizer,
-    rates: RateCourse,
+    rates: LearningRateSchedule,
     phase_number: usize,
     /// Epochs before those of its history.
     epochs_before: usize,
@@ -121,11 +121,11 @@ pub(crate) struct EpochSolver<S, L> {
     history: Vec<Epoch>,
     stopped: Option<StepError>,
     hooks: Hooks,
-    saver: Option<Saver<S>>,
+    writer: Option<CheckpointWriter<S>>,
 }
 
 /// The checkpoint writer, and what went before this phase.
-pub(crate) struct Saver<S> {
+pub(crate) struct CheckpointWriter<S> {
     pub(crate) checkpoints: Arc<CheckpointManager>,
     pub(crate) outcome: Outcome<S>,
     /// Seconds of what went before, where this run's clock does not count them.
@@ -149,7 +149,7 @@ pub(crate) struct Run<S> {
     /// Who watches.
     pub hooks: Hooks,
     /// Checkpoint writer, if enabled.
-    pub saver: Option<Saver<S>>,
+    pub writer: Option<CheckpointWriter<S>>,
 }
 
 /// Samples of a step: no more than there are, at least one.
@@ -160,7 +160,13 @@ fn batch(optimizer: &Optimizer, samples: usize) -> usize {
 impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
     /// A solver for one phase over `samples` training samples, shuffled by `rng`; host it in an argmin `Executor` whose
     /// state starts with the initial weights and runs for `rates.epochs` iterations.
-    pub fn new(learner: L, optimizer: Optimizer, rates: RateCourse, rng: RandomGenerator, samples: usize) -> Self {
+    pub fn new(
+        learner: L,
+        optimizer: Optimizer,
+        rates: LearningRateSchedule,
+        rng: RandomGenerator,
+        samples: usize,
+    ) -> Self {
         let steps = rates.epochs * samples.div_ceil(batch(&optimizer, samples));
         Self {
             learner,
@@ -176,16 +182,16 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
             history: Vec::new(),
             stopped: None,
             hooks: Hooks::default(),
-            saver: None,
+            writer: None,
         }
     }
 
     /// Makes this phase a part of a longer run.
     pub(crate) fn within(self, run: Run<S>) -> Self {
-        let Run { phase_number, epoch, epochs_before, step, steps, clock, hooks, saver } = run;
+        let Run { phase_number, epoch, epochs_before, step, steps, clock, hooks, writer } = run;
         let optimizer_state = OptimizerState { epoch, step, ..self.optimizer_state };
         let steps = steps.unwrap_or(self.steps);
-        Self { phase_number, epochs_before, steps, clock, hooks, saver, optimizer_state, ..self }
+        Self { phase_number, epochs_before, steps, clock, hooks, writer, optimizer_state, ..self }
     }
 
     /// Resumes from a checkpoint.
@@ -219,7 +225,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
     }
 
     fn rate(&self, epoch_of_phase: f64) -> f64 {
-        let RateCourse { epochs, rate, eta_min, schedule, t_max } = self.rates;
+        let LearningRateSchedule { epochs, rate, eta_min, schedule, t_max } = self.rates;
         schedule.rate(rate, eta_min, t_max, epoch_of_phase, epochs as f64)
     }
 
@@ -305,8 +311,8 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
 
     /// Writes a checkpoint, if checkpoints are enabled and one is due.
     fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&CheckpointManager) -> bool) {
-        let Some(Saver { checkpoints, outcome, seconds }) =
-            self.saver.as_ref().filter(|saver| is_due(&saver.checkpoints))
+        let Some(CheckpointWriter { checkpoints, outcome, seconds }) =
+            self.writer.as_ref().filter(|writer| is_due(&writer.checkpoints))
         else {
             return;
         };

@@ -13,7 +13,7 @@ use crate::training::learner::States;
 use crate::training::objective::{self, BatchReport, Objective, ThreadsError};
 use crate::training::phase::{StopReason, run_epochs};
 use crate::training::problem::TrainingProblem;
-use crate::training::solver::{EpochSolver, Hooks, Run, Saver, StepError};
+use crate::training::solver::{CheckpointWriter, EpochSolver, Hooks, Run, StepError};
 use std::any::Any;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -156,7 +156,7 @@ pub fn resume<S: Scalar>(
             steps: Some(steps),
             clock,
             hooks: hooks.clone(),
-            saver: checkpoints.clone().map(|checkpoints| Saver {
+            writer: checkpoints.clone().map(|checkpoints| CheckpointWriter {
                 checkpoints,
                 outcome: outcome.clone(),
                 seconds: None,

@@ -21,7 +21,7 @@ pub enum TubeError {
     Share(f64),
     /// Too few motions for the share.
     #[error("expected at least {needed} whole motions that the model has not learned from, found {found}")]
-    Few {
+    TooFewWindows {
         /// Motions there are.
         found: usize,
         /// Motions that it takes.
@@ -95,7 +95,7 @@ impl Tube {
             return Err(TubeError::Share(share));
         }
         if windows.len() < Self::needed(share) {
-            return Err(TubeError::Few { found: windows.len(), needed: Self::needed(share) });
+            return Err(TubeError::TooFewWindows { found: windows.len(), needed: Self::needed(share) });
         }
         let half = |rest: usize| windows.iter().zip(predictions).skip(rest).step_by(2).collect::<Vec<_>>();
         let (scaling, scored) = (half(0), half(1));
@@ -206,9 +206,9 @@ mod tests {
     fn few_motions_and_lost_ones_are_named() {
         let (windows, mut predictions) = motions(40, 3);
         let tube = |count: usize, share| Tube::new(&windows[..count], &predictions[..count].to_vec(), 2, share);
-        assert_eq!(tube(17, 0.9), Err(TubeError::Few { found: 17, needed: 18 }));
+        assert_eq!(tube(17, 0.9), Err(TubeError::TooFewWindows { found: 17, needed: 18 }));
         assert!(tube(18, 0.9).is_ok());
-        assert_eq!(tube(37, 0.95), Err(TubeError::Few { found: 37, needed: 38 }));
+        assert_eq!(tube(37, 0.95), Err(TubeError::TooFewWindows { found: 37, needed: 38 }));
         assert_eq!(tube(40, 1.0), Err(TubeError::Share(1.0)));
         predictions.iter_mut().take(12).for_each(|p| p[150..].fill(f64::NAN));
         let lost = Tube::new(&windows, &predictions, 2, 0.9);

@@ -201,7 +201,7 @@ pub struct AtomicWriter<'a> {
     files: &'a dyn Files,
     file: File,
     /// The temporary file; none if the target is written in place.
-    draft: Option<Draft<'a>>,
+    temporary: Option<TemporaryFile<'a>>,
     /// Bytes gathered for the next write.
     buffer: Vec<u8>,
 }
@@ -220,15 +220,15 @@ impl<'a> AtomicWriter<'a> {
             Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
             Err(error) => return Err(error),
         };
-        let (draft, file) = match fs::metadata(&target) {
+        let (temporary, file) = match fs::metadata(&target) {
             Ok(data) if data.is_dir() => return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
             Ok(data) if !data.is_file() => (None, OpenOptions::new().write(true).open(&target)?),
             _ => {
-                let (draft, file) = Draft::create(files, &target)?;
-                (Some(draft), file)
+                let (temporary, file) = TemporaryFile::create(files, &target)?;
+                (Some(temporary), file)
             }
         };
-        Ok(Self { files, file, draft, buffer: Vec::new() })
+        Ok(Self { files, file, temporary, buffer: Vec::new() })
     }
 
     /// Adds bytes at the end.
@@ -252,11 +252,11 @@ impl<'a> AtomicWriter<'a> {
     /// As of [`write_atomically`].
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()?;
-        match self.draft {
+        match self.temporary {
             None => Ok(()),
-            Some(draft) => {
-                draft.complete(&self.file)?;
-                draft.take_name()
+            Some(temporary) => {
+                temporary.complete(&self.file)?;
+                temporary.take_name()
             }
         }
     }
@@ -278,8 +278,8 @@ pub fn check_target(path: &Path) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(data) if data.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
         Ok(data) if !data.is_file() => OpenOptions::new().write(true).open(path).map(drop),
-        Ok(_) => Draft::create(&Disk, &fs::canonicalize(path)?).map(drop),
-        Err(_) => Draft::create(&Disk, path).map(drop),
+        Ok(_) => TemporaryFile::create(&Disk, &fs::canonicalize(path)?).map(drop),
+        Err(_) => TemporaryFile::create(&Disk, path).map(drop),
     }
 }
 
@@ -292,16 +292,16 @@ pub fn check_target(path: &Path) -> io::Result<()> {
 /// # Errors
 /// The error of the file system, or `InvalidData` if the bytes read back are others.
 pub fn replace(files: &dyn Files, newest: &Path, previous: &Path, bytes: &[u8], keep: bool) -> io::Result<()> {
-    let draft = Draft::write(files, newest, bytes)?;
-    draft.verify(bytes)?;
+    let temporary = TemporaryFile::write(files, newest, bytes)?;
+    temporary.verify(bytes)?;
     if keep && newest.exists() {
         uninterrupted(|| files.rename(newest, previous))?;
     }
-    draft.take_name()
+    temporary.take_name()
 }
 
 /// A temporary file beside its target; removed unless it takes the target's name.
-struct Draft<'a> {
+struct TemporaryFile<'a> {
     files: &'a dyn Files,
     target: PathBuf,
     directory: PathBuf,
@@ -309,7 +309,7 @@ struct Draft<'a> {
     named: bool,
 }
 
-impl<'a> Draft<'a> {
+impl<'a> TemporaryFile<'a> {
     /// Creates the temporary file, empty.
     fn create(files: &'a dyn Files, target: &Path) -> io::Result<(Self, File)> {
         let name = target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "names no file"))?;
@@ -324,10 +324,10 @@ impl<'a> Draft<'a> {
 
     /// Creates the temporary file with these bytes, on the disk.
     fn write(files: &'a dyn Files, target: &Path, bytes: &[u8]) -> io::Result<Self> {
-        let (draft, mut file) = Self::create(files, target)?;
+        let (temporary, mut file) = Self::create(files, target)?;
         write_all(files, &mut file, bytes)?;
-        draft.complete(&file)?;
-        Ok(draft)
+        temporary.complete(&file)?;
+        Ok(temporary)
     }
 
     /// Gives the file the permissions of the target, if that exists, and brings it to the disk.
@@ -360,7 +360,7 @@ impl<'a> Draft<'a> {
     }
 }
 
-impl Drop for Draft<'_> {
+impl Drop for TemporaryFile<'_> {
     fn drop(&mut self) {
         if !self.named {
             // The first error is the one to report; nothing more can be done if the removal fails too.

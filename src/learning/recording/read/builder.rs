@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 const MOST: usize = 100_000;
 
 /// A trajectory while its rows come in.
-pub struct Growing {
+pub struct TrackBuilder {
     /// Value of the column that tells trajectories apart.
     pub label: Option<String>,
     /// Rows of its samples.
@@ -33,7 +33,7 @@ pub struct Builder<'a> {
     /// Rows to come, if they are known and make one trajectory.
     expected: usize,
     /// The trajectories so far.
-    pub growing: Vec<Growing>,
+    pub tracks: Vec<TrackBuilder>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
 }
@@ -42,8 +42,8 @@ impl<'a> Builder<'a> {
     /// No rows yet.
     pub fn new(columns: &'a Columns, selection: Selection) -> Self {
         let periodic = columns.periodic();
-        let (growing, labels) = (Vec::new(), HashMap::new());
-        Self { columns, selection, periodic, current: 0, labels, expected: 0, growing, duplicates: 0 }
+        let (tracks, labels) = (Vec::new(), HashMap::new());
+        Self { columns, selection, periodic, current: 0, labels, expected: 0, tracks, duplicates: 0 }
     }
 
     /// Which columns are used.
@@ -60,30 +60,30 @@ impl<'a> Builder<'a> {
     /// trajectories apart if there is such a column.
     pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {
         self.turn_to(row, label)?;
-        let Some(growing) = self.growing.get_mut(self.current) else { return Ok(()) };
+        let Some(tracks) = self.tracks.get_mut(self.current) else { return Ok(()) };
         let timed = usize::from(self.selection.timed);
         // A negative factor of time turns its order around.
         let sign = self.selection.values[0].factor.signum();
-        if self.selection.timed && !growing.last.is_empty() && values[0] * sign <= growing.last[0] * sign {
-            if values == growing.last {
+        if self.selection.timed && !tracks.last.is_empty() && values[0] * sign <= tracks.last[0] * sign {
+            if values == tracks.last {
                 self.duplicates += 1;
                 return Ok(());
             }
-            let hint = match (values[0] == growing.last[0], label.is_none()) {
+            let hint = match (values[0] == tracks.last[0], label.is_none()) {
                 (true, _) => " with other values",
                 (false, true) => " (another trajectory? give it a file or a column of its own)",
                 (false, false) => "",
             };
             let column = self.selection.values[0].name.clone();
-            let (before_row, before) = (growing.last_row, growing.last[0]);
+            let (before_row, before) = (tracks.last_row, tracks.last[0]);
             return Err(Problem::Order { row, column, before_row, before, found: values[0], hint });
         }
-        growing.last.clear();
-        growing.last.extend_from_slice(values);
-        growing.last_row = row;
+        tracks.last.clear();
+        tracks.last.extend_from_slice(values);
+        tracks.last_row = row;
 
-        let (sample, track) = (growing.track.times.len(), &mut growing.track);
-        growing.rows.note(sample, row);
+        let (sample, track) = (tracks.track.times.len(), &mut tracks.track);
+        tracks.rows.note(sample, row);
         let n = self.columns.coords.len();
         let mut scaled = values.iter().zip(&self.selection.values).map(|(x, used)| {
             let y = x * used.factor;
@@ -123,18 +123,18 @@ impl<'a> Builder<'a> {
 
     /// Finds or begins the trajectory of a label.
     fn turn_to(&mut self, row: u64, label: Option<&str>) -> Result<(), Problem> {
-        if self.growing.get(self.current).is_some_and(|growing| growing.label.as_deref() == label) {
+        if self.tracks.get(self.current).is_some_and(|tracks| tracks.label.as_deref() == label) {
             return Ok(());
         }
         if let Some(known) = label.and_then(|label| self.labels.get(label)) {
             self.current = *known;
             return Ok(());
         }
-        if self.growing.len() == MOST {
+        if self.tracks.len() == MOST {
             let column = self.columns.trajectory.clone().unwrap_or_default();
             return Err(Problem::Trajectories { row, column, most: MOST });
         }
-        self.current = self.growing.len();
+        self.current = self.tracks.len();
         if let Some(label) = label {
             self.labels.insert(label.to_string(), self.current);
         }
@@ -149,7 +149,7 @@ impl<'a> Builder<'a> {
             force: room(force.len()),
             ..empty()
         };
-        self.growing.push(Growing { label, rows: Rows::default(), track, last: Vec::new(), last_row: 0 });
+        self.tracks.push(TrackBuilder { label, rows: Rows::default(), track, last: Vec::new(), last_row: 0 });
         Ok(())
     }
 }

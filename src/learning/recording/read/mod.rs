@@ -61,13 +61,13 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
     let builder = parse(file, size, columns)?;
     reading.time = builder.selection().time().map(ToString::to_string);
     reading.duplicates += builder.duplicates;
-    if builder.growing.is_empty() {
+    if builder.tracks.is_empty() {
         return Err(Problem::NoRows);
     }
     let name = path.display().to_string();
     let mut most = 0;
-    for growing in builder.growing {
-        most = most.max(pieces::add(&name, growing, reading));
+    for track_builder in builder.tracks {
+        most = most.max(pieces::add(&name, track_builder, reading));
     }
     if most < LEAST { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
 }

@@ -17,7 +17,7 @@ use crate::recording::statistics::median;
 use crate::recording::{RecordedTrajectory, Recording};
 use local_fit::Estimate;
 use noise::along;
-use pace::Usual;
+use pace::Typical;
 use signal::{Fits, Signal};
 use thiserror::Error;
 use window::best;
@@ -270,8 +270,8 @@ impl Smoothing {
         }
         let clock = Clock::of(&track.times);
         let tracks = std::slice::from_ref(track);
-        let usual: Vec<Usual<'_>> = (0..n)
-            .map(|i| Usual {
+        let usual: Vec<Typical<'_>> = (0..n)
+            .map(|i| Typical {
                 signal: self.signal(tracks, std::slice::from_ref(&clock), i),
                 sigmas: along((&track.times, &track.q), clock.even, (n, i), self.coordinates[i].noise),
                 window: self.samples(i, track, &clock),
@@ -307,7 +307,7 @@ const LACKING: f64 = 4.0;
 const STRETCHED: f64 = 1.5;
 
 /// Fills column `signal.i` of all arrays by a window of its own around every sample.
-fn smooth(Usual { signal, sigmas, .. }: &Usual<'_>, windows: &[usize], smoothed: &mut Smoothed) {
+fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoothed: &mut Smoothed) {
     let (times, clock, n, i) = (&signal.tracks[0].times, &signal.clocks[0], signal.n, signal.i);
     let length = times.len();
     let mut fits = Fits::default();

@@ -14,7 +14,7 @@ const TOLERATED: f64 = 2.0;
 const HOPELESS: f64 = 4.0;
 
 /// A coordinate of one trajectory with its usual window in samples.
-pub struct Usual<'a> {
+pub struct Typical<'a> {
     /// The coordinate of the trajectory, the only one of the signal.
     pub signal: Signal<'a>,
     /// Noise at every sample.
@@ -43,7 +43,7 @@ const INDEPENDENT: f64 = 4.0;
 
 impl Tried {
     /// Tries a window at places spread evenly; none if it is as long as half the trajectory, or too short for the polynomials.
-    fn new(Usual { signal, sigmas, .. }: &Usual<'_>, window: usize) -> Option<Self> {
+    fn new(Typical { signal, sigmas, .. }: &Typical<'_>, window: usize) -> Option<Self> {
         let track = &signal.tracks[0];
         if window > track.len() / 2 || window < signal.degree + 3 {
             return None;
@@ -82,13 +82,13 @@ impl Tried {
 /// variance together there, a window to either side, coordinates in units of their usual error (the local choice of Fan and Gijbels, Local
 /// Polynomial Modelling, 1996, section 4.3). Where the usual windows are nearly as good they are kept, so that motion of even pace has one
 /// length. Factors are averaged over a quarter of the window to either side.
-pub fn windows(usual: &[Usual<'_>]) -> Vec<Vec<usize>> {
+pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
     let Some(first) = usual.first() else { return Vec::new() };
     let track = &first.signal.tracks[0];
     let (length, least) = (track.len(), (first.signal.degree + 3) | 1);
     let most = (length - (length + 1) % 2).max(least);
-    let of = |u: &Usual<'_>, k: f64| scaled(u.window, k).clamp(least, most);
-    let told: Vec<&Usual<'_>> = usual.iter().filter(|u| u.error > 0.0).collect();
+    let of = |u: &Typical<'_>, k: f64| scaled(u.window, k).clamp(least, most);
+    let told: Vec<&Typical<'_>> = usual.iter().filter(|u| u.error > 0.0).collect();
     let tried: Vec<(i32, Vec<Tried>)> = (LEAST..=MOST)
         .filter_map(|k| {
             // Windows below the least are the least: tried once, by the longest such factor.
@@ -112,7 +112,7 @@ pub fn windows(usual: &[Usual<'_>]) -> Vec<Vec<usize>> {
 }
 
 /// The factor at a sample.
-fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Usual<'_>], sample: usize) -> i32 {
+fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Typical<'_>], sample: usize) -> i32 {
     let mut squares: Vec<(i32, f64)> = Vec::with_capacity(tried.len());
     let mut best = f64::INFINITY;
     let mut missed = vec![Missed::default(); told.len()];
@@ -158,7 +158,7 @@ mod tests {
             let sigma = [0.002, 0.004][i];
             let tracks = std::slice::from_ref(&track);
             let signal = Signal { tracks, clocks: &clocks, n: 2, i, sigma, ratio: None, degree: 4 };
-            Usual { signal, sigmas: vec![sigma; length], window: usual, error: 10.0 * sigma }
+            Typical { signal, sigmas: vec![sigma; length], window: usual, error: 10.0 * sigma }
         };
         windows(&[of(0), of(1)])
     }

@@ -8,7 +8,7 @@ mod warnings;
 pub(crate) use coordinate::CoordinateSurvey;
 pub(crate) use motionless::Stillness;
 pub(crate) use motionless::stillness;
-pub(crate) use suspicious::{Kind, Suspicion};
+pub(crate) use suspicious::{Kind, Warning};
 
 use crate::recording::clock::Clock;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
@@ -83,7 +83,7 @@ pub struct Survey {
     /// The coordinates.
     pub(crate) coordinates: Vec<CoordinateSurvey>,
     /// Places that do not look like smooth motion with noise; of very many the first.
-    pub(crate) suspicious: Vec<Suspicion>,
+    pub(crate) suspicious: Vec<Warning>,
     /// Number of suspicious places.
     pub suspicious_count: usize,
     /// Degree of the polynomials of smoothing.

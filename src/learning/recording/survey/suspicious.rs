@@ -14,7 +14,7 @@ const LONGEST: f64 = 1.7;
 const LIMIT: f64 = 6.0;
 /// Fewest equal values in a row that may be a frozen sensor.
 const FROZEN: usize = 8;
-/// Suspicions that are kept.
+/// Warnings that are kept.
 const MOST: usize = 1000;
 
 /// Kind of a suspicious place.
@@ -34,7 +34,7 @@ pub enum Kind {
 
 /// A place in the data that does not look like smooth motion with noise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Suspicion {
+pub struct Warning {
     /// Name of the trajectory.
     pub track: String,
     /// Row of the file (line, or row of an array, from 1).
@@ -62,7 +62,7 @@ const PATTERNS: [(Kind, &[f64]); 3] = [
 /// Sixth differences, scaled to the noise of one sample, are noise alone where motion is smooth. Where one is beyond six
 /// standard deviations (robust, from their median) and its neighbours have the other sign (motion that is sampled too
 /// coarsely has the same), the pattern around it tells what happened.
-pub fn find(reading: &LoadedRecording, i: usize, sigma: f64, found: &mut Vec<Suspicion>) -> usize {
+pub fn find(reading: &LoadedRecording, i: usize, sigma: f64, found: &mut Vec<Warning>) -> usize {
     let (recording, n) = (&reading.recording, reading.recording.n());
     let (mut count, mut z) = (0, Vec::new());
     for (track, rows) in recording.tracks.iter().zip(&reading.rows) {
@@ -71,7 +71,7 @@ pub fn find(reading: &LoadedRecording, i: usize, sigma: f64, found: &mut Vec<Sus
             if found.len() < MOST {
                 let (name, coordinate) = (track.name.clone(), recording.coordinates[i].clone());
                 let (row, value) = (rows.row(at), track.q[at * n + i]);
-                found.push(Suspicion { track: name, row, coordinate, kind, value, size });
+                found.push(Warning { track: name, row, coordinate, kind, value, size });
             }
         };
         let q = |at: usize| track.q[at * n + i];

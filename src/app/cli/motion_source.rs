@@ -1,15 +1,15 @@
-//! Subject of a roll-out: a trained model, or a system.
+//! MotionSource of a roll-out: a trained model, or a system.
 
-use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::source::Source;
+use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, forces};
 use crate::lagrangian::EulerLagrange;
 use crate::rollout::Domain;
 use std::path::{Path, PathBuf};
 
 /// A source of motion with what is known about it.
-pub struct Subject {
+pub struct MotionSource {
     /// Name of the system.
     pub name: String,
     /// Its terms.
@@ -26,7 +26,7 @@ pub struct Subject {
     pub file: Option<PathBuf>,
 }
 
-impl Subject {
+impl MotionSource {
     /// A trained model, by its file or by the directory of its run.
     ///
     /// # Errors
@@ -45,9 +45,9 @@ impl Subject {
     /// # Errors
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
-        let system = chosen::system(name)?;
+        let system = system_arg::system(name)?;
         let Source { model, columns, forces } = Source::configured(system.clone(), given)?;
-        let file = chosen::is_file(name).then(|| PathBuf::from(name));
+        let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
         Ok(Self { name, model, columns, forces, domain: None, time_unit, file })
     }

@@ -1,4 +1,4 @@
-//! The system that a command is about: one of the catalogue by its name, or one of one's own by its file.
+//! The system that a command is about: one of the catalogue by its name, or another one by its file.
 
 use crate::cli::{CliError, config};
 use crate::lagrangian::system::System;
