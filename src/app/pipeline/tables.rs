@@ -1,15 +1,34 @@
 //! Values from tables of TOML.
 
 use serde::de::DeserializeOwned;
+use toml::Value;
 
 /// A value from a table. All are read from tables and not from texts, so that the code of every type is compiled for one format.
 ///
 /// # Errors
 /// The path of the key that is refused, such as `phase[0].rate`, and what is wrong there.
-pub(crate) fn from_table<T: DeserializeOwned>(table: toml::Value) -> Result<T, (String, String)> {
+pub(crate) fn from_table<T: DeserializeOwned>(table: Value) -> Result<T, (String, String)> {
+    // A date would be read as text.
+    if let Some(path) = date(&table) {
+        return Err((path, "no key takes a date or a time".to_string()));
+    }
     serde_path_to_error::deserialize(table).map_err(|error| {
         let path = error.path().to_string();
         let path = path.trim_end_matches('?').trim_end_matches('.');
         (path.to_string(), error.inner().message().to_string())
     })
+}
+
+/// The path of the first date in a value.
+fn date(value: &Value) -> Option<String> {
+    let inside = |name: String, value| {
+        let rest = date(value)?;
+        Some(if rest.is_empty() || rest.starts_with('[') { name + &rest } else { format!("{name}.{rest}") })
+    };
+    match value {
+        Value::Datetime(_) => Some(String::new()),
+        Value::Table(table) => table.iter().find_map(|(name, value)| inside(name.clone(), value)),
+        Value::Array(items) => items.iter().enumerate().find_map(|(k, value)| inside(format!("[{k}]"), value)),
+        _ => None,
+    }
 }

@@ -21,6 +21,8 @@ mod mercury;
 mod nalgebra_matrices;
 #[path = "../../../examples/other_solver.rs"]
 mod other_solver;
+#[path = "../../../examples/own_lagrangian.rs"]
+mod own_lagrangian;
 #[path = "../../../examples/own_optimizer.rs"]
 mod own_optimizer;
 #[path = "../../../examples/own_solver.rs"]
@@ -43,6 +45,11 @@ fn an_integrator_of_ode_solvers_moves_a_cart_and_a_pendulum() {
 #[test]
 fn an_integrator_of_another_crate_moves_a_learned_pendulum() {
     other_solver::main().unwrap();
+}
+
+#[test]
+fn a_lagrangian_of_ones_own_is_learned_and_solved() {
+    own_lagrangian::main().unwrap();
 }
 
 #[test]
