@@ -5,6 +5,7 @@
 //! `touch examples/own_lagrangian.rs; time cargo build --release --example own_lagrangian`.
 
 use lnn::prelude::*;
+use std::f64::consts::TAU;
 
 /// Coordinate: angle from the lowest point in rad. Parameters: mass (kg), radius (m), turning of the hoop (rad/s), g (m/s^2).
 struct BeadOnHoop;
@@ -32,7 +33,7 @@ fn step(model: &dyn EulerLagrange<f64>, (q, v): (f64, f64), h: f64) -> Result<(f
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bead = Mechanics::new(BeadOnHoop, [0.1, 0.5, 6.0, 9.81]);
-    let q: Vec<f64> = (0..700).map(|k| 6.28 * (f64::from(k) * 0.618 % 1.0)).collect();
+    let q: Vec<f64> = (0..700).map(|k| TAU * (f64::from(k) * 0.618 % 1.0)).collect();
     let v: Vec<f64> = (0..700).map(|k| 6.0 * (f64::from(k) * 0.414 % 1.0) - 3.0).collect();
     let a = bead.acceleration(&q, &v)?;
     let data = Dataset::new(1, q, v, a)?;

@@ -298,10 +298,13 @@ fn record<'t, S: Scalar>(
 /// The code of an [`Evaluator`], which this crate compiles once for each scalar: a crate with a Lagrangian of its own compiles the code of
 /// that Lagrangian alone.
 struct Routines<S> {
-    terms: fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>,
-    metric_jets: fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>,
-    wide_metric_jets: fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<Dd>>, MechanicsError>,
+    terms: TermsOf<S>,
+    metric_jets: JetsOf<S, S>,
+    wide_metric_jets: JetsOf<S, Dd>,
 }
+
+type TermsOf<S> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
+type JetsOf<S, T> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<T>>, MechanicsError>;
 
 impl<S: Scalar> Routines<S> {
     const ALL: Self =

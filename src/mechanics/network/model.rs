@@ -27,9 +27,12 @@ pub struct NetworkLagrangian<S> {
 /// not compile it again.
 #[derive(Clone, Copy, Debug)]
 struct Code<S> {
-    terms: fn(&NetworkLagrangian<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>,
-    metric_jets: fn(&NetworkLagrangian<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>,
+    terms: TermsOf<S>,
+    metric_jets: JetsOf<S>,
 }
+
+type TermsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
+type JetsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>;
 
 #[derive(Debug)]
 struct Workspace<S> {
