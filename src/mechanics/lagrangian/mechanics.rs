@@ -85,6 +85,7 @@ impl<S: Scalar> Lagrangian for RecordedValue<S> {
 /// Parameters, recorded programs and buffers: everything that does not depend on the type of the Lagrangian.
 #[derive(Debug)]
 struct Evaluator<S> {
+    routines: Routines<S>,
     parameters: Vec<S>,
     /// The program of the value, recorded on first use.
     value: OnceLock<Option<RecordedValue<S>>>,
@@ -109,6 +110,7 @@ impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
     /// [`Lagrangian::parameter_count`] is an error of every call.
     pub fn new(system: L, parameters: impl IntoIterator<Item = S>) -> Self {
         let evaluator = Evaluator {
+            routines: Routines::get(),
             parameters: parameters.into_iter().collect(),
             value: OnceLock::new(),
             engine: OnceLock::new(),
@@ -297,6 +299,7 @@ fn record<'t, S: Scalar>(
 
 /// The code of an [`Evaluator`], which this crate compiles once for each scalar: a crate with a Lagrangian of its own compiles the code of
 /// that Lagrangian alone.
+#[derive(Clone, Copy, Debug)]
 struct Routines<S> {
     terms: TermsOf<S>,
     metric_jets: JetsOf<S, S>,
@@ -310,8 +313,8 @@ impl<S: Scalar> Routines<S> {
     const ALL: Self =
         Self { terms: Evaluator::terms, metric_jets: Evaluator::metric_jets, wide_metric_jets: Evaluator::metric_jets };
 
-    fn get() -> &'static Self {
-        S::routines().downcast_ref().expect("every scalar holds its own routines")
+    fn get() -> Self {
+        *S::routines().downcast_ref().expect("every scalar holds its own routines")
     }
 }
 
@@ -340,16 +343,16 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        (Routines::get().terms)(&self.evaluator, &self.system, q, v, request, terms)
+        (self.evaluator.routines.terms)(&self.evaluator, &self.system, q, v, request, terms)
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        (Routines::get().metric_jets)(&self.evaluator, &self.system, q, v)
+        (self.evaluator.routines.metric_jets)(&self.evaluator, &self.system, q, v)
     }
 
     fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
         let worth = S::epsilon().to_f64() > Dd::epsilon().to_f64()
             && Lagrangian::coordinates(&self.system) <= REPLAY_COORDINATES;
-        worth.then(|| (Routines::get().wide_metric_jets)(&self.evaluator, &self.system, q, v)).transpose()
+        worth.then(|| (self.evaluator.routines.wide_metric_jets)(&self.evaluator, &self.system, q, v)).transpose()
     }
 }
