@@ -1,5 +1,5 @@
-//! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, dot products for a few rows, a plain loop for other
-//! numbers.
+//! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, dot products for a few rows. Other numbers have the loop
+//! of [`Matrices`](crate::scalar::Matrices).
 //!
 //! Products of a few rows with a transposed matrix, `C = alpha A B^T`, by dot products: the rows of both are contiguous, so that
 //! nothing is packed. A blocked product packs `B^T` whatever the number of rows, which takes longer than to multiply few.

@@ -60,30 +60,30 @@ impl<'a> Builder<'a> {
     /// trajectories apart if there is such a column.
     pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {
         self.turn_to(row, label)?;
-        let Some(tracks) = self.tracks.get_mut(self.current) else { return Ok(()) };
+        let Some(open) = self.tracks.get_mut(self.current) else { return Ok(()) };
         let timed = usize::from(self.selection.timed);
         // A negative factor of time turns its order around.
         let sign = self.selection.values[0].factor.signum();
-        if self.selection.timed && !tracks.last.is_empty() && values[0] * sign <= tracks.last[0] * sign {
-            if values == tracks.last {
+        if self.selection.timed && !open.last.is_empty() && values[0] * sign <= open.last[0] * sign {
+            if values == open.last {
                 self.duplicates += 1;
                 return Ok(());
             }
-            let hint = match (values[0] == tracks.last[0], label.is_none()) {
+            let hint = match (values[0] == open.last[0], label.is_none()) {
                 (true, _) => " with other values",
                 (false, true) => " (another trajectory? give it a file or a column of its own)",
                 (false, false) => "",
             };
             let column = self.selection.values[0].name.clone();
-            let (before_row, before) = (tracks.last_row, tracks.last[0]);
+            let (before_row, before) = (open.last_row, open.last[0]);
             return Err(Problem::Order { row, column, before_row, before, found: values[0], hint });
         }
-        tracks.last.clear();
-        tracks.last.extend_from_slice(values);
-        tracks.last_row = row;
+        open.last.clear();
+        open.last.extend_from_slice(values);
+        open.last_row = row;
 
-        let (sample, track) = (tracks.track.times.len(), &mut tracks.track);
-        tracks.rows.note(sample, row);
+        let (sample, track) = (open.track.times.len(), &mut open.track);
+        open.rows.note(sample, row);
         let n = self.columns.coords.len();
         let mut scaled = values.iter().zip(&self.selection.values).map(|(x, used)| {
             let y = x * used.factor;
@@ -123,7 +123,7 @@ impl<'a> Builder<'a> {
 
     /// Finds or begins the trajectory of a label.
     fn turn_to(&mut self, row: u64, label: Option<&str>) -> Result<(), Problem> {
-        if self.tracks.get(self.current).is_some_and(|tracks| tracks.label.as_deref() == label) {
+        if self.tracks.get(self.current).is_some_and(|open| open.label.as_deref() == label) {
             return Ok(());
         }
         if let Some(known) = label.and_then(|label| self.labels.get(label)) {

@@ -66,8 +66,8 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
     }
     let name = path.display().to_string();
     let mut most = 0;
-    for track_builder in builder.tracks {
-        most = most.max(pieces::add(&name, track_builder, reading));
+    for track in builder.tracks {
+        most = most.max(pieces::add(&name, track, reading));
     }
     if most < LEAST { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
 }

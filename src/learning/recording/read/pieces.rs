@@ -15,8 +15,8 @@ const UNSURE: f64 = 1.5;
 ///
 /// A trajectory goes on across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
 /// is a guess, and where gaps are longer, it is cut.
-pub fn add(file: &str, track_builder: TrackBuilder, reading: &mut LoadedRecording) -> usize {
-    let TrackBuilder { label, rows, mut track, .. } = track_builder;
+pub fn add(file: &str, builder: TrackBuilder, reading: &mut LoadedRecording) -> usize {
+    let TrackBuilder { label, rows, mut track, .. } = builder;
     let clock = Clock::of(&track.times);
     let mut bounds = vec![0];
     let mut turned = Vec::new();
