@@ -127,6 +127,13 @@ impl Features {
     pub fn degree(&self, term: usize) -> i32 {
         self.terms[term].degree()
     }
+    /// `true` if a term is one of the `others`, over the same variables, times variables.
+    pub fn is_multiple(&self, term: usize, others: &Self, other: usize) -> bool {
+        let (whole, factor) = (&self.terms[term], &others.terms[other]);
+        let power = |variable: usize| whole.powers.iter().find(|(k, _)| *k == variable).map_or(0, |(_, power)| *power);
+        factor.velocity.is_none_or(|_| factor.velocity == whole.velocity)
+            && factor.powers.iter().all(|&(k, least)| power(k) >= least)
+    }
     /// `true` for the constant.
     pub fn is_constant(&self, term: usize) -> bool {
         self.terms[term].powers.is_empty() && self.terms[term].velocity.is_none()

@@ -3,9 +3,10 @@
 use super::features::Features;
 use super::pencil::{Moments, Pencil};
 use super::{ConstraintKind, FoundConstraint, MotionSamples};
+use crate::linalg::{Workspace, dot, solve};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A combination of this many times the variance of its noise still counts as vanishing.
 const TAKEN: f64 = 4.0;
@@ -19,6 +20,12 @@ const RISE: f64 = 30.0;
 const SHARES: [f64; 5] = [0.1, 0.03, 0.01, 3e-3, 1e-3];
 /// Terms are left out one by one where there are at most so many.
 const FEW: usize = 40;
+/// Preference of terms of lower degree as pivots, which then would not divide what follows.
+const LOWER: f64 = 1e-3;
+/// Rounds of weighted squares, starts of them for each term, and multiplications that they may take.
+const REWEIGHTED: usize = 12;
+const FORMS: usize = 4;
+const WORK: usize = 4_000_000_000;
 /// Quantile of Student's distribution for 95 %, 7 degrees of freedom, as of eight parts.
 const STUDENT: f64 = 2.365;
 
@@ -36,7 +43,8 @@ pub struct Generator {
     pub holds: bool,
 }
 
-/// The combinations of some terms that vanish.
+/// The combinations of terms that vanish, degree by degree. What vanishes already times further variables is none: terms in which its
+/// leading term divides are left out of higher degrees.
 pub struct Vanishing<'a> {
     features: &'a Features,
     moments: Moments,
@@ -44,50 +52,145 @@ pub struct Vanishing<'a> {
     centred: bool,
     /// Samples whose errors are independent.
     independent: f64,
+    levels: Vec<Level>,
+    /// Leading terms of what vanishes.
+    leading: Vec<usize>,
+}
+
+/// Combinations of terms up to a degree that vanish.
+struct Level {
+    degree: i32,
     terms: Vec<usize>,
-    /// A basis of them, over the terms.
+    /// A basis over the terms in reduced row echelon form, and the column of each row's pivot.
     rows: Vec<Vec<f64>>,
+    pivots: Vec<usize>,
     /// Size of the step between what vanishes and what does not.
-    pub gap: Option<f64>,
+    gap: Option<f64>,
 }
 
 impl<'a> Vanishing<'a> {
-    /// Looks for combinations that vanish, or `centred`, that are constant along each trajectory; of `shared` samples the errors are as
-    /// one.
-    pub fn of(samples: &MotionSamples, features: &'a Features, centred: bool, shared: f64) -> Self {
+    /// Looks for combinations that vanish, beside those that are `known` to, or `centred`, that are constant along each trajectory; of
+    /// `shared` samples the errors are as one.
+    pub fn of(
+        samples: &MotionSamples,
+        features: &'a Features,
+        known: Option<&Vanishing<'_>>,
+        centred: bool,
+        shared: f64,
+    ) -> Self {
         let p = features.len();
         let moments = Moments::of(samples, features, if p > 300 { 4 } else { 8 });
-        // Every constant is constant.
-        let terms: Vec<usize> = (0..p).filter(|&term| !(centred && features.is_constant(term))).collect();
         let whole = moments.pencil(centred, |_| true);
-        let (ratios, combinations) = whole.on(&terms).solve();
+        let independent = samples.len() as f64 / shared;
+        let (levels, leading) = (Vec::new(), Vec::new());
+        let mut found = Self { features, moments, whole, centred, independent, levels, leading };
+        let highest = (0..p).map(|term| features.degree(term)).max().unwrap_or(0);
+        // The product of a constant and of another function is not constant: there is one level.
+        for degree in if centred { highest..=highest } else { 0..=highest } {
+            let left = |&term: &usize| {
+                let follows =
+                    || known.is_some_and(|known| known.divides(features, term)) || found.divides(features, term);
+                // Every constant is constant.
+                features.degree(term) <= degree && !(centred && features.is_constant(term)) && !follows()
+            };
+            let level = found.level((0..p).filter(left).collect(), degree);
+            found.leading.extend(level.pivots.iter().filter_map(|&column| level.terms.get(column)));
+            found.levels.push(level);
+        }
+        found
+    }
+
+    /// `true` if a term of these or of other features is a leading term times variables.
+    fn divides(&self, features: &Features, term: usize) -> bool {
+        self.leading.iter().any(|&lead| features.is_multiple(term, self.features, lead))
+    }
+
+    /// What vanishes of some terms.
+    fn level(&self, terms: Vec<usize>, degree: i32) -> Level {
+        let (ratios, combinations) = self.whole.on(&terms).solve();
         let count = ratios.iter().filter(|ratio| **ratio <= TAKEN).count();
         let largest = if count > 0 { ratios[count - 1].max(1.0) } else { 1.0 };
         let gap = ratios.get(count).map(|next| (next / largest).sqrt());
         let count = if gap.is_some_and(|gap| gap < LEAST_GAP) { 0 } else { count };
-        let rows = combinations.chunks_exact(terms.len()).take(count).map(<[f64]>::to_vec).collect();
-        Self { features, moments, whole, centred, independent: samples.len() as f64 / shared, terms, rows, gap }
+        let mut rows: Vec<Vec<f64>> =
+            combinations.chunks_exact(terms.len().max(1)).take(count).map(<[f64]>::to_vec).collect();
+        let highest = |&term: &usize| if self.centred || self.features.degree(term) == degree { 1.0 } else { LOWER };
+        let pivots = reduce(&mut rows, &terms.iter().map(highest).collect::<Vec<f64>>());
+        Level { degree, terms, rows, pivots, gap }
     }
 
-    /// As many as there are, none of which follows from the others, simple ones first, each with the terms that it needs. Another `form`
-    /// than 0 prefers other terms.
-    pub fn generators(&self, form: u64) -> Vec<Generator> {
-        let mut rows = self.rows.clone();
-        let mut rng = ChaCha8Rng::seed_from_u64(form);
-        let preference: Vec<f64> =
-            self.terms.iter().map(|_| if form == 0 { 1.0 } else { rng.random_range(-3.0..0.0f64).exp() }).collect();
-        let pivots = reduce(&mut rows, &preference);
-        let mut found: Vec<Generator> = rows
-            .iter()
-            .zip(&pivots)
-            .map(|(row, &own)| {
-                let free = (0..self.terms.len()).filter(|k| *k == own || !pivots.contains(k));
-                let support: Vec<(usize, f64)> = free.map(|k| (self.terms[k], row[k])).collect();
+    /// Size of the step between what vanishes and what does not, the smallest of the degrees of those taken; of the highest degree if
+    /// none was.
+    pub fn gap(&self, taken: &[Generator]) -> Option<f64> {
+        let has = |degree| taken.iter().any(|generator| generator.degree(self.features) == degree);
+        let gaps = self.levels.iter().filter(|level| has(level.degree)).filter_map(|level| level.gap);
+        if taken.is_empty() { self.levels.last().and_then(|level| level.gap) } else { gaps.reduce(f64::min) }
+    }
+
+    /// Combinations with the terms that they need, simple ones first: a basis, none of which follows from the others, and
+    /// combinations of few terms.
+    pub fn generators(&self) -> Vec<Generator> {
+        let mut supports: Vec<Vec<usize>> = Vec::new();
+        for level in &self.levels {
+            for support in level.basis().chain(level.sparse()) {
                 let support = needed(&self.whole, support, self.independent);
-                fitted(&self.moments, self.features, &support, self.centred)
-            })
-            .collect();
+                // Where several vanish that have these terms alone, none of them is determined.
+                let next = self.whole.on(&support).solve().0.get(1).copied();
+                if next.is_none_or(|next| next > TAKEN) && !supports.contains(&support) {
+                    supports.push(support);
+                }
+            }
+        }
+        let fit = |support: &Vec<usize>| fitted(&self.moments, self.features, support, self.centred);
+        let mut found: Vec<Generator> = supports.iter().map(fit).collect();
         found.sort_by_key(|generator| (generator.degree(self.features), generator.terms().count()));
+        found
+    }
+}
+
+impl Level {
+    /// Each row of the basis, without the pivots of the others.
+    fn basis(&self) -> impl Iterator<Item = Vec<(usize, f64)>> + '_ {
+        self.rows.iter().zip(&self.pivots).map(|(row, own)| {
+            let free = (0..self.terms.len()).filter(|k| k == own || !self.pivots.contains(k));
+            free.map(|k| (self.terms[k], row[k])).collect()
+        })
+    }
+
+    /// For single terms at the factor 1 combinations of few terms, those with a small `sum log |c_k|`: by least squares whose weights
+    /// `1 / (c_k^2 + eps^2)` are of the factors before (Candès, Wakin and Boyd 2008), from random weights at first.
+    fn sparse(&self) -> Vec<Vec<(usize, f64)>> {
+        let (size, count) = (self.rows.len(), self.terms.len());
+        let once = REWEIGHTED * size * size * (count + size);
+        let (mut rng, mut workspace) = (ChaCha8Rng::seed_from_u64(0), Workspace::new());
+        let (mut found, mut known): (Vec<Vec<(usize, f64)>>, BTreeSet<Vec<usize>>) = (Vec::new(), BTreeSet::new());
+        for lead in (0..count).cycle().take((WORK / once.max(1)).min(FORMS * count)) {
+            let column: Vec<f64> = self.rows.iter().map(|row| row[lead]).collect();
+            let mut weights: Vec<f64> = (0..count).map(|_| rng.random_range(-6.0..0.0f64).exp()).collect();
+            let mut factors = vec![0.0; count];
+            for round in 1..=REWEIGHTED {
+                let weighted = |a: &[f64], b: &[f64]| -> f64 {
+                    a.iter().zip(b).zip(&weights).map(|((a, b), weight)| weight * a * b).sum()
+                };
+                let products: Vec<f64> =
+                    self.rows.iter().flat_map(|a| self.rows.iter().map(|b| weighted(a, b))).collect();
+                let mut mix = vec![0.0; size];
+                if solve(size, &products, &column, &mut mix, &mut workspace).is_err() {
+                    break;
+                }
+                let unit = dot(&mix, &column).recip();
+                factors.fill(0.0);
+                for (row, share) in self.rows.iter().zip(&mix) {
+                    factors.iter_mut().zip(row).for_each(|(c, x)| *c += unit * share * x);
+                }
+                let least = 0.25_f64.powi(round.min(5) as i32);
+                weights = factors.iter().map(|c| (c * c + least * least).recip()).collect();
+            }
+            let support: Vec<usize> = (0..count).filter(|&k| factors[k].abs() > 1e-3).collect();
+            if factors.iter().all(|c| c.is_finite()) && !support.is_empty() && known.insert(support) {
+                found.push(self.terms.iter().copied().zip(factors).collect());
+            }
+        }
         found
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Combinations `c` of monomials of the coordinates are judged by the pencil of what they are, `G = mean D D^T`, and what noise alone makes of
 //! them, `N = mean sum_i sigma_i^2 dD/dq_i dD/dq_i^T`: `c.G c / c.N c` is near 1 where a combination vanishes but for the noise. Its minima are
-//! the fit by errors in all variables (Taubin 1991). Of what vanishes as many combinations are taken as their gradients are independent, the
+//! the fit by errors in all variables (Taubin 1991). Degree by degree, terms are left out that have a leading term of what vanishes already
+//! as a factor: products of it are nothing new (Heldt et al. 2009). Of what vanishes as many combinations are taken as their gradients are independent, the
 //! simplest first, each reduced to the terms that it needs. The same with `monomials(q) v_i`, beside what follows from the former, gives the
 //! rows that are linear in the velocities; Frobenius' condition tells those that a function of the coordinates stands behind.
 
@@ -45,9 +46,6 @@ const PLACES: usize = 64;
 const MANY_PLACES: usize = 256;
 /// A row at unit length beside others whose part outside of them is below this at one of the places nearly follows from them there.
 const NEARLY: f64 = 0.1;
-/// Forms of the same functions, and how many of these at most, that are looked at for it.
-const FORMS: u64 = 4;
-const MOST_CANDIDATES: usize = 96;
 /// Below this share of its derivatives the curl of a row within its kernel is noise.
 const CURL: f64 = 0.03;
 
@@ -100,8 +98,8 @@ pub struct FoundConstraints {
     pub count: usize,
     /// All that was found.
     pub constraints: Vec<FoundConstraint>,
-    /// Smallest combination of the coordinates that does not count as vanishing over the largest that does, both relative to noise; over
-    /// noise itself if none does.
+    /// Smallest combination of the coordinates that does not count as vanishing over the largest that does, both relative to noise, the
+    /// smallest such step of the degrees of the constraints; over noise itself if none vanishes.
     pub gap: Option<f64>,
     /// Trajectories it was found on.
     pub trajectories: usize,
@@ -168,18 +166,19 @@ pub fn find_constraints(
         }
     }
     let mut held = RowsTaken::at(samples, PLACES);
-    let vanishing = Vanishing::of(samples, &of_positions, false, 1.0);
-    let functions = held.take(samples, &of_positions, vanishing.generators(0), false, IMPOSED);
-    let functions = exchanged(samples, &of_positions, functions, &vanishing);
+    let vanishing = Vanishing::of(samples, &of_positions, None, false, 1.0);
+    let candidates = vanishing.generators();
+    let functions = held.take(samples, &of_positions, candidates.clone(), false, IMPOSED);
+    let functions = exchanged(samples, &of_positions, functions, candidates);
     let conserved = if samples.trajectories() > 1 {
-        let constant = Vanishing::of(samples, &of_positions, true, 1.0);
-        held.take(samples, &of_positions, constant.generators(0), false, BESIDE)
+        let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, 1.0);
+        held.take(samples, &of_positions, constant.generators(), false, BESIDE)
     } else {
         Vec::new()
     };
     let by_functions = held.bases.clone();
-    let moving = Vanishing::of(samples, &of_velocities, false, samples.shared());
-    let moving = held.take(samples, &of_velocities, moving.generators(0), true, BESIDE);
+    let moving = Vanishing::of(samples, &of_velocities, Some(&vanishing), false, samples.shared());
+    let moving = held.take(samples, &of_velocities, moving.generators(), true, BESIDE);
     let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
     let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
     let mut constraints = Vec::new();
@@ -194,7 +193,7 @@ pub fn find_constraints(
     Ok(FoundConstraints {
         count,
         constraints,
-        gap: vanishing.gap,
+        gap: vanishing.gap(&functions),
         trajectories: samples.trajectories(),
         refuted: held.refuted,
         noise: samples.relative_noise(),
@@ -288,55 +287,62 @@ impl RowsTaken {
 /// Functions with the same zeros whose gradients are independent wherever the motion was: of a rotation matrix three products of its
 /// columns and three of its rows are, at most states, but not where it turns about an axis.
 ///
-/// Where one of those taken nearly follows from the others at some of the states, it is exchanged for a candidate with which the mean of
-/// `log det G` over the states, `G` the products of the gradients at unit length, is largest, and so on. Candidates are all functions with
-/// these zeros that some choice of leading terms makes simple.
+/// Where one of those taken nearly follows from the others or loses its gradient at some of the states, it is exchanged for a candidate with
+/// which the mean of `1 / det G` over the states, `G` the products of the gradients over their sizes, is smallest, and so on. Candidates are
+/// all simple functions with these zeros.
 fn exchanged(
     samples: &MotionSamples,
     features: &Features,
     taken: Vec<Generator>,
-    vanishing: &Vanishing<'_>,
+    candidates: Vec<Generator>,
 ) -> Vec<Generator> {
     let places = samples.places(MANY_PLACES);
-    let unit = |generator: &Generator| -> Vec<Vec<f64>> {
-        let rows = places.iter().map(|&at| features.gradient(samples, at, &generator.weights));
-        rows.map(|row| row.iter().map(|x| x / dot(&row, &row).sqrt().max(f64::MIN_POSITIVE)).collect()).collect()
+    // Over their size in the mean, so that a gradient that vanishes somewhere is seen.
+    let sized = |generator: &Generator| -> Vec<Vec<f64>> {
+        let mut rows: Vec<Vec<f64>> =
+            places.iter().map(|&at| features.gradient(samples, at, &generator.weights)).collect();
+        let square = rows.iter().map(|row| dot(row, row)).sum::<f64>() / rows.len().max(1) as f64;
+        rows.iter_mut().flatten().for_each(|x| *x /= square.sqrt().max(f64::MIN_POSITIVE));
+        rows
     };
     let (size, mut pool) = (taken.len(), taken);
-    let mut rows: Vec<Vec<Vec<f64>>> = pool.iter().map(unit).collect();
+    let mut rows: Vec<Vec<Vec<f64>>> = pool.iter().map(sized).collect();
     let mut chosen: Vec<usize> = (0..size).collect();
     let nearly = (0..places.len()).any(|place| least_part(chosen.iter().map(|&k| rows[k][place].as_slice())) < NEARLY);
     if !nearly {
         return pool;
     }
     let most = pool.iter().map(|generator| generator.degree(features)).max();
-    for other in (0..FORMS).flat_map(|form| vanishing.generators(form)) {
+    for other in candidates {
         let new = pool.iter().all(|known| !known.terms().eq(other.terms()));
-        if pool.len() < MOST_CANDIDATES && other.holds && new && Some(other.degree(features)) <= most {
-            rows.push(unit(&other));
+        if other.holds && new && Some(other.degree(features)) <= most {
+            rows.push(sized(&other));
             pool.push(other);
         }
     }
-    // What the logarithm of the volume gains by a row instead of another one, the mean over the places.
-    let gains = |chosen: &[usize], from: usize| -> Vec<f64> {
-        let mut gains = vec![0.0; rows.len()];
+    // Sums of `1 / det G` over the places with each row instead of one of those chosen.
+    let sums = |chosen: &[usize], from: usize| -> Vec<f64> {
+        let mut sums = vec![0.0; rows.len()];
         for place in 0..places.len() {
-            let mut basis = Vec::new();
-            chosen.iter().filter(|&&k| k != chosen[from]).for_each(|&k| extend(&mut basis, &rows[k][place]));
-            let part = |row: &Vec<Vec<f64>>| {
-                let rest = beside(&basis, &row[place]);
-                // A place at which they depend on each other counts, but not beyond all others.
-                dot(&rest, &rest).max(1e-12).ln()
+            let (mut basis, mut volume) = (Vec::new(), 1.0);
+            // A place at which they depend on each other counts, but not beyond all others.
+            let part = |basis: &[f64], row: &[f64]| {
+                let rest = beside(basis, row);
+                dot(&rest, &rest).max(1e-6)
             };
-            let own = part(&rows[chosen[from]]);
-            gains.iter_mut().zip(&rows).for_each(|(gain, row)| *gain += (part(row) - own) / places.len() as f64);
+            for &k in chosen.iter().filter(|&&k| k != chosen[from]) {
+                volume *= part(&basis, &rows[k][place]);
+                extend(&mut basis, &rows[k][place]);
+            }
+            sums.iter_mut().zip(&rows).for_each(|(sum, row)| *sum += (volume * part(&basis, &row[place])).recip());
         }
-        gains
+        sums
     };
+    let mut least = f64::INFINITY;
     loop {
-        let of = |from: usize| gains(&chosen, from).into_iter().enumerate().map(move |(to, gain)| (gain, from, to));
-        match (0..size).flat_map(of).max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((gain, from, to)) if gain > 1e-6 => chosen[from] = to,
+        let of = |from: usize| sums(&chosen, from).into_iter().enumerate().map(move |(to, sum)| (sum, from, to));
+        match (0..size).flat_map(of).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((sum, from, to)) if sum < 0.999 * least => (least, chosen[from]) = (sum, to),
             _ => break,
         }
     }

@@ -146,6 +146,9 @@ impl Pencil {
     /// Stationary values of the ratio, ascending, with their combinations, row by row; empty of numbers that are not finite.
     pub fn solve(&self) -> (Vec<f64>, Vec<f64>) {
         let p = self.terms;
+        if p == 0 {
+            return (Vec::new(), Vec::new());
+        }
         let both: Vec<f64> = self.gram.iter().zip(&self.noise).map(|(g, n)| g + n).collect();
         let (mut values, mut vectors, mut workspace) = (vec![0.0; p], vec![0.0; p * p], Workspace::new());
         if eigh(p, &both, &mut values, &mut vectors, &mut workspace).is_err() {

@@ -5,6 +5,7 @@ use crate::recording::smooth::SmoothOptions;
 use crate::recording::{RecordedTrajectory, Recording};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeSet;
 
 /// Coordinates and velocities at a time.
 type Path = Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)>;
@@ -65,6 +66,11 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
         let kinds: Vec<ConstraintKind> = found.constraints.iter().map(|c| c.kind).collect();
         assert_eq!((found.count, kinds), (2, vec![ConstraintKind::Holonomic; 2]), "{noise}: {found:?}");
         assert!(found.gap.unwrap() > 5.0 && found.trajectories == 24 && found.refuted == 0);
+        // Further degrees add products of these, and nothing else.
+        let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
+        let further =
+            find_constraints(&samples, ConstraintSearch { degree: 4, ..ConstraintSearch::default() }).unwrap();
+        assert_eq!(further.formulas(), found.formulas(), "{noise}");
         let first = &found.constraints[0];
         assert_eq!(first.coefficients.keys().collect::<Vec<_>>(), ["1", "x1^2", "y1^2"], "{noise}: {first:?}");
         for (term, exact) in [("x1^2", 1.0), ("y1^2", 1.0), ("1", -1.0)] {
@@ -96,10 +102,10 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     let recording = recorded(&names, &[false; 9], 0.001, false, &mut |rng| rotation(rng));
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
     let features = Features::of_positions(&samples, 2);
-    let vanishing = Vanishing::of(&samples, &features, false, 1.0);
+    let vanishing = Vanishing::of(&samples, &features, None, false, 1.0);
     let mut held = RowsTaken::at(&samples, PLACES);
-    let simplest = held.take(&samples, &features, vanishing.generators(0), false, IMPOSED);
-    let taken = exchanged(&samples, &features, simplest.clone(), &vanishing);
+    let simplest = held.take(&samples, &features, vanishing.generators(), false, IMPOSED);
+    let taken = exchanged(&samples, &features, simplest.clone(), vanishing.generators());
     assert_eq!((simplest.len(), taken.len()), (6, 6));
     // Orthonormal columns of unit gradients at a turn about the vertical.
     let least = |generators: &[Generator], angle: f64| {
@@ -129,6 +135,38 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     };
     let worst = |of: &[Generator]| (1..20).map(|k| least(of, 0.31 * f64::from(k))).fold(f64::INFINITY, f64::min);
     assert!(worst(&taken) > NEARLY && worst(&simplest) < NEARLY, "{} {}", worst(&simplest), worst(&taken));
+}
+
+/// A rotation about a fixed point: a point of its third axis, then the ends of all three, seen from there.
+fn top(rng: &mut ChaCha8Rng) -> Path {
+    let rotation = rotation(rng);
+    Box::new(move |t| {
+        let (r, _) = rotation(t);
+        let axis = |j: usize| [r[j], r[3 + j], r[6 + j]];
+        let point = axis(2).map(|x| 0.22 * x);
+        let end = |j: usize| -> [f64; 3] { [0, 1, 2].map(|i| point[i] + axis(j)[i]) };
+        ([point, end(0), end(1), end(2)].concat(), vec![0.0; 12])
+    })
+}
+
+/// Linear functions are found as such, and not as their products with coordinates, which hold nothing where these vanish.
+#[test]
+fn what_follows_from_linear_functions_is_not_found_again() {
+    let names: Vec<String> = (1..=12).map(|i| format!("q{i}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    for noise in [0.0, 0.001] {
+        let found = found(&recorded(&names, &[false; 12], noise, false, &mut |rng| top(rng)));
+        assert_eq!(found.count, 9, "{noise}: {found:?}");
+        for linear in &found.constraints[..3] {
+            let least = linear.coefficients.values().fold(f64::INFINITY, |least, c| c.abs().min(least));
+            assert!((least - 0.22 / 1.22).abs() < 1e-3, "{noise}: {linear:?}");
+        }
+        // The other six are of the nine coordinates that are left, and their terms are squares and products of two.
+        let others = found.constraints[3..].iter().flat_map(|found| found.coefficients.keys());
+        let used: BTreeSet<&str> =
+            others.flat_map(|term| term.split(['*', '^'])).filter(|x| x.starts_with('q')).collect();
+        assert_eq!(used.len(), 9, "{noise}: {found:?}");
+    }
 }
 
 /// A disk of radius 0.5 that turns and rolls at rates of its own.
