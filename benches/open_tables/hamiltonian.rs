@@ -6,9 +6,8 @@
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics};
 use lnn::network::Structure;
-use lnn::pipeline::{Fit, FitReport};
 use lnn::presets::Trainer;
-use lnn::recording::{RecordedTrajectory, Recording};
+use lnn::recording::RecordedTrajectory;
 use lnn::rollout::{Options, rollout_many};
 use lnn::scalar::Real;
 use rand::{Rng, SeedableRng};
@@ -174,6 +173,30 @@ fn motions(exact: Exact, starts: &[State], samples: usize, time: f64) -> Vec<Rec
         .collect()
 }
 
+/// Derivatives in time by parabolas through three samples.
+fn slopes(of: &[f64], times: &[f64]) -> Vec<f64> {
+    let slope = |k: usize| (of[k] - of[k - 1]) / (times[k] - times[k - 1]);
+    let last = of.len() - 1;
+    (0..=last)
+        .map(|k| match k {
+            0 => 1.5 * slope(1) - 0.5 * slope(2),
+            k if k == last => 1.5 * slope(k) - 0.5 * slope(k - 1),
+            k => 0.5 * (slope(k) + slope(k + 1)),
+        })
+        .collect()
+}
+
+/// Noisy samples moved onto the integral of their exact rates, by Hermite polynomials, whose constant is their mean.
+fn along(noisy: &[f64], rates: &[f64], slopes: &[f64], times: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0];
+    for k in 1..noisy.len() {
+        let h = times[k] - times[k - 1];
+        sum.push(sum[k - 1] + 0.5 * h * (rates[k] + rates[k - 1]) - h * h / 12.0 * (slopes[k] - slopes[k - 1]));
+    }
+    let offset = noisy.iter().zip(&sum).map(|(noisy, sum)| noisy - sum).sum::<f64>() / noisy.len() as f64;
+    sum.iter().map(|sum| sum + offset).collect()
+}
+
 /// Learns from the rows and returns the mean squared error of the energy.
 fn run(row: &Row, seed: u64, share: f64, steps: usize) -> (f64, f64) {
     let started = Instant::now();
@@ -185,61 +208,46 @@ fn run(row: &Row, seed: u64, share: f64, steps: usize) -> (f64, f64) {
     let n = exact.coordinates();
     // Half of the motions of spring and pendulum is for the test, a fifth of the bodies'.
     let noisy = !matches!(exact, Exact::Bodies(_));
+    let mut per_momentum = exact.per_momentum();
     tracks.truncate(if noisy { count / 2 } else { count * 4 / 5 });
-    let mut momenta: Vec<Vec<f64>> =
-        tracks.iter().map(|track| track.v.iter().map(|v| v / exact.per_momentum()).collect()).collect();
     if noisy {
-        for (track, momenta) in tracks.iter_mut().zip(&mut momenta) {
-            track.q.iter_mut().chain(momenta).for_each(|x| *x += NOISE * gauss(&mut rng));
+        // The order of the samples in time is used: rates are exact, and give a motion up to where it begins.
+        let mut pairs = (0.0, 0.0);
+        for track in &mut tracks {
+            let [p, rates] =
+                [&track.v, &track.a].map(|of| of.iter().map(|x| x / exact.per_momentum()).collect::<Vec<_>>());
+            let noisy: Vec<f64> = p.iter().map(|p| p + NOISE * gauss(&mut rng)).collect();
+            let p = along(&noisy, &rates, &slopes(&rates, &track.times), &track.times);
+            pairs.0 += track.v.iter().map(|v| v * v).sum::<f64>();
+            pairs.1 += track.v.iter().zip(p).map(|(v, p)| v * p).sum::<f64>();
+            track.a = rates;
+        }
+        // Momenta have noise, rates of positions have none: the regression is of momenta on them.
+        per_momentum = pairs.0 / pairs.1;
+        for track in &mut tracks {
+            track.a.iter_mut().for_each(|rate| *rate *= per_momentum);
+            track.q.iter_mut().for_each(|q| *q += NOISE * gauss(&mut rng));
+            track.q = along(&track.q, &track.v, &track.a, &track.times);
         }
     }
-    // Momenta have noise, rates have none: the regression is of momenta on rates.
-    let pairs = || tracks.iter().flat_map(|track| &track.v).zip(momenta.iter().flatten());
-    let per_momentum = pairs().map(|(v, _)| v * v).sum::<f64>() / pairs().map(|(v, p)| v * p).sum::<f64>();
     let threads = 2;
-    let model: Box<dyn EulerLagrange<f64>> = if noisy {
-        // The order of the samples in time is used: what is exact, the rates, smooths what is not.
-        for (k, track) in tracks.iter_mut().enumerate() {
-            (track.name, track.a) = (format!("motion {k}"), vec![]);
-        }
-        let recording = Recording { coordinates: vec!["q".into()], periodic: vec![false], tracks };
-        let fitted = |structure| {
-            let fit = Fit::recording(recording.clone()).structure(structure).seed(seed).threads(threads);
-            let fit = fit.configure(move |config| {
-                if share < 1.0 {
-                    config.training.phases[0].epochs = 2;
-                }
-            });
-            fit.run().expect("enough motion")
-        };
-        // Held-out motion decides whether the mass is a constant.
-        let both = [Structure::ConstantMass, Structure::Mechanical].map(fitted).into_iter();
-        let off = |fit: &FitReport| fit.hold_out.model.iter().map(|spread| spread.median).sum::<f64>();
-        Box::new(both.min_by(|a, b| off(a).total_cmp(&off(b))).expect("two").network)
-    } else {
-        let part = |of: fn(&RecordedTrajectory) -> &[f64]| tracks.iter().flat_map(|t| of(t).iter().copied()).collect();
-        let (q, v, a): (Vec<f64>, Vec<f64>, Vec<f64>) = (part(|t| &t.q), part(|t| &t.v), part(|t| &t.a));
-        let data = Dataset::new(n, q, v, a).expect("finite states");
-        let epochs = (steps * 128).div_ceil(data.len() * 8 / 10);
-        let trained = |structure| {
-            Trainer::new(&data)
-                .structure(structure)
-                .epochs(epochs)
-                .seed(seed)
-                .threads(threads)
-                .train()
-                .expect("a training")
-        };
-        let both = [Structure::ConstantMass, Structure::Mechanical].map(trained).into_iter();
-        Box::new(both.min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss)).expect("two").model)
+    let part = |of: fn(&RecordedTrajectory) -> &[f64]| tracks.iter().flat_map(|t| of(t).iter().copied()).collect();
+    let (q, v, a): (Vec<f64>, Vec<f64>, Vec<f64>) = (part(|t| &t.q), part(|t| &t.v), part(|t| &t.a));
+    let data = Dataset::new(n, q, v, a).expect("finite states");
+    let epochs = (steps * 128).div_ceil(data.len() * 8 / 10);
+    let trained = |structure| {
+        let trainer = Trainer::new(&data).structure(structure).epochs(epochs).seed(seed).threads(threads);
+        trainer.train().expect("a training")
     };
+    let both = [Structure::ConstantMass, Structure::Mechanical].map(trained).into_iter();
+    let model = both.min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss)).expect("two").model;
     let starts: Vec<State> = (0..MOTIONS).map(|_| exact.judged(&mut rng)).collect();
     let (samples, time) = row.judged;
     let true_motions = motions(exact, &starts, samples, time);
     let starts: Vec<State> =
         starts.into_iter().map(|(q, p)| (q, p.iter().map(|p| p * per_momentum).collect())).collect();
     let options = Options { energy: false, rtol: 1e-8, atol: 1e-8, ..Options::new(time, time / (samples - 1) as f64) };
-    let predicted = rollout_many(&*model, &starts, &options, threads);
+    let predicted = rollout_many(&model, &starts, &options, threads);
     let errors = true_motions.iter().zip(predicted).map(|(exact_motion, predicted)| {
         let predicted = predicted.trajectory;
         let energy = |q: &[f64], v: &[f64], per: f64| exact.energy(q, &v.iter().map(|v| v / per).collect::<Vec<_>>());
