@@ -43,6 +43,9 @@ pub struct Generator {
     pub holds: bool,
 }
 
+/// Terms with their factors.
+type Combination = Vec<(usize, f64)>;
+
 /// The combinations of terms that vanish, degree by degree. What vanishes already times further variables is none: terms in which its
 /// leading term divides are left out of higher degrees.
 pub struct Vanishing<'a> {
@@ -150,7 +153,7 @@ impl<'a> Vanishing<'a> {
 
 impl Level {
     /// Each row of the basis, without the pivots of the others.
-    fn basis(&self) -> impl Iterator<Item = Vec<(usize, f64)>> + '_ {
+    fn basis(&self) -> impl Iterator<Item = Combination> + '_ {
         self.rows.iter().zip(&self.pivots).map(|(row, own)| {
             let free = (0..self.terms.len()).filter(|k| k == own || !self.pivots.contains(k));
             free.map(|k| (self.terms[k], row[k])).collect()
@@ -159,11 +162,11 @@ impl Level {
 
     /// For single terms at the factor 1 combinations of few terms, those with a small `sum log |c_k|`: by least squares whose weights
     /// `1 / (c_k^2 + eps^2)` are of the factors before (Candès, Wakin and Boyd 2008), from random weights at first.
-    fn sparse(&self) -> Vec<Vec<(usize, f64)>> {
+    fn sparse(&self) -> Vec<Combination> {
         let (size, count) = (self.rows.len(), self.terms.len());
         let once = REWEIGHTED * size * size * (count + size);
         let (mut rng, mut workspace) = (ChaCha8Rng::seed_from_u64(0), Workspace::new());
-        let (mut found, mut known): (Vec<Vec<(usize, f64)>>, BTreeSet<Vec<usize>>) = (Vec::new(), BTreeSet::new());
+        let (mut found, mut known) = (Vec::new(), BTreeSet::new());
         for lead in (0..count).cycle().take((WORK / once.max(1)).min(FORMS * count)) {
             let column: Vec<f64> = self.rows.iter().map(|row| row[lead]).collect();
             let mut weights: Vec<f64> = (0..count).map(|_| rng.random_range(-6.0..0.0f64).exp()).collect();
@@ -230,20 +233,20 @@ fn smallest(pencil: &Pencil, support: &[usize]) -> Option<(f64, Vec<f64>)> {
 }
 
 /// The terms that a combination needs.
-fn needed(pencil: &Pencil, mut support: Vec<(usize, f64)>, independent: f64) -> Vec<usize> {
+fn needed(pencil: &Pencil, mut support: Combination, independent: f64) -> Vec<usize> {
     let terms = |support: &[(usize, f64)]| support.iter().map(|(term, _)| *term).collect::<Vec<_>>();
     let all: Vec<f64> = support.iter().map(|(_, weight)| *weight).collect();
     let start = pencil.on(&terms(&support)).ratio(&all);
     let allowed = (start + RISE / independent * start.max(1.0)).min(TAKEN);
     let most = |support: &[(usize, f64)]| support.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
-    let mut refit = |fewer: Vec<(usize, f64)>| -> Option<Vec<(usize, f64)>> {
+    let mut refit = |fewer: Combination| -> Option<Combination> {
         let (ratio, weights) = smallest(pencil, &terms(&fewer)).filter(|_| !fewer.is_empty())?;
         let kept = fewer.iter().zip(weights).map(|(&(term, _), weight)| (term, weight)).collect();
         (ratio <= allowed).then_some(kept)
     };
     for share in SHARES {
         let least = share * most(&support);
-        let fewer: Vec<(usize, f64)> = support.iter().copied().filter(|(_, weight)| weight.abs() >= least).collect();
+        let fewer: Combination = support.iter().copied().filter(|(_, weight)| weight.abs() >= least).collect();
         if let Some(fitted) = refit(fewer) {
             support = fitted;
             break;
