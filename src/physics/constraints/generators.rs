@@ -26,6 +26,8 @@ const LOWER: f64 = 1e-3;
 const REWEIGHTED: usize = 12;
 const FORMS: usize = 4;
 const WORK: usize = 4_000_000_000;
+/// Half width of the range of a factor over the largest factor from which on it says nothing.
+const UNDETERMINED: f64 = 0.3;
 /// Quantile of Student's distribution for 95 %, 7 degrees of freedom, as of eight parts.
 const STUDENT: f64 = 2.365;
 
@@ -137,15 +139,13 @@ impl<'a> Vanishing<'a> {
         for level in &self.levels {
             for support in level.basis().chain(level.sparse()) {
                 let support = needed(&self.whole, support, self.independent);
-                // Where several vanish that have these terms alone, none of them is determined.
-                let next = self.whole.on(&support).solve().0.get(1).copied();
-                if next.is_none_or(|next| next > TAKEN) && !supports.contains(&support) {
+                if !supports.contains(&support) {
                     supports.push(support);
                 }
             }
         }
         let fit = |support: &Vec<usize>| fitted(&self.moments, self.features, support, self.centred);
-        let mut found: Vec<Generator> = supports.iter().map(fit).collect();
+        let mut found: Vec<Generator> = supports.iter().map(fit).filter(Generator::is_determined).collect();
         found.sort_by_key(|generator| (generator.degree(self.features), generator.terms().count()));
         found
     }
@@ -314,6 +314,12 @@ impl Generator {
     /// The terms that it has.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.weights.len()).filter(|&term| self.weights[term] != 0.0)
+    }
+
+    /// `false` if several vanish that have these terms alone, so that parts of the data have others.
+    fn is_determined(&self) -> bool {
+        let most = self.weights.iter().fold(0.0, |most: f64, weight| most.max(weight.abs()));
+        self.spread.iter().all(|spread| *spread < UNDETERMINED * most)
     }
 
     /// The highest degree of its terms.

@@ -287,9 +287,9 @@ impl RowsTaken {
 /// Functions with the same zeros whose gradients are independent wherever the motion was: of a rotation matrix three products of its
 /// columns and three of its rows are, at most states, but not where it turns about an axis.
 ///
-/// Where one of those taken nearly follows from the others or loses its gradient at some of the states, it is exchanged for a candidate with
-/// which the mean of `1 / det G` over the states, `G` the products of the gradients over their sizes, is smallest, and so on. Candidates are
-/// all simple functions with these zeros.
+/// Where one of those taken nearly follows from the others or loses its gradient at some of the states, others are taken of all simple
+/// functions with these zeros: as many, one after the other, with which the mean of `1 / det G` over the states, `G` the products of the
+/// gradients over their sizes, is smallest.
 fn exchanged(
     samples: &MotionSamples,
     features: &Features,
@@ -307,8 +307,7 @@ fn exchanged(
     };
     let (size, mut pool) = (taken.len(), taken);
     let mut rows: Vec<Vec<Vec<f64>>> = pool.iter().map(sized).collect();
-    let mut chosen: Vec<usize> = (0..size).collect();
-    let nearly = (0..places.len()).any(|place| least_part(chosen.iter().map(|&k| rows[k][place].as_slice())) < NEARLY);
+    let nearly = (0..places.len()).any(|place| least_part(rows.iter().map(|row| row[place].as_slice())) < NEARLY);
     if !nearly {
         return pool;
     }
@@ -320,8 +319,8 @@ fn exchanged(
             pool.push(other);
         }
     }
-    // Sums of `1 / det G` over the places with each row instead of one of those chosen.
-    let sums = |chosen: &[usize], from: usize| -> Vec<f64> {
+    // Sums of `1 / det G` over the places of some rows with each row beside.
+    let sums = |others: &[usize]| -> Vec<f64> {
         let mut sums = vec![0.0; rows.len()];
         for place in 0..places.len() {
             let (mut basis, mut volume) = (Vec::new(), 1.0);
@@ -330,7 +329,7 @@ fn exchanged(
                 let rest = beside(basis, row);
                 dot(&rest, &rest).max(1e-6)
             };
-            for &k in chosen.iter().filter(|&&k| k != chosen[from]) {
+            for &k in others {
                 volume *= part(&basis, &rows[k][place]);
                 extend(&mut basis, &rows[k][place]);
             }
@@ -338,10 +337,19 @@ fn exchanged(
         }
         sums
     };
-    let mut least = f64::INFINITY;
+    let best = |others: &[usize]| {
+        sums(others).into_iter().enumerate().map(|(k, sum)| (sum, k)).min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    // One after the other, then one in the place of another.
+    let (mut chosen, mut least) = (Vec::new(), f64::INFINITY);
+    while let Some((sum, next)) = best(&chosen).filter(|_| chosen.len() < size) {
+        least = sum;
+        chosen.push(next);
+    }
     loop {
-        let of = |from: usize| sums(&chosen, from).into_iter().enumerate().map(move |(to, sum)| (sum, from, to));
-        match (0..size).flat_map(of).min_by(|a, b| a.0.total_cmp(&b.0)) {
+        let without = |from: usize| [&chosen[..from], &chosen[from + 1..]].concat();
+        let of = |from: usize| best(&without(from)).map(|(sum, to)| (sum, from, to));
+        match (0..size).filter_map(of).min_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((sum, from, to)) if sum < 0.999 * least => (least, chosen[from]) = (sum, to),
             _ => break,
         }
