@@ -1,7 +1,7 @@
 //! Training, roll-out and evaluation from outside, on networks too small to learn much.
 #![cfg(feature = "cli")]
 
-use crate::common::program::{joined, lead, said_by, wait_for};
+use crate::common::program::{joined, lead, said_by, wait_for, wait_until};
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::network::file::ModelFile;
@@ -334,6 +334,8 @@ fn ctrl_c_keeps_the_best_model() {
 /// A second run into a directory, once the first has taken it.
 #[cfg(unix)]
 fn lnn_when_locked(config: &str, out: &Path) -> Output {
-    wait_for(&out.join(".lnn.lock"));
+    // The file says who has locked it once it is locked.
+    let locked = || std::fs::metadata(out.join(".lnn.lock")).is_ok_and(|file| file.len() > 0);
+    wait_until("the lock", locked);
     lnn(&["train", "--config", config, "--out", &text(out)])
 }
