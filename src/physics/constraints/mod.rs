@@ -169,7 +169,7 @@ pub fn find_constraints(
     let vanishing = Vanishing::of(samples, &of_positions, None, false, 1.0);
     let candidates = vanishing.generators();
     let functions = held.take(samples, &of_positions, candidates.clone(), false, IMPOSED);
-    let functions = exchanged(samples, &of_positions, functions, candidates);
+    let functions = independent_everywhere(samples, &of_positions, functions, candidates);
     let conserved = if samples.trajectories() > 1 {
         let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, 1.0);
         held.take(samples, &of_positions, constant.generators(), false, BESIDE)
@@ -290,7 +290,7 @@ impl RowsTaken {
 /// Where one of those taken nearly follows from the others or loses its gradient at some of the states, others are taken of all simple
 /// functions with these zeros: as many, one after the other, with which the mean of `1 / det G` over the states, `G` the products of the
 /// gradients over their sizes, is smallest.
-fn exchanged(
+fn independent_everywhere(
     samples: &MotionSamples,
     features: &Features,
     taken: Vec<Generator>,
@@ -305,20 +305,16 @@ fn exchanged(
         rows.iter_mut().flatten().for_each(|x| *x /= square.sqrt().max(f64::MIN_POSITIVE));
         rows
     };
-    let (size, mut pool) = (taken.len(), taken);
-    let mut rows: Vec<Vec<Vec<f64>>> = pool.iter().map(sized).collect();
+    let rows: Vec<Vec<Vec<f64>>> = taken.iter().map(sized).collect();
     let nearly = (0..places.len()).any(|place| least_part(rows.iter().map(|row| row[place].as_slice())) < NEARLY);
     if !nearly {
-        return pool;
+        return taken;
     }
-    let most = pool.iter().map(|generator| generator.degree(features)).max();
-    for other in candidates {
-        let new = pool.iter().all(|known| !known.terms().eq(other.terms()));
-        if other.holds && new && Some(other.degree(features)) <= most {
-            rows.push(sized(&other));
-            pool.push(other);
-        }
-    }
+    let degree = |generator: &Generator| generator.degree(features);
+    let (size, most) = (taken.len(), taken.iter().map(degree).max());
+    let pool: Vec<Generator> =
+        candidates.into_iter().filter(|other| other.holds && Some(degree(other)) <= most).collect();
+    let rows: Vec<Vec<Vec<f64>>> = pool.iter().map(sized).collect();
     // Sums of `1 / det G` over the places of some rows with each row beside.
     let sums = |others: &[usize]| -> Vec<f64> {
         let mut sums = vec![0.0; rows.len()];
@@ -342,7 +338,9 @@ fn exchanged(
     };
     // One after the other, then one in the place of another.
     let (mut chosen, mut least) = (Vec::new(), f64::INFINITY);
-    while let Some((sum, next)) = best(&chosen).filter(|_| chosen.len() < size) {
+    while chosen.len() < size
+        && let Some((sum, next)) = best(&chosen)
+    {
         least = sum;
         chosen.push(next);
     }
@@ -354,7 +352,7 @@ fn exchanged(
             _ => break,
         }
     }
-    chosen.sort_by_key(|&k| (pool[k].degree(features), pool[k].terms().count()));
+    chosen.sort_unstable();
     chosen.into_iter().map(|k| pool[k].clone()).collect()
 }
 

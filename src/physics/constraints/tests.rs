@@ -105,7 +105,7 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     let vanishing = Vanishing::of(&samples, &features, None, false, 1.0);
     let mut held = RowsTaken::at(&samples, PLACES);
     let simplest = held.take(&samples, &features, vanishing.generators(), false, IMPOSED);
-    let taken = exchanged(&samples, &features, simplest.clone(), vanishing.generators());
+    let taken = independent_everywhere(&samples, &features, simplest.clone(), vanishing.generators());
     assert_eq!((simplest.len(), taken.len()), (6, 6));
     // Orthonormal columns of unit gradients at a turn about the vertical.
     let least = |generators: &[Generator], angle: f64| {
