@@ -4,12 +4,12 @@
 //! 0.001 and 0.01 of the size of each column, seed 0, and at 0.001 seeds 0 to 9, and looks for its constraints. `--part none` does the
 //! same with ten systems without. `--part drift` integrates 10,000 swings; `--part learned` learns Lagrangians in Cartesian coordinates
 //! under constraints that were found, not given; `--part cost` times evaluations, roll-outs and training steps beside those of free
-//! coordinates. Without `--part` all. `--seeds N` bounds the number of seeds, `--system NAME` chooses one system,
-//! `--epochs N` the epochs of a training, `--noise X` the noise of the motions in which it finds its constraints, 0 unless it is given.
+//! coordinates. Without `--part` all.
 
 #[path = "shared/networks.rs"]
 mod networks;
 
+use clap::Parser;
 use lnn::analysis::mass_matrix_error_within;
 use lnn::configuration::Penalty;
 use lnn::constraints::{ConstraintKind, ConstraintSearch, FoundConstraints, MotionSamples, find_constraints};
@@ -509,29 +509,53 @@ pub fn trial() {
     cost(1, 128);
 }
 
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Part {
+    Found,
+    None,
+    Drift,
+    Cost,
+    Learned,
+}
+
+#[derive(clap::Parser)]
+struct Arguments {
+    /// What is measured; all parts if not given
+    #[arg(long)]
+    part: Option<Part>,
+    /// Seeds from 0 on, of `learned` at most 5
+    #[arg(long, default_value_t = 10)]
+    seeds: u64,
+    /// One system of the catalogue
+    #[arg(long)]
+    system: Option<String>,
+    /// Epochs of a training of `learned`
+    #[arg(long, default_value_t = 40)]
+    epochs: usize,
+    /// Noise of the motions in which `learned` finds its constraints
+    #[arg(long, default_value_t = 0.0)]
+    noise: f64,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    let after = |name: &str| arguments.iter().position(|a| a == name).and_then(|at| arguments.get(at + 1));
-    let part = after("--part").map(String::as_str);
-    let seeds = after("--seeds").and_then(|text| text.parse().ok()).unwrap_or(10);
-    let system = after("--system").map(String::as_str);
-    let only = |name: &str| system.is_none_or(|system| system == name);
-    let epochs = after("--epochs").and_then(|text| text.parse().ok()).unwrap_or(40);
-    let asked = |name: &str| part.is_none_or(|part| part == name);
-    if asked("found") {
-        found(seeds, (100, 5.0), &only);
+    let arguments = Arguments::parse();
+    let only = |name: &str| arguments.system.as_deref().is_none_or(|system| system == name);
+    let asked = |part: Part| arguments.part.is_none_or(|asked| asked == part);
+    if asked(Part::Found) {
+        found(arguments.seeds, (100, 5.0), &only);
     }
-    if asked("none") {
+    if asked(Part::None) {
         none((100, 5.0), &only);
     }
-    if asked("drift") {
+    if asked(Part::Drift) {
         drift(10_000.0);
     }
-    if asked("cost") {
+    if asked(Part::Cost) {
         cost(20, 1024);
     }
-    if asked("learned") {
-        let noise = after("--noise").and_then(|text| text.parse().ok()).unwrap_or(0.0);
-        learned(seeds.min(5), (60_000, epochs, noise), &only);
+    if asked(Part::Learned) {
+        learned(arguments.seeds.min(5), (60_000, arguments.epochs, arguments.noise), &only);
     }
 }

@@ -6,14 +6,14 @@
 //! `--part forces` under known forces at 0.06, `--part clean` other systems without noise and with 1e-3, `--part cart-poles` a damped
 //! double cart-pole, `--part outside` systems that the library does not hold, `--part arms` recorded pendula of one, two and three arms (DynamicsLab, University
 //! of Washington), if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files, `--part metrics` metrics
-//! of networks that it trains by the preset `quick` as metrics, `L = v^T g(q) v/2`, or with `--black-box` as any function. `--seeds 3` takes fewer seeds, `--only NAME`
-//! one system, `--show` prints the formulas. Everything is written to `target/formula/PART.csv` as well. Times are
-//! processor times.
+//! of networks that it trains by the preset `quick` as metrics, `L = v^T g(q) v/2`, or with `--black-box` as any function. Formulas
+//! of made motion are written to `target/formula/PART.csv` as well. Times are processor times.
 
 #[path = "formula/cases.rs"]
 mod cases;
 
 use cases::{CART_POLES, CLEAN, Case, FRICTION, METRICS, Metric, OUTSIDE, POSITIONS, Recorded};
+use clap::{Parser, ValueEnum};
 use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion};
 use lnn::lagrangian::configure;
 use lnn::network::Structure;
@@ -120,39 +120,42 @@ fn line(case: &Case, how: Recorded, seeds: u64, show: bool, csv: &mut String) ->
 
 const USUAL: Recorded = Recorded { runs: 100, seconds: 5.0, rate: 100.0, sigma: 0.0, seed: 0, force: 0.0 };
 
-fn run(part: &str, seeds: u64, only: &str, show: bool) -> String {
-    let mut csv = "system,sigma,runs,force,seed,right,found,error,residual,seconds\n".to_string();
-    let mut one = |case: &Case, how: Recorded| {
-        if case.name.contains(only) {
-            line(case, how, seeds, show, &mut csv);
-        }
-    };
-    match part {
-        "positions" => POSITIONS.iter().for_each(|(case, sigma)| one(case, Recorded { sigma: *sigma, ..USUAL })),
-        "half" => POSITIONS.iter().for_each(|(case, sigma)| one(case, Recorded { sigma: sigma / 2.0, ..USUAL })),
-        "tenth" => {
-            POSITIONS.iter().for_each(|(case, sigma)| one(case, Recorded { sigma: sigma / 3.0, runs: 10, ..USUAL }));
-        }
-        "friction" => FRICTION.iter().for_each(|(case, sigma)| one(case, Recorded { sigma: *sigma, ..USUAL })),
-        "forces" => {
-            POSITIONS[..3].iter().for_each(|(case, _)| one(case, Recorded { sigma: 0.06, force: 5.0, ..USUAL }));
-        }
-        "clean" => {
-            for case in &CLEAN {
-                for sigma in [0.0, 1e-3] {
-                    one(case, Recorded { sigma, ..USUAL });
-                }
-            }
-        }
-        "cart-poles" => one(&CART_POLES, Recorded { sigma: 0.01, ..USUAL }),
-        "outside" => OUTSIDE.iter().for_each(|case| one(case, Recorded { sigma: 1e-3, ..USUAL })),
-        _ => unreachable!("parts are checked"),
-    }
-    csv
+/// What is measured.
+#[derive(Clone, Copy, ValueEnum)]
+enum Part {
+    Positions,
+    Half,
+    Tenth,
+    Friction,
+    Forces,
+    Clean,
+    CartPoles,
+    Outside,
+    Arms,
+    Metrics,
 }
 
-/// What can be measured on made motion.
-const PARTS: [&str; 8] = ["positions", "half", "tenth", "friction", "forces", "clean", "cart-poles", "outside"];
+/// The systems of a part and how each is recorded; none of the parts that are not about made motion.
+fn recorded(part: Part) -> Vec<(&'static Case, Recorded)> {
+    let noisy = |cases: &'static [(Case, f64)], share: f64| {
+        cases.iter().map(move |(case, sigma)| (case, Recorded { sigma: sigma * share, ..USUAL }))
+    };
+    match part {
+        Part::Positions => noisy(&POSITIONS, 1.0).collect(),
+        Part::Half => noisy(&POSITIONS, 0.5).collect(),
+        Part::Tenth => noisy(&POSITIONS, 1.0 / 3.0).map(|(case, how)| (case, Recorded { runs: 10, ..how })).collect(),
+        Part::Friction => noisy(&FRICTION, 1.0).collect(),
+        Part::Forces => {
+            POSITIONS[..3].iter().map(|(case, _)| (case, Recorded { sigma: 0.06, force: 5.0, ..USUAL })).collect()
+        }
+        Part::Clean => {
+            CLEAN.iter().flat_map(|case| [0.0, 1e-3].map(|sigma| (case, Recorded { sigma, ..USUAL }))).collect()
+        }
+        Part::CartPoles => vec![(&CART_POLES, Recorded { sigma: 0.01, ..USUAL })],
+        Part::Outside => OUTSIDE.iter().map(|case| (case, Recorded { sigma: 1e-3, ..USUAL })).collect(),
+        Part::Arms | Part::Metrics => vec![],
+    }
+}
 
 /// Accuracy that is asked for of the arms' angles, in rad: what the textbook's equations reach.
 const ARMS_NOISE: f64 = 5e-4;
@@ -286,42 +289,52 @@ pub fn trial() {
     assert_eq!(CLEAN.len() + FRICTION.len() + CART_POLES.coordinates.len(), 13);
 }
 
+#[derive(clap::Parser)]
+struct Arguments {
+    /// What is measured; all parts if not given
+    #[arg(long)]
+    part: Option<Part>,
+    /// Seeds from 0 on
+    #[arg(long, default_value_t = 10)]
+    seeds: u64,
+    /// Only systems of which the name contains this text
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Print the formulas
+    #[arg(long)]
+    show: bool,
+    /// Learn `metrics` as any function of positions and velocities
+    #[arg(long)]
+    black_box: bool,
+    /// Folder of the recorded pendula
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/multi-arm-pendulum"))]
+    arms: PathBuf,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let (mut parts, mut seeds, mut only, mut show) = (PARTS.map(String::from).to_vec(), 10, String::new(), false);
-    let mut structure = Structure::Metric;
-    let mut folder_of_arms = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/multi-arm-pendulum");
-    parts.extend(["arms", "metrics"].map(String::from));
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--bench" => {}
-            "--show" => show = true,
-            "--black-box" => structure = Structure::BlackBox,
-            "--part" => {
-                let known = arguments.next().filter(|part| parts.contains(part));
-                parts = vec![known.unwrap_or_else(|| panic!("--part: expected one of {}", parts.join(", ")))];
-            }
-            "--seeds" => seeds = arguments.next().and_then(|n| n.parse().ok()).expect("--seeds: expected a number"),
-            "--only" => only = arguments.next().expect("--only: expected a name"),
-            "--arms" => folder_of_arms = arguments.next().map(PathBuf::from).expect("--arms: expected a folder"),
-            other => panic!("{other}: unknown argument"),
-        }
-    }
+    let Arguments { part, seeds, only, show, black_box, arms: folder_of_arms, .. } = Arguments::parse();
+    let structure = if black_box { Structure::BlackBox } else { Structure::Metric };
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/formula");
     std::fs::create_dir_all(&folder).expect("a folder for the results");
-    for part in parts {
-        println!("{part}");
-        if part == "arms" {
-            arms(&folder_of_arms, &only);
-            continue;
-        }
-        if part == "metrics" {
-            for case in METRICS.iter().filter(|case| case.name.contains(&only)) {
-                (0..seeds).for_each(|seed| metric(case, structure, seed, show));
+    for part in part.map_or(Part::value_variants().to_vec(), |part| vec![part]) {
+        let name = part.to_possible_value().expect("no part is hidden").get_name().to_string();
+        println!("{name}");
+        match part {
+            Part::Arms => arms(&folder_of_arms, &only),
+            Part::Metrics => {
+                for case in METRICS.iter().filter(|case| case.name.contains(&only)) {
+                    (0..seeds).for_each(|seed| metric(case, structure, seed, show));
+                }
             }
-            continue;
+            _ => {
+                let mut csv = "system,sigma,runs,force,seed,right,found,error,residual,seconds\n".to_string();
+                for (case, how) in recorded(part).into_iter().filter(|(case, _)| case.name.contains(&only)) {
+                    line(case, how, seeds, show, &mut csv);
+                }
+                std::fs::write(folder.join(format!("{name}.csv")), csv).expect("room for the results");
+            }
         }
-        let csv = run(&part, seeds, &only, show);
-        std::fs::write(folder.join(format!("{part}.csv")), csv).expect("room for the results");
     }
 }

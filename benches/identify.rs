@@ -3,12 +3,13 @@
 //! `cargo bench --bench identify -- --part coverage` records double pendula with noise and counts how often the stated 90 % ranges hold the
 //! truth, seeds 0 to 99; `--part duffing` identifies an oscillator from eight samples a period under a force that is held between the samples;
 //! `--part arms` identifies recorded pendula of two and three arms (DynamicsLab, University of Washington) and predicts runs that were not
-//! identified from, if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files. `--seeds 10` takes fewer seeds.
+//! identified from, if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files.
 
 #[allow(dead_code)]
 #[path = "../examples/arms.rs"]
 mod arms;
 
+use clap::Parser;
 use lnn::cli::parse_system;
 use lnn::identification::{Between, Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure};
@@ -197,15 +198,32 @@ pub fn trial() {
     duffing(400).expect("an oscillator is identified");
 }
 
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Part {
+    Coverage,
+    Duffing,
+    Arms,
+}
+
+#[derive(clap::Parser)]
+struct Arguments {
+    #[arg(long, default_value = "coverage")]
+    part: Part,
+    /// Recordings of `coverage`, of seeds from 0 on
+    #[arg(long, default_value_t = 100)]
+    seeds: u64,
+    /// Folder of the recorded pendula
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/multi-arm-pendulum"))]
+    arms: PathBuf,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() -> Outcome<()> {
-    let words: Vec<String> = std::env::args().collect();
-    let after = |name: &str| words.iter().position(|word| word == name).and_then(|at| words.get(at + 1));
-    let seeds = after("--seeds").map_or(Ok(100), |text| text.parse())?;
-    let usual = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/multi-arm-pendulum");
-    match after("--part").map_or("coverage", String::as_str) {
-        "coverage" => coverage(seeds),
-        "duffing" => duffing(40_000),
-        "arms" => recorded_arms(&after("--arms").map_or_else(usual, PathBuf::from)),
-        other => Err(format!("--part {other}: expected coverage, duffing or arms").into()),
+    let arguments = Arguments::parse();
+    match arguments.part {
+        Part::Coverage => coverage(arguments.seeds),
+        Part::Duffing => duffing(40_000),
+        Part::Arms => recorded_arms(&arguments.arms),
     }
 }

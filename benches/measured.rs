@@ -52,6 +52,7 @@ mod tubes;
 #[path = "../examples/pendulum_video.rs"]
 mod video;
 
+use clap::Parser;
 use lnn::analysis::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
@@ -78,8 +79,30 @@ const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: &[&str] =
-    &["rows", "noise", "films", "textbook", "determination", "orbits", "arm7", "links", "tubes", "lost"];
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Part {
+    Rows,
+    Noise,
+    Films,
+    Textbook,
+    Determination,
+    Orbits,
+    Arm7,
+    Links,
+    Tubes,
+    Lost,
+}
+
+#[derive(clap::Parser)]
+struct Arguments {
+    /// What is measured; all parts if not given
+    #[arg(long)]
+    part: Option<Part>,
+    /// Films of `films` and `textbook`: `x_red,y_red,x_green,y_green,x_blue,y_blue`
+    films: Vec<PathBuf>,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
 
 /// Seeds of the small systems: those before them served to choose.
 const SEEDS: std::ops::Range<u64> = 20..40;
@@ -244,37 +267,27 @@ pub fn trial() {
 }
 
 fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let (mut parts, mut films) = (PARTS.iter().map(ToString::to_string).collect::<Vec<_>>(), Vec::new());
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--bench" => {}
-            "--part" => {
-                let part = arguments.next().filter(|part| PARTS.contains(&part.as_str()));
-                parts = vec![part.unwrap_or_else(|| panic!("--part: expected one of {}", PARTS.join(", ")))];
-            }
-            other => films.push(PathBuf::from(other)),
-        }
-    }
+    let Arguments { part, films, .. } = Arguments::parse();
+    let asked = |name: Part| part.is_none_or(|part| part == name);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/measured");
     std::fs::create_dir_all(&folder).expect("a folder for the results");
     let scale = Scale { epochs: None, hidden: [128; 3], shooting_epochs: Shooting::default().epochs };
     // First, while the process is small.
-    if parts.iter().any(|part| part == "rows") {
+    if asked(Part::Rows) {
         rows::time(&folder.join("rows.csv"), 10_000_000);
     }
-    if parts.iter().any(|part| part == "noise") {
+    if asked(Part::Noise) {
         let rows = noise::compare(50, 0..3, scale);
         let csv = format!("seed,learned_from,error,seconds\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("noise.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "determination") {
+    if asked(Part::Determination) {
         let small = Scale { epochs: Some(60), hidden: [48; 3], shooting_epochs: 0 };
         let rows = determination::compare(SEEDS, (12, 8.0), small);
         let csv = format!("case,seed,quantity,learned,low,high,truth\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("determination.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "orbits") {
+    if asked(Part::Orbits) {
         println!("errors: {}", orbits::TOLD.join("; "));
         let counts = [10, 30, 100, 300];
         let cases: Vec<(usize, f64)> = [0.01, 0.001].iter().flat_map(|&noise| counts.map(|n| (n, noise))).collect();
@@ -282,30 +295,30 @@ fn main() {
         let csv = format!("learned_by,orbits,noise,quantity,error,seconds\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("orbits.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "arm7") {
+    if asked(Part::Arm7) {
         let rows = arm7::compare(0..3, 20.0, &folder, (None, THREADS));
         let csv = format!("seed,learned_from,joint,nmse,inertia\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("arm7.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "links") {
+    if asked(Part::Links) {
         let rows = arm7::links(0..3, 20.0, &folder, 20_000);
         let csv = format!("seed,joint,nmse,inertia\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("links.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "tubes") {
+    if asked(Part::Tubes) {
         let small = Scale { epochs: Some(60), hidden: [48; 3], shooting_epochs: 0 };
         let rows = tubes::compare(tubes::Motions { counts: [24, 1000, 1000], seconds: 3.0, ahead: 2.0 }, small);
         let csv = format!("system,share,calibrated,fresh,inside,half_width\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("tubes.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "lost") {
+    if asked(Part::Lost) {
         let rows = lost::compare(0..3, (12, 8.0), None);
         let csv = format!("seed,entry,error,seconds\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("lost.csv"), csv).expect("room for the results");
     }
-    if parts.iter().any(|part| part == "films") {
+    if asked(Part::Films) {
         std::fs::write(folder.join("films.csv"), filmed(films, Some(scale))).expect("room for the results");
-    } else if parts.iter().any(|part| part == "textbook") {
+    } else if asked(Part::Textbook) {
         std::fs::write(folder.join("textbook.csv"), filmed(films, None)).expect("room for the results");
     }
 }

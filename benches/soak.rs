@@ -3,6 +3,7 @@
 //! `cargo bench --bench soak -- --minutes 30` prints a line per minute and at the end the slope of a straight line through
 //! all rounds after the first tenth, in kB per hour and per round. Linux only (`/proc/self/status`).
 
+use clap::Parser;
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
@@ -50,10 +51,17 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     above / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
+#[derive(clap::Parser)]
+struct Arguments {
+    /// How long
+    #[arg(long, default_value_t = 30.0)]
+    minutes: f64,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    let minutes = arguments.iter().position(|a| a == "--minutes").and_then(|k| arguments.get(k + 1)?.parse().ok());
-    soak(minutes.unwrap_or(30.0));
+    soak(Arguments::parse().minutes);
 }
 
 /// Rounds for so many minutes, and what became of the memory.

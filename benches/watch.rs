@@ -1,13 +1,13 @@
 //! A watch over the figures that README and the pages state: which of them no longer hold, and how old the tables are.
 //!
 //! `cargo bench --bench watch` runs the command of every headline, reads its figure from what the command prints or writes, and prints
-//! `holds` or `NO LONGER` beside the bound that the page's figure implies. It ends with an error if one does not hold. `--minutes N` leaves
-//! out those that take longer (10), `--only TEXT` takes those of which page or words contain the text, `--list` runs none. A headline whose
+//! `holds` or `NO LONGER` beside the bound that the page's figure implies. It ends with an error if one does not hold. A headline whose
 //! recordings are missing has no figure, which is said and is no error. Times are those of two idle cores.
 //!
 //! Then, for README and every page, how many rows of tables state figures, the commit that the oldest row comes from, and how many commits
 //! have changed the numerics since. A row that was reworded without a measurement looks newer than it is.
 
+use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::Instant;
@@ -187,17 +187,29 @@ pub fn trial() {
     assert!(HEADLINES.iter().all(|headline| root().join(headline.page).exists()));
 }
 
+#[derive(clap::Parser)]
+struct Arguments {
+    /// Leave out headlines that take longer, in minutes
+    #[arg(long, default_value_t = 10)]
+    minutes: u32,
+    /// Only headlines of which page or words contain this text
+    #[arg(long, default_value = "")]
+    only: String,
+    /// List the headlines without running them
+    #[arg(long)]
+    list: bool,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().collect();
-    let after = |name: &str| arguments.iter().position(|a| a == name).and_then(|at| arguments.get(at + 1));
-    let minutes = after("--minutes").map_or(10, |text| text.parse().expect("--minutes: expected a number"));
-    let only = after("--only").map_or("", String::as_str);
+    let Arguments { minutes, only, list, .. } = Arguments::parse();
     let asked = |headline: &&Headline| {
-        headline.minutes <= minutes && (headline.page.contains(only) || headline.says.contains(only))
+        headline.minutes <= minutes && (headline.page.contains(&only) || headline.says.contains(&only))
     };
     let headlines: Vec<&Headline> = HEADLINES.iter().filter(asked).collect();
     let mut all = true;
-    if arguments.iter().any(|a| a == "--list") {
+    if list {
         headlines.iter().for_each(|h| println!("{:>3} min  {}: {}\n         {}", h.minutes, h.page, h.says, h.command));
     } else {
         println!("{}", git(&["describe", "--always", "--dirty"]).unwrap_or_else(|| "no history".to_string()));

@@ -1,7 +1,5 @@
 //! Run time against error: roll-outs, derivative engines, activation kernels, small symmetric matrices.
 //!
-//! `cargo bench --bench work_precision -- [--quick | --smoke] [--part NAME].. [--model FILE] [--out DIR]`
-//!
 //! Every part writes its raw numbers as CSV, log-log diagrams and what failed or was left out, with the reason;
 //! `report.html` gathers everything. Errors are judged in double-double.
 
@@ -10,6 +8,7 @@ mod common;
 #[path = "work_precision/mod.rs"]
 mod work_precision;
 
+use clap::Parser;
 use std::process::ExitCode;
 
 /// Every part at its smallest.
@@ -18,15 +17,7 @@ pub fn trial() {
 }
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let options = match work_precision::Options::parse(&arguments) {
-        Ok(options) => options,
-        Err(message) => {
-            eprintln!("error: {message}\n{}", work_precision::USAGE);
-            return ExitCode::from(2);
-        }
-    };
-    match work_precision::run(&options) {
+    match work_precision::run(&work_precision::Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("error: {message}");

@@ -12,6 +12,7 @@ mod products;
 #[path = "../shared/turns.rs"]
 mod turns;
 
+use clap::Parser;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Request, Terms, configure};
@@ -254,11 +255,23 @@ fn ensembles(options: &Options) {
     }
 }
 
+#[derive(clap::Parser)]
+struct Arguments {
+    /// Seconds; shows that everything runs, its numbers mean nothing
+    #[arg(long)]
+    smoke: bool,
+    /// Only evaluate a state of this system of the catalogue, so many times
+    #[arg(long, num_args = 2, value_names = ["SYSTEM", "N"])]
+    count: Option<Vec<String>>,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    match arguments.iter().position(|argument| argument == "--count").map(|at| &arguments[at + 1..]) {
-        Some([name, count, ..]) => repeat(name, count.parse().expect("a number of evaluations")),
-        _ => run(arguments.iter().any(|argument| argument == "--smoke")),
+    let arguments = Arguments::parse();
+    match arguments.count.as_deref() {
+        Some([name, count]) => repeat(name, count.parse().expect("--count: expected a number after the system")),
+        _ => run(arguments.smoke),
     }
 }
 

@@ -8,6 +8,7 @@
 //! The error of a motion is the geometric mean over its samples of `|z' - z| / (|z'| + |z|)`, `z` the Cartesian positions and velocities.
 //! Means over the motions are printed, arithmetic and geometric.
 
+use super::Coordinates;
 use lnn::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
 use lnn::data::Dataset;
 use lnn::forward::Dual;
@@ -569,13 +570,13 @@ pub fn trial() {
     table(&[&ROWS[0]], 1, &[false, true], &Budget { chunks: 10, steps: 4, hidden: vec![4] });
 }
 
-/// Rows by name, all without one, in the coordinates of a name, in both without one.
-pub fn all(name: Option<&str>, seeds: u64, coordinates: Option<&str>, chunks: usize, steps: usize) {
+/// Rows by name, all without one, in one kind of coordinates, in both without one.
+pub fn all(name: Option<&str>, seeds: u64, coordinates: Option<Coordinates>, chunks: usize, steps: usize) {
     let rows: Vec<&Row> = ROWS.iter().filter(|row| name.is_none_or(|name| name == row.name)).collect();
     let coordinates: &[bool] = match coordinates {
-        Some("generalized") => &[false],
-        Some("cartesian") => &[true],
-        _ => &[false, true],
+        Some(Coordinates::Generalized) => &[false],
+        Some(Coordinates::Cartesian) => &[true],
+        None => &[false, true],
     };
     table(&rows, seeds, coordinates, &Budget { chunks, steps, hidden: vec![128; 3] });
 }

@@ -331,12 +331,12 @@ fn print(name: &str, numbers: &[f64; 6], rest: &str) {
 }
 
 /// All seeds, beside their numbers and the exact arm's valid times.
-pub fn all(file: Option<&str>, seeds: u64) {
+pub fn all(file: Option<&Path>, seeds: u64) {
     let Some(file) = file else {
         println!("letters: left out, --letters FILE.csv names the file that benches/peers/letters.py makes");
         return;
     };
-    let letters = read(Path::new(file));
+    let letters = read(file);
     println!("               torque   inertial coriolis gravity  valid, letters and without torques, s");
     for seed in 0..seeds {
         let (numbers, [tracked, pulled], seconds) = row(&letters, seed, (500, 300));

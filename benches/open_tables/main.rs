@@ -1,16 +1,54 @@
 //! Tables that others published, by their protocols, learned here.
 //!
 //! `cargo bench --bench open_tables` runs all of them; `--table chunks` is of Finzi, Wang and Wilson, `--table hamiltonian` of Greydanus,
-//! Dzamba and Yosinski, `--table letters --letters FILE.csv` of Lutter, Ritter and Peters. `--row NAME` takes one system, `--seeds N` so
-//! many seeds from 0 (3 if not given), `--steps N` so many steps of the optimiser. Of the first table `--chunks N` takes so many chunks to
-//! learn from (800), `--in generalized` or `--in cartesian` one kind of coordinates.
+//! Dzamba and Yosinski, `--table letters --letters FILE.csv` of Lutter, Ritter and Peters.
 
 mod chunks;
 mod hamiltonian;
 mod letters;
 
-/// Steps of the optimiser.
-const STEPS: usize = 6000;
+use clap::Parser;
+use std::path::PathBuf;
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Table {
+    Chunks,
+    Hamiltonian,
+    Letters,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Coordinates {
+    Generalized,
+    Cartesian,
+}
+
+#[derive(clap::Parser)]
+struct Arguments {
+    /// One table; all if not given
+    #[arg(long)]
+    table: Option<Table>,
+    /// One system
+    #[arg(long)]
+    row: Option<String>,
+    /// Seeds from 0 on
+    #[arg(long, default_value_t = 3)]
+    seeds: u64,
+    /// Steps of the optimiser
+    #[arg(long, default_value_t = 6000)]
+    steps: usize,
+    /// Chunks to learn from
+    #[arg(long, default_value_t = 800)]
+    chunks: usize,
+    /// One kind of coordinates of the chunks; both if not given
+    #[arg(long)]
+    r#in: Option<Coordinates>,
+    /// Recorded letters, a file that `benches/peers/letters.py` makes
+    #[arg(long)]
+    letters: Option<PathBuf>,
+    #[arg(long, hide = true)]
+    bench: bool,
+}
 
 /// Rows of every table at their smallest.
 pub fn trial() {
@@ -20,19 +58,16 @@ pub fn trial() {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    let after = |name: &str| arguments.iter().position(|a| a == name).and_then(|at| arguments.get(at + 1));
-    let number = |name: &str, usual: usize| after(name).and_then(|text| text.parse().ok()).unwrap_or(usual);
-    let (row, seeds, steps) =
-        (after("--row").map(String::as_str), number("--seeds", 3) as u64, number("--steps", STEPS));
-    let asked = |name: &str| after("--table").is_none_or(|table| table == name);
-    if asked("chunks") {
-        chunks::all(row, seeds, after("--in").map(String::as_str), number("--chunks", 800), steps);
+    let arguments = Arguments::parse();
+    let (row, seeds, steps) = (arguments.row.as_deref(), arguments.seeds, arguments.steps);
+    let asked = |table: Table| arguments.table.is_none_or(|asked| asked == table);
+    if asked(Table::Chunks) {
+        chunks::all(row, seeds, arguments.r#in, arguments.chunks, steps);
     }
-    if asked("hamiltonian") {
+    if asked(Table::Hamiltonian) {
         hamiltonian::all(row, seeds, steps);
     }
-    if asked("letters") {
-        letters::all(after("--letters").map(String::as_str), seeds);
+    if asked(Table::Letters) {
+        letters::all(arguments.letters.as_deref(), seeds);
     }
 }

@@ -17,7 +17,7 @@ pub fn description(options: &Options) -> String {
         format!("load averages at the start: {}", if load.is_empty() { "unknown" } else { &load }),
         format!(
             "scale: {:?}; at least {} repeats unless a column says fewer",
-            options.scale,
+            options.scale(),
             options.stopwatch().repeats
         ),
     ];

@@ -18,7 +18,7 @@ mod rollouts;
 mod summary;
 mod timing;
 
-pub use options::{Options, USAGE};
+pub use options::Options;
 
 use lnn::report::Report;
 use options::Part;
@@ -34,7 +34,7 @@ pub fn run(options: &Options) -> Result<(), String> {
     let machine = machine::description(options);
     let mut report = Report::new("Run time against error").preformatted(&machine);
     println!("{machine}");
-    for part in Part::ALL.into_iter().filter(|part| options.parts.contains(part)) {
+    for part in options.parts() {
         let begun = Instant::now();
         let section: Section = match part {
             Part::Rollouts => rollouts::section(options)?,
@@ -43,7 +43,7 @@ pub fn run(options: &Options) -> Result<(), String> {
             Part::Matrices => matrices::section(options),
         };
         report = write(&section, &options.out, &machine, report)?;
-        eprintln!("{}: {:.1} s", part.name(), begun.elapsed().as_secs_f64());
+        eprintln!("{part:?}: {:.1} s", begun.elapsed().as_secs_f64());
     }
     output::save(&options.out.join("report.html"), report.to_html().as_bytes())?;
     println!("written to {}", options.out.display());

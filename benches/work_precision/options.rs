@@ -1,11 +1,8 @@
 //! Arguments of the program.
 
 use super::timing::Stopwatch;
+use clap::ValueEnum;
 use std::path::PathBuf;
-
-/// How to call it.
-pub const USAGE: &str = "usage: cargo bench --bench work_precision -- [--quick | --smoke] \
-[--part rollouts|derivatives|activations|matrices].. [--model FILE] [--out DIR]";
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +16,7 @@ pub enum Scale {
 }
 
 /// A part of the program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Part {
     Rollouts,
     Derivatives,
@@ -27,71 +24,51 @@ pub enum Part {
     Matrices,
 }
 
-impl Part {
-    pub const ALL: [Self; 4] = [Self::Rollouts, Self::Derivatives, Self::Activations, Self::Matrices];
-
-    /// Name on the command line and of the part's files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rollouts => "rollouts",
-            Self::Derivatives => "derivatives",
-            Self::Activations => "activations",
-            Self::Matrices => "matrices",
-        }
-    }
-}
-
 /// What to measure and where to write it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, clap::Parser)]
 pub struct Options {
-    pub scale: Scale,
-    pub parts: Vec<Part>,
-    /// Learned double pendulum; trained if not given.
+    /// Below two minutes in the place of ten
+    #[arg(long)]
+    quick: bool,
+    /// Seconds; shows that every part writes what it should, its numbers mean nothing
+    #[arg(long)]
+    smoke: bool,
+    /// A part, several times for several; all if not given
+    #[arg(long = "part")]
+    parts: Vec<Part>,
+    /// Learned double pendulum; trained if not given
+    #[arg(long)]
     pub model: Option<PathBuf>,
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/target/work-precision"))]
     pub out: PathBuf,
+    #[arg(long, hide = true)]
+    bench: bool,
 }
 
 impl Options {
     /// Everything at the smallest scale.
     pub fn smoke() -> Self {
         let out = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/work-precision-smoke");
-        Self { scale: Scale::Smoke, parts: Part::ALL.to_vec(), model: None, out }
+        Self { quick: false, smoke: true, parts: Vec::new(), model: None, out, bench: false }
     }
 
-    /// Reads the arguments after the program's name.
-    ///
-    /// # Errors
-    /// What is wrong with them, in words.
-    pub fn parse(arguments: &[String]) -> Result<Self, String> {
-        let out = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/work-precision");
-        let mut options = Self { scale: Scale::Full, parts: Vec::new(), model: None, out };
-        let mut arguments = arguments.iter().cloned();
-        while let Some(argument) = arguments.next() {
-            let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
-            match argument.as_str() {
-                "--bench" => {}
-                "--quick" if options.scale == Scale::Full => options.scale = Scale::Quick,
-                "--quick" => {}
-                "--smoke" => options.scale = Scale::Smoke,
-                "--model" => options.model = Some(value()?.into()),
-                "--out" => options.out = value()?.into(),
-                "--part" => {
-                    let name = value()?;
-                    let part = Part::ALL.into_iter().find(|part| part.name() == name);
-                    options.parts.push(part.ok_or_else(|| format!("unknown part {name:?}"))?);
-                }
-                _ => return Err(format!("unknown argument {argument:?}")),
-            }
+    pub fn scale(&self) -> Scale {
+        match (self.smoke, self.quick) {
+            (true, _) => Scale::Smoke,
+            (false, true) => Scale::Quick,
+            (false, false) => Scale::Full,
         }
-        if options.parts.is_empty() {
-            options.parts = Part::ALL.to_vec();
-        }
-        Ok(options)
+    }
+
+    /// In their order.
+    pub fn parts(&self) -> impl Iterator<Item = Part> {
+        let all = Part::value_variants().iter().copied();
+        all.filter(|part| self.parts.is_empty() || self.parts.contains(part))
     }
 
     /// One of three by scale.
     pub fn choose<T>(&self, smoke: T, quick: T, full: T) -> T {
-        match self.scale {
+        match self.scale() {
             Scale::Smoke => smoke,
             Scale::Quick => quick,
             Scale::Full => full,
