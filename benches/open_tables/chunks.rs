@@ -570,6 +570,11 @@ pub fn trial() {
     table(&[&ROWS[0]], 1, &[false, true], &Budget { chunks: 10, steps: 4, hidden: vec![4] });
 }
 
+/// Names of the rows.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ROWS.iter().map(|row| row.name)
+}
+
 /// Rows by name, all without one, in one kind of coordinates, in both without one.
 pub fn all(name: Option<&str>, seeds: u64, coordinates: Option<Coordinates>, chunks: usize, steps: usize) {
     let rows: Vec<&Row> = ROWS.iter().filter(|row| name.is_none_or(|name| name == row.name)).collect();

@@ -277,6 +277,11 @@ fn table(rows: &[&Row], seeds: u64, share: f64, steps: usize) {
     }
 }
 
+/// Names of the rows.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ROWS.iter().map(|row| row.name)
+}
+
 /// Rows by name, all without one.
 pub fn all(name: Option<&str>, seeds: u64, steps: usize) {
     let rows: Vec<&Row> = ROWS.iter().filter(|row| name.is_none_or(|name| name == row.name)).collect();

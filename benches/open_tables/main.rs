@@ -8,6 +8,7 @@ mod hamiltonian;
 mod letters;
 
 use clap::Parser;
+use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -29,7 +30,7 @@ struct Arguments {
     #[arg(long)]
     table: Option<Table>,
     /// One system
-    #[arg(long)]
+    #[arg(long, value_parser = PossibleValuesParser::new(chunks::names().chain(hamiltonian::names())))]
     row: Option<String>,
     /// Seeds from 0 on
     #[arg(long, default_value_t = 3)]
