@@ -19,6 +19,8 @@ mod cost;
 mod open_tables;
 #[path = "peers/main.rs"]
 mod peers;
+#[path = "rates/main.rs"]
+mod rates;
 #[path = "work_precision.rs"]
 mod work_precision;
 
@@ -37,5 +39,6 @@ fn main() {
     work_precision::trial();
     constraints::trial();
     open_tables::trial();
+    rates::trial();
     watch::trial();
 }

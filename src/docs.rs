@@ -57,6 +57,7 @@ macro_rules! page {
             "[formula]: crate::docs::formula\n",
             "[identify]: crate::docs::identify\n",
             "[certificates]: crate::docs::certificates\n",
+            "[verdicts]: crate::docs::verdicts\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
             "[friction]: crate::docs::method#friction\n",
@@ -104,6 +105,7 @@ pages! {
     formula "formula.md";
     identify "identify.md";
     certificates "certificates.md";
+    verdicts "verdicts.md";
     summary "summary.md";
     method "method.md";
     library "library.md";
