@@ -145,7 +145,7 @@ class Symmetries:
         Every vector field as a formula, and the function by whose rate it changes L.
     structure_constants : (k, k, k)
     time_translation : bool
-        Whether the energy is conserved.
+        Whether ``p.v - L`` is conserved: the energy, or ``g(v, v)/2`` along geodesics of a metric with a time.
     singular_values : (unknowns,)
     basis : str
         Highest degrees of the functions that fields are made of.

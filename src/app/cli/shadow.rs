@@ -12,7 +12,7 @@ use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
 use crate::relativity::{
     Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, difference_image, outline,
-    shadow,
+    shadow, time_moves_alone,
 };
 use crate::report::png;
 use crate::storage::{check_target, write_atomically};
@@ -234,7 +234,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let picture = png(&Image::beside(&images, GAP));
     write_atomically(&args.out, &picture).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
-    let facts = Facts { system: &system, unit: unit.as_deref(), camera: &camera, tracing: &tracing, views: &views };
+    let alone = |model: &dyn EulerLagrange<f64>| time_moves_alone(model, camera.chart, camera.distance);
+    let facts = Facts {
+        system: &system,
+        unit: unit.as_deref(),
+        camera: &camera,
+        tracing: &tracing,
+        views: &views,
+        free_factor: args.model.is_some() && models.iter().any(|(_, model)| alone(&**model)),
+    };
     let text = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
     output::print(&text.map_err(refused)?)?;
     if interrupted {

@@ -132,6 +132,11 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> 
 }
 
 impl Balance {
+    /// Energy that is not accounted for, root mean square over the trajectories, over the mean kinetic energy.
+    pub fn unaccounted(&self) -> f64 {
+        self.defect_rms / self.kinetic.abs()
+    }
+
     /// The balance in two lines, its parts over the mean kinetic energy.
     pub fn text(&self) -> String {
         let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();

@@ -120,7 +120,8 @@ mod tests {
 
     fn windows(count: usize) -> Vec<Window> {
         let times: Vec<f64> = (1..20).map(|k| 0.1 * f64::from(k)).collect();
-        let window = Window { q: vec![0.0], v: vec![-1.0], measured: vec![0.0; times.len()], times, force: None };
+        let window =
+            Window { q: vec![0.0], v: vec![-1.0], lead: 0.0, measured: vec![0.0; times.len()], times, force: None };
         vec![window; count]
     }
 

@@ -12,6 +12,8 @@ mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
+#[cfg(feature = "rollout")]
+mod groups;
 mod mechanics;
 #[doc(hidden)]
 pub mod system;
@@ -52,6 +54,10 @@ pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
 pub use expression::ExpressionLagrangian;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
+#[cfg(feature = "rollout")]
+pub(crate) use groups::{Regrouped, acting_groups};
+#[cfg(feature = "training")]
+pub(crate) use groups::{group_factors, groups};
 pub use mechanics::Mechanics;
 pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;

@@ -24,7 +24,10 @@ impl std::fmt::Display for Stillness {
         match self {
             Self::Constant(value) => write!(f, "does not move: it is {value} in every sample"),
             Self::Copy(sum) => write!(f, "follows from the other coordinates: it is {sum} plus a constant"),
-            Self::Noise(sigma) => write!(f, "does not move beyond its noise of {}", number(*sigma)),
+            Self::Noise(sigma) if sigma.is_finite() => {
+                write!(f, "does not move beyond its noise of {}", number(*sigma))
+            }
+            Self::Noise(_) => write!(f, "does not move beyond its noise"),
         }
     }
 }

@@ -10,16 +10,25 @@ use crate::scalar::{Dd, Real, Scalar};
 /// A row at unit length whose part beside the rows before it is below this at every state follows from them.
 const REDUNDANT: f64 = 1e-6;
 
+/// What there is to say of a constraint that no state satisfies.
+fn missed(defect: f64) -> String {
+    if defect.is_finite() {
+        format!("contradicts the others: the nearest states miss it by {defect:.3e}")
+    } else {
+        "is not finite at any of the states that were tried".to_string()
+    }
+}
+
 /// Why constraints leave no motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintError {
     /// No state was found that satisfies all of them.
-    #[error("constraint `{name}` contradicts the others: the nearest states miss it by {defect:.3e}")]
+    #[error("constraint `{name}` {}", missed(*defect))]
     Contradiction {
         /// The constraint that is missed most.
         name: String,
-        /// By how much, in units of the coordinates.
+        /// By how much, in units of the coordinates; not finite if it is not at any state.
         defect: f64,
     },
     /// As many independent rows as coordinates.
@@ -121,7 +130,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
                     needed.extend(independent(n, &rows.matrix, REDUNDANT).0);
                 }
                 Err(off) => {
-                    if nearest.is_none_or(|best| off.defect < best.defect) {
+                    if nearest.is_none_or(|best| best.defect.is_nan() || off.defect < best.defect) {
                         nearest = Some(off);
                     }
                 }
