@@ -37,7 +37,7 @@ fn rate(
 
 // ---- Fits
 
-/// Motion of the coordinates `x` and `y` at 100 Hz in several trajectories of a length in s, with white noise.
+/// Motion of the coordinates `x` and `y` at 50 Hz in several trajectories of a length in s, with white noise.
 struct Motion<'a> {
     model: Option<&'a dyn EulerLagrange<f64>>,
     seconds: f64,
@@ -45,17 +45,17 @@ struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    const RUNS: usize = 10;
+    const RUNS: usize = 6;
 
     fn recording(&self, rng: &mut ChaCha8Rng, periodic: [bool; 2]) -> Outcome<Recording> {
         let mut tracks = Vec::new();
         for run in 0..Self::RUNS {
             let mut draw = |low: f64, high: f64| -> [f64; 2] { std::array::from_fn(|_| rng.random_range(low..high)) };
             let (q, v) = (draw(0.4, 1.2), draw(-1.0, 1.0));
-            let samples = (100.0 * self.seconds) as usize;
-            let times: Vec<f64> = (0..=samples).map(|k| 0.01 * k as f64).collect();
+            let samples = (50.0 * self.seconds) as usize;
+            let times: Vec<f64> = (0..=samples).map(|k| 0.02 * k as f64).collect();
             let mut q = match self.model {
-                Some(model) => rollout(model, &q, &v, &Options::new(self.seconds, 0.01)).complete()?.q,
+                Some(model) => rollout(model, &q, &v, &Options::new(self.seconds, 0.02)).complete()?.q,
                 None => vec![0.0; 2 * times.len()],
             };
             q.truncate(2 * times.len());
@@ -71,7 +71,7 @@ impl Motion<'_> {
 fn is_good(motion: &Motion<'_>, rng: &mut ChaCha8Rng, periodic: [bool; 2]) -> Outcome<bool> {
     let recording = motion.recording(rng, periodic)?;
     let fit = Fit::recording(recording).seed(rng.random_range(0..1000)).threads(2).configure(|config| {
-        config.training.network.hidden = vec![24, 24];
+        config.training.network.hidden = vec![16, 16];
         config.training.phases.iter_mut().for_each(|phase| phase.epochs = 40);
     });
     Ok(fit.run().is_ok_and(|found| found.text().starts_with("measured: good: ")))
@@ -89,12 +89,12 @@ fn fits(seeds: u64) -> Outcome<Vec<Rate>> {
         ),
         (
             "coordinates that do not act on each other",
-            Motion { model: Some(&springs(0.0)), seconds: 12.0, noise: 1e-4 },
+            Motion { model: Some(&springs(0.0)), seconds: 8.0, noise: 1e-4 },
             [false; 2],
         ),
         (
             "an orbit whose momentum is conserved",
-            Motion { model: Some(&Mechanics::new(Orbit, vec![])), seconds: 12.0, noise: 1e-4 },
+            Motion { model: Some(&Mechanics::new(Orbit, vec![])), seconds: 8.0, noise: 1e-4 },
             [false, true],
         ),
     ];
@@ -102,7 +102,7 @@ fn fits(seeds: u64) -> Outcome<Vec<Rate>> {
     for (case, motion, periodic) in all {
         rates.push(rate(("good", case), NEVER, seeds, |rng| is_good(&motion, rng, periodic))?);
     }
-    let coupled = Motion { model: Some(&springs(0.6)), seconds: 12.0, noise: 1e-4 };
+    let coupled = Motion { model: Some(&springs(0.6)), seconds: 8.0, noise: 1e-4 };
     rates.push(rate(("good", "coupled springs"), 0.5..=1.0, seeds, |rng| is_good(&coupled, rng, [false; 2]))?);
     Ok(rates)
 }
