@@ -189,6 +189,7 @@ pub use physics::{analysis, formula, identification};
 pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
+pub use support::cancellation;
 pub(crate) use support::names;
 #[doc(hidden)]
 pub use support::storage;

@@ -64,9 +64,13 @@ pub fn attended<T: Send>(
 /// As [`attended`], for work whose part is worth nothing: after a signal its result is lost.
 ///
 /// # Errors
-/// `KeyboardInterrupt` after a signal, and a panic of the work.
-pub fn whole<T: Send>(py: Python<'_>, work: impl FnOnce(&Watch) -> T + Send) -> PyResult<T> {
-    let done = attended(py, None, |watch| (work(&watch), watch.interrupt.load(Ordering::SeqCst)))?;
+/// `KeyboardInterrupt` after a signal, what `progress` raises, and a panic of the work.
+pub fn whole<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Watch) -> T + Send,
+) -> PyResult<T> {
+    let done = attended(py, progress, |watch| (work(&watch), watch.interrupt.load(Ordering::SeqCst)))?;
     match done {
         (_, true) => Err(PyKeyboardInterrupt::new_err("interrupted")),
         (result, false) => Ok(result),

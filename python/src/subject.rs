@@ -1,6 +1,6 @@
 //! Something that moves by a Lagrangian: a system or a model.
 
-use crate::attend::{attended, whole};
+use crate::attend::whole;
 use crate::errors::{pipeline, runtime, value};
 use crate::readings::{FormulaChoices, described};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
@@ -14,7 +14,7 @@ use lnn::lagrangian::{
 };
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
-use lnn::pipeline::{EvaluationOptions, CONSTRAINTS_UNSUPPORTED, evaluate, trained_on};
+use lnn::pipeline::{CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, trained_on};
 use lnn::report::page;
 use lnn::rollout::{Integrator, Options, Rollout, RolloutError, rollout_many};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
@@ -25,9 +25,14 @@ use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::atomic::Ordering;
 
 /// States whose terms are computed at a time.
 const CHUNK: usize = 4096;
+/// Points whose geometry is computed at a time.
+const GEOMETRY_CHUNK: usize = 256;
+/// Components of Riemann tensors at once, at most: with all that stands beside them some 2 GB.
+const MOST_GEOMETRY: usize = 1 << 25;
 
 /// Origin of a Lagrangian.
 enum Kind {
@@ -218,11 +223,32 @@ impl Subject {
         Err(value(format_args!("{what}: expected {} numbers per state, found {columns}", self.n())))
     }
 
+    /// Terms of states; few of them, which are computed in a moment, without a look at signals.
+    fn attended(
+        &self,
+        py: Python<'_>,
+        states: (&[f64], &[f64]),
+        request: Request,
+        threads: usize,
+    ) -> PyResult<Vec<(Terms<f64>, usize)>> {
+        if states.0.len() <= CHUNK * self.n() {
+            return Ok(py.detach(|| self.computed(states, request, threads, &Watch::default())));
+        }
+        whole(py, None, |watch| self.computed(states, request, threads, watch))
+    }
+
     /// Terms of states, chunk by chunk, parts of them side by side.
-    fn computed(&self, q: &[f64], v: &[f64], request: Request, threads: usize) -> Vec<(Terms<f64>, usize)> {
+    fn computed(
+        &self,
+        (q, v): (&[f64], &[f64]),
+        request: Request,
+        threads: usize,
+        watch: &Watch,
+    ) -> Vec<(Terms<f64>, usize)> {
         let (n, model) = (self.n(), self.moving());
         let part = |q: &[f64], v: &[f64]| {
             let chunks = q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n));
+            let chunks = chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed));
             let terms = chunks.map(|(q, v)| {
                 let mut terms = Terms::default();
                 // Every row that fails is among the failures, its accelerations are NaN.
@@ -312,7 +338,7 @@ impl Subject {
         threads: usize,
     ) -> PyResult<(Vec<Numbers<'py>>, Vec<(usize, String)>)> {
         let (q, v) = self.states(&q, &v)?;
-        let mut parts = py.detach(|| self.computed(q, v, Request::ALL, threads));
+        let mut parts = self.attended(py, (q, v), Request::ALL, threads)?;
         let mut failures = Vec::new();
         let mut before = 0;
         for (terms, states) in &parts {
@@ -356,7 +382,7 @@ impl Subject {
             "energy" => (Request::ENERGY, 1, |t| &mut t.energy),
             _ => (Request::ACCELERATION, n, |t| &mut t.acceleration),
         };
-        let mut parts = py.detach(|| self.computed(q, v, request, threads));
+        let mut parts = self.attended(py, (q, v), request, threads)?;
         Ok(field(py, &mut parts, width, take))
     }
 
@@ -384,8 +410,9 @@ impl Subject {
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
         let starts: Vec<_> = q.chunks(n).zip(v.chunks(n)).map(|(q, v)| (q.to_vec(), v.to_vec())).collect();
         let model = self.moving();
-        let motions =
-            whole(py, |watch| rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads))?;
+        let motions = whole(py, None, |watch| {
+            rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
+        })?;
         let result = PyList::empty(py);
         for Rollout { trajectory, statistics, stop } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
@@ -406,10 +433,19 @@ impl Subject {
         velocity: Vec<f64>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         self.require_free()?;
-        let points = slice(&points)?;
+        let (n, points) = (self.n(), slice(&points)?);
+        let most = MOST_GEOMETRY / n.pow(4).max(1);
+        if points.len() / n > most {
+            return Err(value(format_args!("q: expected at most {most} points, found {}", points.len() / n)));
+        }
         let model = self.moving();
-        let found = py.detach(|| geometries(model, points, &velocity)).map_err(value)?;
-        let result = found.into_iter().map(|geometry| match geometry {
+        let found = whole(py, None, |watch| {
+            let chunks = points.chunks(GEOMETRY_CHUNK * n);
+            let chunks = chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed));
+            chunks.map(|points| geometries(model, points, &velocity)).collect::<Result<Vec<_>, _>>()
+        })?;
+        let found = found.map_err(value)?;
+        let result = found.into_iter().flatten().map(|geometry| match geometry {
             Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
             Ok(geometry) => {
                 let result = PyDict::new(py);
@@ -456,10 +492,11 @@ impl Subject {
         let most = tried.iter().map(|(basis, _)| unknowns(n, basis.len())).max().unwrap_or(0);
         let points = points.unwrap_or(enough(most, exact)).min(most_states(n, most));
         let model = self.moving();
-        let (found, degrees) = py.detach(|| {
+        let (found, degrees) = whole(py, None, |watch| {
             let (q, v) = self.sampled(&region, points, seed)?;
-            most_symmetries(model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
-        })?;
+            let model = Interruptible::new(model, &watch.interrupt);
+            most_symmetries(&model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
+        })??;
         let closed = found.algebra.as_ref().filter(|algebra| algebra.closes);
         Ok(json!({
             "count": found.separation.count,
@@ -481,19 +518,21 @@ impl Subject {
         let system = self.system_instance().ok();
         let description = system.as_ref().and_then(|system| system.system.description());
         let formulas = description.map(|description| description.constraints.clone()).unwrap_or_default();
-        let found = py.detach(|| {
+        let found = whole(py, None, |watch| {
             let (q, v) = self.sampled(&self.interest(), EXAMINED_STATES, seed)?;
-            Ok::<_, PyErr>(examine(self.moving(), &formulas, (&q, &v)))
-        })?;
+            let model = Interruptible::new(self.moving(), &watch.interrupt);
+            Ok::<_, PyErr>(examine(&model, &formulas, (&q, &v)))
+        })??;
         serde_json::to_string(&found).map_err(runtime)
     }
 
     /// The Lagrangian as a formula, as JSON.
     fn formula(&self, py: Python<'_>, choices: &str) -> PyResult<String> {
         self.require_free()?;
-        let (options, name) = FormulaChoices::read(choices)?;
+        let (mut options, name) = FormulaChoices::read(choices)?;
         let (names, periodic) = (&self.columns[..self.n()], self.periodic());
-        whole(py, |_| {
+        whole(py, None, |watch| {
+            options.cancellation = watch.cancellation();
             let (q, v) = self.sampled(&self.interest(), MODEL_STATES, options.seed)?;
             let found = formula_of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
             Ok(described(&found, &name))
@@ -524,7 +563,7 @@ impl Subject {
         let region = Bounds { positions: pairs(position), velocities: pairs(velocity) };
         let usual = Signature::of(self.n(), self.time_like().is_some());
         let signature = signature.map_or(usual, |(positive, negative)| Signature { positive, negative });
-        let found: Certificate = attended(py, None, |watch| {
+        let found: Certificate = whole(py, None, |watch| {
             let stop = Some(watch.interrupt.as_ref());
             let options = certificate::Options {
                 condition,
@@ -574,7 +613,7 @@ impl Subject {
         // A system that is described in the model's file is the one whose constraints it was learned under.
         let constraints = header.description.is_none().then(|| header.constraints.clone());
         let options = EvaluationOptions { starts, constraints, threads, ..options };
-        let found = attended(py, progress.as_ref(), |watch| evaluate(&system, network, options, &watch))?;
+        let found = whole(py, progress.as_ref(), |watch| evaluate(&system, network, options, watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }
 }

@@ -1,20 +1,20 @@
 //! `lnn constraints`: what the coordinates of recorded motion obey, and what a Lagrangian leaves open.
 
-use crate::cli::files::require_free;
+use crate::cli::files::OutputFile;
 use crate::cli::number::whole;
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
+use crate::cli::watch::search;
 use crate::cli::{CliError, config, output};
 use crate::constraints::{
-    ConstraintKind, ConstraintSearch, EXAMINED_STATES, ExaminedLagrangian, FoundConstraint, FoundConstraints,
-    MOST_DEGREE, MotionSamples, OwnConstraint, examine, find_constraints,
+    ConstraintKind, ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraint,
+    FoundConstraints, MOST_DEGREE, MotionSamples, OwnConstraint, examine, find_constraints,
 };
 use crate::lagrangian::{EulerLagrange, FormulaConstraints};
 use crate::names::{percent, pluralize, rounded};
 use crate::recording::smooth::SmoothOptions;
 use crate::report::text_table;
 use crate::scalar::Scalar;
-use crate::storage::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -87,32 +87,34 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.recording.coords.is_empty() {
         return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
     }
-    if let Some(out) = &args.out {
-        let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
-        require_free(out, &inputs, args.overwrite)?;
-    }
+    let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
+    let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.overwrite)).transpose()?;
     let recording = args.recording.read()?.recording;
-    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?;
-    let search = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
-    let found = find_constraints(&samples, search).map_err(CliError::data)?;
-    if let Some(out) = &args.out {
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
+    let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
+    let found = find_constraints(&samples, wanted).map_err(|error| match error {
+        ConstraintSearchError::Cancelled(_) => CliError::nothing_written(),
+        error => CliError::data(error),
+    })?;
+    drop(samples);
+    if let Some(out) = &out {
         write_table(out, &found)?;
     }
     if args.json {
         let text = serde_json::to_string(&found).map_err(CliError::data)?;
-        return output::print(&format!("{text}\n"));
+        return OutputFile::print(out, &format!("{text}\n"));
     }
-    output::print(&text(&found, &recording.coordinates))
+    OutputFile::print(out, &text(&found, &recording.coordinates))
 }
 
 /// Writes the constraints of the system as the table that a system file takes.
-fn write_table(out: &Path, found: &FoundConstraints) -> Result<(), CliError> {
+fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), CliError> {
     let constraints = found.formulas();
     if constraints.is_empty() {
-        return Err(CliError::file(out, "no constraints were found: there is nothing to write"));
+        return Err(CliError::data("--out: no constraints were found: there is nothing to write"));
     }
     let text = toml::to_string(&Table { constraints }).map_err(CliError::data)?;
-    write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))
+    out.write(text.as_bytes())
 }
 
 /// The findings as text.

@@ -2,7 +2,7 @@
 
 use crate::cli::charges::Charges;
 use crate::cli::constraints::constrained;
-use crate::cli::files::require_free;
+use crate::cli::files::{OutputFile, require_free};
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::motion_source::MotionSource;
@@ -14,7 +14,6 @@ use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
 use crate::rollout::{Balances, Driven, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
-use crate::storage::check_target;
 use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -160,8 +159,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         if *plot == args.out {
             return Err(CliError::usage("--plot: the trajectory goes into this file (--out)"));
         }
-        require_free(plot, &inputs, args.overwrite)?;
-        check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
+        OutputFile::claim(plot, &inputs, args.overwrite)?;
     }
     let force = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
     if args.charges && force.is_some() {
@@ -215,6 +213,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     if let Some(error @ (RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. })) = &result.stop {
         return Err(refused(error));
+    }
+    if !standard {
+        // Another program may have written it meanwhile.
+        require_free(&args.out, &inputs, args.overwrite)?;
     }
     target.finish()?;
     let time_unit = source.time_unit.as_deref();

@@ -3,6 +3,7 @@
 use super::features::Features;
 use super::pencil::{Moments, Pencil};
 use super::{ConstraintKind, FoundConstraint, MotionSamples};
+use crate::cancellation::Cancellation;
 use crate::linalg::{Workspace, dot, solve};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -52,6 +53,7 @@ type Combination = Vec<(usize, f64)>;
 /// leading term divides are left out of higher degrees.
 pub struct Vanishing<'a> {
     features: &'a Features,
+    cancellation: &'a Cancellation,
     moments: Moments,
     whole: Pencil,
     centred: bool,
@@ -77,7 +79,7 @@ impl<'a> Vanishing<'a> {
     /// Looks for combinations that vanish, beside those that are `known` to, or `centred`, that are constant along each trajectory; of
     /// `shared` samples the errors are as one.
     pub fn of(
-        samples: &MotionSamples,
+        samples: &'a MotionSamples,
         features: &'a Features,
         known: Option<&Vanishing<'_>>,
         centred: bool,
@@ -88,10 +90,12 @@ impl<'a> Vanishing<'a> {
         let whole = moments.pencil(centred, |_| true);
         let independent = samples.len() as f64 / shared;
         let (levels, leading) = (Vec::new(), Vec::new());
-        let mut found = Self { features, moments, whole, centred, independent, levels, leading };
+        let cancellation = &samples.cancellation;
+        let mut found = Self { features, cancellation, moments, whole, centred, independent, levels, leading };
         let highest = (0..p).map(|term| features.degree(term)).max().unwrap_or(0);
         // The product of a constant and of another function is not constant: there is one level.
-        for degree in if centred { highest..=highest } else { 0..=highest } {
+        let degrees = if centred { highest..=highest } else { 0..=highest };
+        for degree in degrees.take_while(|_| cancellation.go_on()) {
             let left = |&term: &usize| {
                 let follows =
                     || known.is_some_and(|known| known.divides(features, term)) || found.divides(features, term);
@@ -137,15 +141,18 @@ impl<'a> Vanishing<'a> {
     pub fn generators(&self) -> Vec<Generator> {
         let mut supports: Vec<Vec<usize>> = Vec::new();
         for level in &self.levels {
-            for support in level.basis().chain(level.sparse()) {
+            let combinations = level.basis().chain(level.sparse(self.cancellation));
+            for support in combinations.take_while(|_| self.cancellation.go_on()) {
                 let support = needed(&self.whole, support, self.independent);
                 if !supports.contains(&support) {
                     supports.push(support);
                 }
             }
         }
+        let go_on = |_: &&Vec<usize>| self.cancellation.go_on();
         let fit = |support: &Vec<usize>| fitted(&self.moments, self.features, support, self.centred);
-        let mut found: Vec<Generator> = supports.iter().map(fit).filter(Generator::is_determined).collect();
+        let mut found: Vec<Generator> =
+            supports.iter().take_while(go_on).map(fit).filter(Generator::is_determined).collect();
         found.sort_by_key(|generator| (generator.degree(self.features), generator.terms().count()));
         found
     }
@@ -162,12 +169,13 @@ impl Level {
 
     /// For single terms at the factor 1 combinations of few terms, those with a small `sum log |c_k|`: by least squares whose weights
     /// `1 / (c_k^2 + eps^2)` are of the factors before (Candès, Wakin and Boyd 2008), from random weights at first.
-    fn sparse(&self) -> Vec<Combination> {
+    fn sparse(&self, cancellation: &Cancellation) -> Vec<Combination> {
         let (size, count) = (self.rows.len(), self.terms.len());
         let once = REWEIGHTED * size * size * (count + size);
         let (mut rng, mut workspace) = (ChaCha8Rng::seed_from_u64(0), Workspace::new());
         let (mut found, mut known) = (Vec::new(), BTreeSet::new());
-        for lead in (0..count).cycle().take((WORK / once.max(1)).min(FORMS * count)) {
+        let leads = (0..count).cycle().take((WORK / once.max(1)).min(FORMS * count));
+        for lead in leads.take_while(|_| cancellation.go_on()) {
             let column: Vec<f64> = self.rows.iter().map(|row| row[lead]).collect();
             let mut weights: Vec<f64> = (0..count).map(|_| rng.random_range(-6.0..0.0f64).exp()).collect();
             let mut factors = vec![0.0; count];

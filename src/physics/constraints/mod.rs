@@ -19,6 +19,7 @@ mod tests;
 pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
 pub use samples::MotionSamples;
 
+use crate::cancellation::Cancelled;
 use crate::lagrangian::{ReducedMass, take_out};
 use crate::linalg::{Workspace, dot, eigh};
 use features::Features;
@@ -122,6 +123,9 @@ impl FoundConstraints {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintSearchError {
+    /// The search was ended from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// More terms than are looked at.
     #[error("{what} makes {found} terms, at most {MOST_TERMS} are looked at together")]
     Terms {
@@ -166,10 +170,15 @@ pub fn find_constraints(
         }
     }
     let mut held = RowsTaken::at(samples, PLACES);
+    let stop = &samples.cancellation;
+    stop.stage("functions that vanish");
     let vanishing = Vanishing::of(samples, &of_positions, None, false, 1.0);
     let candidates = vanishing.generators();
+    stop.check()?;
     let functions = held.take(samples, &of_positions, candidates.clone(), false, IMPOSED);
     let functions = independent_everywhere(samples, &of_positions, functions, candidates);
+    stop.check()?;
+    stop.stage("functions that are constant");
     let conserved = if samples.trajectories() > 1 {
         let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, 1.0);
         held.take(samples, &of_positions, constant.generators(), false, BESIDE)
@@ -177,8 +186,11 @@ pub fn find_constraints(
         Vec::new()
     };
     let by_functions = held.bases.clone();
+    stop.check()?;
+    stop.stage("rows of velocities");
     let moving = Vanishing::of(samples, &of_velocities, Some(&vanishing), false, samples.shared());
     let moving = held.take(samples, &of_velocities, moving.generators(), true, BESIDE);
+    stop.check()?;
     let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
     let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
     let mut constraints = Vec::new();

@@ -1,5 +1,6 @@
 //! States of recorded motion with their noise.
 
+use crate::cancellation::Cancellation;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 
@@ -20,6 +21,8 @@ pub struct MotionSamples {
     starts: Vec<usize>,
     /// Samples whose velocities have errors of their own, as one to so many.
     shared: f64,
+    /// Ends a search in them.
+    pub(super) cancellation: Cancellation,
 }
 
 impl MotionSamples {
@@ -91,6 +94,12 @@ impl MotionSamples {
             }
         }
         Ok(samples)
+    }
+
+    /// The same, a search in which is ended by `cancellation` and reports to it.
+    #[must_use]
+    pub fn watched(self, cancellation: &Cancellation) -> Self {
+        Self { cancellation: cancellation.clone(), ..self }
     }
 
     /// Number of coordinates.

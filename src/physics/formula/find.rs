@@ -8,6 +8,7 @@ use super::motion::{BlockSum, Model, Motion, inflation, total};
 use super::select::{Path, eliminate_backward};
 use super::wald::{Equations, RIDGE, Survivors, survivors};
 use super::weak::{Stretch, Windows};
+use crate::cancellation::Cancellation;
 use crate::identification::linear::{inverse_with, part, times};
 use crate::identification::{Segment, joined, spread_of};
 use crate::linalg::{self, Workspace, dot};
@@ -43,6 +44,8 @@ pub struct FormulaOptions {
     pub seed: u64,
     /// Threads; the result does not depend on them.
     pub threads: usize,
+    /// Ends the search, and receives reports of how far it is.
+    pub cancellation: Cancellation,
 }
 
 impl Default for FormulaOptions {
@@ -59,6 +62,7 @@ impl Default for FormulaOptions {
             bootstraps: 40,
             seed: 0,
             threads: 1,
+            cancellation: Cancellation::default(),
         }
     }
 }
@@ -115,6 +119,8 @@ pub(super) struct Prepared<'a> {
     speeds: Vec<f64>,
     /// Time in which the motion changes, in s.
     pace: f64,
+    /// Ends the search.
+    pub cancellation: Cancellation,
     n: usize,
 }
 
@@ -174,7 +180,8 @@ impl<'a> Prepared<'a> {
         };
         let sigma_of = recording.tracks.iter().map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
         let spread = (0..n).map(|i| spread_of(recording, i)).collect();
-        Ok(Self { recording, smoothed, sigma_of, sigma, spread, step, resolved, bounds, speeds, pace, n })
+        let cancellation = options.cancellation.clone();
+        Ok(Self { recording, smoothed, sigma_of, sigma, spread, step, resolved, bounds, speeds, pace, cancellation, n })
     }
 
     /// The block of a segment.
@@ -337,7 +344,7 @@ impl Search<'_> {
             self.motion.settle(model, segments, 4);
             self.motion.fit(model, segments, PASSES);
             let blocks = self.motion.blocks(model, &self.candidates, segments);
-            if round >= rounds {
+            if round >= rounds || self.motion.data.cancellation.is_cancelled() {
                 return blocks;
             }
             let Some(found) = self.survivors(model, segments, &blocks, &|_| 1.0) else { return blocks };
@@ -367,6 +374,8 @@ impl Search<'_> {
 pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Result<FoundFormula, FormulaError> {
     let extent = Extent { families: options.families, gyroscopic: options.gyroscopic, friction: options.friction };
     let library = Library::new(&recording.coordinates, &recording.periodic, extent, &options.functions)?;
+    let stop = &options.cancellation;
+    stop.stage("smoothed motion");
     let data = Prepared::new(recording, options)?;
     let (kept, quotient) = library.independent(&data.bounds, options.seed);
     let width = 3.0 * data.pace;
@@ -382,12 +391,16 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     if stretches.len() < 2 {
         return Err(short);
     }
+    stop.check()?;
     let windows = Windows::new(&library, &kept, &stretches, width);
     let driven = windows.driven();
     let held = held_out(&data, options.seed);
     let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
     let start = windows.unit_mass(&library, &kept, &data.speeds);
-    let path = eliminate_backward(&windows, &start, &data.sigma, &complexity, &|block| held.contains(&block));
+    stop.check()?;
+    stop.stage("choice of terms");
+    let path = eliminate_backward(&windows, &start, (&data.sigma, &complexity), &|block| held.contains(&block), stop);
+    stop.check()?;
     log(&library, &kept, &path);
     let Some(choice) = beginning(&path, &windows) else { return Err(short) };
     let mut model = Model {
@@ -408,9 +421,12 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         values
     });
     let mut search = Search { library: &library, motion, candidates, driven, states: states.collect() };
+    stop.stage("short segments");
     search.motion.settle(&model, &mut learned, 4);
     search.motion.choose_steps(&model, &learned);
     search.converge(&mut model, &mut learned, ROUNDS);
+    stop.check()?;
+    stop.stage("longer segments");
     // Longer segments say more of the constants; their starts are known by now.
     let before = (model.clone(), learned.clone());
     let short = search.motion.settle(&model, &mut learned, 1);
@@ -425,7 +441,10 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     }
     search.motion.settle(&model, &mut judges, 6);
     let mut judges = data.joined(&judges);
+    stop.check()?;
+    stop.stage("probabilities");
     let probabilities = probabilities(&search, &model, &blocks, &learned, options);
+    stop.check()?;
     let shortened = shorten(&search, &quotient, &mut model, &mut learned);
     let covariance = covariance(&search, &model, &learned);
     let (square, count) = search.motion.settle(&model, &mut judges, 8);
@@ -451,6 +470,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         found.rescale(options.scale.as_ref())?;
     }
     found.name_constants();
+    stop.check()?;
     Ok(found)
 }
 
@@ -497,7 +517,7 @@ fn probabilities(
     let mut rng = RngStream::Segments.generator(options.seed);
     let names: Vec<usize> = blocks.keys().copied().collect();
     let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
-    for _ in 0..options.bootstraps {
+    for _ in (0..options.bootstraps).take_while(|_| options.cancellation.go_on()) {
         let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
         for _ in &names {
             *weights.entry(names[rng.random_range(0..names.len())]).or_default() += 1.0;
@@ -558,7 +578,9 @@ fn shorten(
                 best = Some((cost, gone, Model { terms, coefficients: x }));
             }
         }
-        let Some((_, gone, shorter)) = best else { return replaced };
+        let Some((_, gone, shorter)) = best.filter(|_| search.motion.data.cancellation.go_on()) else {
+            return replaced;
+        };
         let old = gone.iter().flat_map(|&k| replaced.get(&model.terms[k]).cloned().unwrap_or(vec![model.terms[k]]));
         replaced.insert(shorter.terms[shorter.terms.len() - 1], old.collect());
         *model = shorter;

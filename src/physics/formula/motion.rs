@@ -135,6 +135,7 @@ impl Motion<'_> {
             spread: data.spread.clone(),
             robust: true,
             threads: self.threads,
+            cancellation: data.cancellation.clone(),
         };
         Some(work(&mut problem, x))
     }

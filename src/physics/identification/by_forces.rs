@@ -44,6 +44,7 @@ pub(super) fn identify(
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
     for _ in 0..ROUNDS {
         states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
+        problem.cancellation.check()?;
         if !states.fit(problem, &mut x, Met::Forces) {
             return Err(IdentifyError::Singular);
         }
@@ -80,6 +81,7 @@ pub(super) fn identify(
         Outlier { track, sample, time, coordinate, size }
     };
     let (outliers, outlier_count) = outliers((&[whole], &[residuals]), n, far);
+    problem.cancellation.check()?;
     Ok(Identified {
         explained,
         residuals: by_coordinate,

@@ -47,6 +47,7 @@ pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
 pub(crate) use stages::{choose_steps, joined, spread_of};
 
+use crate::cancellation::Cancellation;
 use crate::recording::Targets;
 use serde::{Deserialize, Serialize};
 
@@ -89,4 +90,7 @@ pub struct IdentifyOptions {
     pub robust: bool,
     /// Threads; 0 for one. The result does not depend on their number.
     pub threads: usize,
+    /// Ends the search, and receives reports of how far it is.
+    #[serde(skip)]
+    pub cancellation: Cancellation,
 }

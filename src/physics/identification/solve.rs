@@ -4,6 +4,7 @@
 
 use super::follow::{Course, Follower, LANES, Segment, State};
 use super::linear::{inverse_with, times};
+use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
@@ -62,6 +63,8 @@ pub(crate) struct Problem<'a> {
     pub spread: Vec<f64>,
     pub robust: bool,
     pub threads: usize,
+    /// Ends every loop.
+    pub cancellation: Cancellation,
 }
 
 /// Normal equations of a segment: start, constants, sensors.
@@ -225,7 +228,7 @@ impl Problem<'_> {
                 let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
                 batch.iter().copied().zip(self.batch(x, &lanes)).collect::<Vec<_>>()
             };
-            batches.iter().flat_map(of).collect::<Vec<_>>()
+            batches.iter().take_while(|_| self.cancellation.go_on()).flat_map(of).collect::<Vec<_>>()
         };
         let share = batches.len().div_ceil(self.threads.max(1)).max(1);
         let mut found = vec![None; segments.len()];
@@ -247,7 +250,7 @@ impl Problem<'_> {
         let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * n]).collect();
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-        for batch in order.chunks(LANES) {
+        for batch in order.chunks(LANES).take_while(|_| self.cancellation.go_on()) {
             let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
             let put = |lane: usize, sample: usize, i: usize, r: f64, _: &[f64]| found[batch[lane]][sample * n + i] = r;
             self.residuals(x, &lanes, false, put);
@@ -358,7 +361,7 @@ impl Problem<'_> {
                 }
             }
             let total: f64 = best.iter().flatten().map(|linear| linear.square).sum();
-            if gained < 1e-4 * total {
+            if gained < 1e-4 * total || self.cancellation.is_cancelled() {
                 break;
             }
         }
@@ -412,6 +415,9 @@ impl Problem<'_> {
         let mut damping = 1e-4;
         for _ in 0..iterations {
             let mut normal = self.normal(&best, segments, damping);
+            if !self.cancellation.iterate((square / normal.count.max(1.0)).sqrt()) {
+                break;
+            }
             let muted = self.without_effect(x, &normal);
             mute(&muted, &mut normal.matrix, &mut normal.right);
             let Some(inverse) = inverse_with(m, &normal.matrix, RIDGE) else { break };

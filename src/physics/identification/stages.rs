@@ -135,10 +135,14 @@ pub fn identify(
         spread,
         robust: options.robust,
         threads: options.threads.max(1),
+        cancellation: options.cancellation.clone(),
     };
+    let stop = &options.cancellation;
+    stop.stage("smoothed motion");
     let mut states = States::new(&problem, &smoothed);
     if met == Met::Forces {
         let segments = cut(recording, &smoothed, LEAST_SEGMENT, n);
+        stop.stage("forces");
         return by_forces::identify(instance, &problem, &mut states, (x, segments));
     }
     if states.len(n) > 0 && !states.fit(&problem, &mut x, met) {
@@ -147,6 +151,7 @@ pub fn identify(
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
     let samples = first_samples(&states, (n, smoothing.step), options.segment)?;
     let segments = cut(recording, &smoothed, samples, n);
+    stop.stage("short segments");
     let mut fitted = first(&mut problem, x, segments)?;
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
@@ -159,13 +164,18 @@ pub fn identify(
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
         refit(&problem, &mut fitted);
     }
+    stop.stage("longer segments");
     fitted = grown(&mut problem, fitted, options.segment);
     if options.noise.is_none() {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
     }
     refit(&problem, &mut fitted);
-    Ok(result(instance, &problem, &fitted, (&start, &noise), options))
+    stop.check()?;
+    stop.stage("what is determined");
+    let found = result(instance, &problem, &fitted, (&start, &noise), options);
+    stop.check()?;
+    Ok(found)
 }
 
 /// What is met.
@@ -290,6 +300,7 @@ fn cut(recording: &Recording, smoothed: &[Option<Smoothed>], samples: usize, n: 
 fn first(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
     choose_steps(problem, &x, &segments);
     let followed = problem.all(&x, &segments);
+    problem.cancellation.check()?;
     let mut kept = followed.iter().map(Option::is_some);
     segments.retain(|_| kept.next().unwrap_or(false));
     if segments.is_empty() {
@@ -327,7 +338,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.sigma.len();
     let mut coarse = problem.ends(x, &probes);
-    while problem.course.substeps < MOST_SUBSTEPS {
+    while problem.course.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
         let mut finer = problem.clone();
         finer.course.substeps *= 2;
         let fine = finer.ends(x, &probes);
@@ -422,7 +433,7 @@ fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
 /// Shorter segments of a form that misses the motion, as long as constants become better known by them: what is missing adds up along a
 /// segment.
 fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
-    while fitted.mean_square() > EXPLAINED * EXPLAINED {
+    while fitted.mean_square() > EXPLAINED * EXPLAINED && !problem.cancellation.is_cancelled() {
         let segments = halved(problem, &fitted);
         if segments.len() == fitted.segments.len() {
             break;
@@ -443,7 +454,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
 fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
     let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
     let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * 1.5 < wanted);
-    while wanted_more != Some(false) {
+    while wanted_more != Some(false) && !problem.cancellation.is_cancelled() {
         let segments = joined(&fitted.segments);
         if segments.len() == fitted.segments.len() {
             break;
