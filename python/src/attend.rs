@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(50);
 /// Stack of the work, that of a main thread.
 const STACK: usize = 8 << 20;
+/// Time that work whose loops are long has after a signal; then it is left to itself.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// An event as Python receives it: kind, two numbers, a text.
 type News = (&'static str, f64, f64, String);
@@ -49,7 +51,7 @@ pub fn attended<T: Send>(
                 work(watch)
             });
             let running = running.map_err(|error| runtime(format_args!("no thread can be started: {error}")))?;
-            let looked = look(&receiver, &flag, progress);
+            let looked = look(&receiver, &flag, progress, Duration::MAX);
             let done = running.join();
             looked?;
             done.map_err(|panic| {
@@ -77,10 +79,40 @@ pub fn whole<T: Send>(
     }
 }
 
-/// Waits for the end of the work.
-fn look(receiver: &Receiver<Message>, flag: &AtomicBool, progress: Option<&Py<PyAny>>) -> PyResult<()> {
-    let mut failed = Ok(());
+/// As [`whole`], for work that owns what it needs and may not look at its flag for long: soon after a signal it is left to itself.
+///
+/// # Errors
+/// `KeyboardInterrupt` after a signal, and a panic of the work.
+pub fn left<T: Send + 'static>(py: Python<'_>, work: impl FnOnce(&Watch) -> T + Send + 'static) -> PyResult<T> {
+    let ((sender, receiver), flag) = (channel(), Arc::new(AtomicBool::new(false)));
+    let watch = Watch { events: None, interrupt: Arc::clone(&flag) };
+    let running = Builder::new().stack_size(STACK).spawn(move || {
+        let _end = End(sender);
+        work(&watch)
+    });
+    let running = running.map_err(|error| runtime(format_args!("no thread can be started: {error}")))?;
+    py.detach(move || {
+        look(&receiver, &flag, None, PATIENCE)?;
+        match running.join() {
+            _ if flag.load(Ordering::SeqCst) => Err(PyKeyboardInterrupt::new_err("interrupted")),
+            Ok(done) => Ok(done),
+            Err(_) => Err(runtime("a mistake in lnn itself")),
+        }
+    })
+}
+
+/// Waits for the end of the work, after a signal as long as there is patience.
+fn look(
+    receiver: &Receiver<Message>,
+    flag: &AtomicBool,
+    progress: Option<&Py<PyAny>>,
+    patience: Duration,
+) -> PyResult<()> {
+    let (mut failed, mut pressed) = (Ok(()), None);
     loop {
+        if pressed.is_some_and(|pressed: Instant| pressed.elapsed() > patience) {
+            return Err(PyKeyboardInterrupt::new_err("interrupted"));
+        }
         let message = receiver.recv_timeout(LOOK);
         if let Ok(Message::Done) | Err(RecvTimeoutError::Disconnected) = message {
             return failed;
@@ -91,7 +123,10 @@ fn look(receiver: &Receiver<Message>, flag: &AtomicBool, progress: Option<&Py<Py
             }
             // The first signal ends the work with what it has, as the program does.
             match py.check_signals() {
-                Err(_) if !flag.swap(true, Ordering::SeqCst) => Ok(()),
+                Err(_) if !flag.swap(true, Ordering::SeqCst) => {
+                    pressed = Some(Instant::now());
+                    Ok(())
+                }
                 outcome => outcome,
             }
         });

@@ -1,6 +1,6 @@
 //! Something that moves by a Lagrangian: a system or a model.
 
-use crate::attend::whole;
+use crate::attend::{left, whole};
 use crate::errors::{pipeline, runtime, value};
 use crate::readings::{FormulaChoices, described};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
@@ -246,8 +246,10 @@ impl Subject {
         watch: &Watch,
     ) -> Vec<(Terms<f64>, usize)> {
         let (n, model) = (self.n(), self.moving());
+        // The same work of many coordinates takes fewer states.
+        let chunk = (4 * CHUNK / (n * n)).clamp(64, CHUNK);
         let part = |q: &[f64], v: &[f64]| {
-            let chunks = q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n));
+            let chunks = q.chunks(chunk * n).zip(v.chunks(chunk * n));
             let chunks = chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed));
             let terms = chunks.map(|(q, v)| {
                 let mut terms = Terms::default();
@@ -473,7 +475,7 @@ impl Subject {
 
     /// Point symmetries, as JSON.
     fn symmetries(
-        &self,
+        slf: &Bound<'_, Self>,
         py: Python<'_>,
         region: Vec<(String, f64, f64)>,
         degrees: Option<&str>,
@@ -481,20 +483,22 @@ impl Subject {
         seed: u64,
         tolerance: Option<f64>,
     ) -> PyResult<String> {
-        self.require_free()?;
-        let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
-        let periodic = self.periodic();
-        let region = self.region(self.interest(), region)?;
+        let this = slf.get();
+        this.require_free()?;
+        let (n, exact, units) = (this.n(), matches!(this.kind, Kind::System(..)), this.units());
+        let periodic = this.periodic();
+        let region = this.region(this.interest(), region)?;
         let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], region.position[i])).collect();
         let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
-        let names = &self.columns[..n];
+        let names = &this.columns[..n];
         let tried = bases(names, &charts, degrees, exact);
         let most = tried.iter().map(|(basis, _)| unknowns(n, basis.len())).max().unwrap_or(0);
         let points = points.unwrap_or(enough(most, exact)).min(most_states(n, most));
-        let model = self.moving();
-        let (found, degrees) = whole(py, None, |watch| {
-            let (q, v) = self.sampled(&region, points, seed)?;
-            let model = Interruptible::new(model, &watch.interrupt);
+        let subject = slf.clone().unbind();
+        let (found, degrees) = left(py, move |watch| {
+            let this = subject.get();
+            let (q, v) = this.sampled(&region, points, seed)?;
+            let model = Interruptible::new(this.moving(), &watch.interrupt);
             most_symmetries(&model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
         })??;
         let closed = found.algebra.as_ref().filter(|algebra| algebra.closes);
@@ -505,7 +509,7 @@ impl Subject {
             "fields": found.fields.iter().map(|field| field.text(&found.basis)).collect::<Vec<_>>(),
             "gauge_functions": found.fields.iter().map(|field| field.gauge_text(&found.basis)).collect::<Vec<_>>(),
             "structure_constants": closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
-            "time_translation": model.conserves_energy(),
+            "time_translation": this.moving().conserves_energy(),
             "singular_values": found.singular_values,
             "basis": degrees.to_string(),
             "points": found.states,
