@@ -99,12 +99,16 @@ pub fn identify(
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
     let met = met(instance, recording, options)?;
+    let stop = &options.cancellation;
+    stop.stage("equations of motion");
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
     let longest = recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0);
     if longest < LEAST_SAMPLES {
         return Err(IdentifyError::Short { found: longest, needed: LEAST_SAMPLES });
     }
+    stop.check()?;
+    stop.stage("smoothed motion");
     let smoothing =
         Smoothing::choose(recording, &SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() })?;
     let smooth = |track: &crate::recording::RecordedTrajectory| {
@@ -137,8 +141,8 @@ pub fn identify(
         threads: options.threads.max(1),
         cancellation: options.cancellation.clone(),
     };
-    let stop = &options.cancellation;
-    stop.stage("smoothed motion");
+
+    stop.check()?;
     let mut states = States::new(&problem, &smoothed);
     if met == Met::Forces {
         let segments = cut(recording, &smoothed, LEAST_SEGMENT, n);
