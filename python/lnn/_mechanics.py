@@ -174,17 +174,9 @@ class Mechanics:
         n = self._n
         points, _, shape = states(q, q, n)
         velocity = [0.0] * n if velocity is None else doubles_list("velocity", velocity)
-        found = self._subject.geometry(points, velocity)
-        fields: dict[str, Any] = {}
-        good = [point if isinstance(point, dict) else {} for point in found]
-        for name, rank in TENSORS.items():
-            rows = [np.asarray(point.get(name, np.full(n**rank, np.nan))) for point in good]
-            fields[name] = np.array(rows).reshape(*shape, *[n] * rank)
-        for name in "determinant", "scalar", "kretschmann":
-            fields[name] = np.array([point.get(name, np.nan) for point in good]).reshape(shape)
-        fields["signature"] = np.array([point.get("signature", (0, 0)) for point in good], int).reshape(*shape, 2)
-        failures = tuple((k, point) for k, point in enumerate(found) if isinstance(point, str))
-        return Geometry(**fields, failures=failures)
+        numbers, signatures, failures = self._subject.geometry(points, velocity)
+        fields: dict[str, Any] = {name: x.reshape(*shape, *[n] * TENSORS.get(name, 0)) for name, x in numbers.items()}
+        return Geometry(**fields, signature=signatures.reshape(*shape, 2), failures=tuple(failures))
 
     def symmetries(
         self,

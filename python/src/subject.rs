@@ -6,7 +6,7 @@ use crate::readings::{FormulaChoices, described};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
 use lnn::constraints::{EXAMINED_STATES, examine};
 use lnn::formula::{MODEL_STATES, formula_of_model};
-use lnn::geometry::geometries;
+use lnn::geometry::{Geometry, GeometryError, geometries};
 use lnn::lagrangian::system::{Bounds, Size};
 use lnn::lagrangian::{
     Description, EulerLagrange, Interruptible, Request, SystemInstance, Terms, configure, configure_system,
@@ -31,7 +31,7 @@ use std::sync::atomic::Ordering;
 const CHUNK: usize = 4096;
 /// Points whose geometry is computed at a time.
 const GEOMETRY_CHUNK: usize = 256;
-/// Components of Riemann tensors at once, at most: with all that stands beside them some 2 GB.
+/// Components of Riemann tensors at once, at most: with all that stands beside them about 1 GB.
 const MOST_GEOMETRY: usize = 1 << 25;
 
 /// Origin of a Lagrangian.
@@ -273,6 +273,49 @@ impl Subject {
     }
 }
 
+/// What a geometry has of numbers at a point, by name and number of indices.
+const FIELDS: [(&str, u32); 10] = [
+    ("metric", 2),
+    ("inverse", 2),
+    ("christoffel", 3),
+    ("riemann", 4),
+    ("ricci", 2),
+    ("einstein", 2),
+    ("weyl", 4),
+    ("determinant", 0),
+    ("scalar", 0),
+    ("kretschmann", 0),
+];
+
+/// Geometries of points, field by field; `NaN` at the points that fail.
+#[derive(Default)]
+struct Geometries {
+    numbers: [Vec<f64>; FIELDS.len()],
+    signatures: Vec<i64>,
+    failures: Vec<(usize, String)>,
+}
+
+impl Geometries {
+    fn push(&mut self, n: usize, found: Result<Geometry<f64>, GeometryError>) {
+        let parts = match found {
+            Ok(Geometry { metric, connection, curvature }) => {
+                self.signatures.extend([metric.signature.positive as i64, metric.signature.negative as i64]);
+                let tensors =
+                    [metric.components, metric.inverse, connection.symbols, curvature.riemann, curvature.ricci];
+                let more = [curvature.einstein, curvature.weyl];
+                let scalars = [metric.determinant, curvature.scalar, curvature.kretschmann].map(|x| vec![x]);
+                tensors.into_iter().chain(more).chain(scalars).collect::<Vec<_>>()
+            }
+            Err(error) => {
+                self.failures.push((self.signatures.len() / 2, error.to_string()));
+                self.signatures.extend([0, 0]);
+                FIELDS.iter().map(|(_, rank)| vec![f64::NAN; n.pow(*rank)]).collect()
+            }
+        };
+        self.numbers.iter_mut().zip(parts).for_each(|(all, part)| all.extend(part));
+    }
+}
+
 /// A field of terms.
 type Field = fn(&mut Terms<f64>) -> &mut Vec<f64>;
 
@@ -427,13 +470,14 @@ impl Subject {
         Ok(result)
     }
 
-    /// Metric, connection and curvature at points `(b, n)`: a dictionary of flat arrays of each, or what is wrong.
+    /// Metric, connection and curvature at points `(b, n)`: flat arrays by name, signatures, and the points that fail with what is wrong.
+    #[allow(clippy::type_complexity)]
     fn geometry<'py>(
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
         velocity: Vec<f64>,
-    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyArray1<i64>>, Vec<(usize, String)>)> {
         self.require_free()?;
         let (n, points) = (self.n(), slice(&points)?);
         let most = MOST_GEOMETRY / n.pow(4).max(1);
@@ -442,35 +486,19 @@ impl Subject {
         }
         let model = self.moving();
         let found = whole(py, None, |watch| {
+            let mut found = Geometries::default();
             let chunks = points.chunks(GEOMETRY_CHUNK * n);
-            let chunks = chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed));
-            chunks.map(|points| geometries(model, points, &velocity)).collect::<Result<Vec<_>, _>>()
-        })?;
-        let found = found.map_err(value)?;
-        let result = found.into_iter().flatten().map(|geometry| match geometry {
-            Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
-            Ok(geometry) => {
-                let result = PyDict::new(py);
-                let (metric, curvature) = (geometry.metric, geometry.curvature);
-                result.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
-                result.set_item("determinant", metric.determinant)?;
-                result.set_item("scalar", curvature.scalar)?;
-                result.set_item("kretschmann", curvature.kretschmann)?;
-                for (name, numbers) in [
-                    ("metric", metric.components),
-                    ("inverse", metric.inverse),
-                    ("christoffel", geometry.connection.symbols),
-                    ("riemann", curvature.riemann),
-                    ("ricci", curvature.ricci),
-                    ("einstein", curvature.einstein),
-                    ("weyl", curvature.weyl),
-                ] {
-                    result.set_item(name, numbers.into_pyarray(py))?;
-                }
-                Ok(result.into_any())
+            for points in chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed)) {
+                geometries(model, points, &velocity)?.into_iter().for_each(|one| found.push(n, one));
             }
-        });
-        result.collect()
+            Ok(found)
+        })?;
+        let Geometries { numbers, signatures, failures } = found.map_err(|error: GeometryError| value(error))?;
+        let arrays = PyDict::new(py);
+        for ((name, _), numbers) in FIELDS.iter().zip(numbers) {
+            arrays.set_item(name, numbers.into_pyarray(py))?;
+        }
+        Ok((arrays, signatures.into_pyarray(py), failures))
     }
 
     /// Point symmetries, as JSON.
