@@ -69,6 +69,7 @@ def formula(
     bootstraps: int = 40,
     seed: int = 0,
     threads: int | None = None,
+    between: str | None = None,
     name: str = "formula",
 ) -> Formula:
     """The Lagrangian of recorded motion as a formula.
@@ -82,8 +83,8 @@ def formula(
     noise : sequence of float, optional
         Standard deviation of the noise of every coordinate in SI units; estimated by default.
     basis : str, optional
-        Functions that terms are made of, by family and total degree; ``"polynomial:2,trigonometric:2"`` by default, ``radial`` and
-        ``reciprocal`` are others.
+        Functions that terms are made of, by family and total degree, such as ``"polynomial:2,trigonometric:2"``; ``radial`` and
+        ``reciprocal`` are others. By default larger and larger ones, until one explains the motion.
     functions : sequence of str
         Functions of the coordinates beside them, such as ``"exp(-x)"``.
     gyroscopic : bool
@@ -94,13 +95,15 @@ def formula(
         Resamplings of the trajectories that give every term a probability, 10000 at most.
     threads : int, optional
         Threads; the result does not depend on them.
+    between : str, optional
+        Known forces between the samples, as in `identify`; what meets the motion best by default.
     name : str
         Name of the system that the formula makes.
     """
     more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
     noise = None if noise is None else doubles_list("noise", noise, positive=True)
-    choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name)
+    choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between)
     return read_formula(_lnn.formula(motion, choices))
 
 
@@ -201,11 +204,12 @@ def formula_choices(
     seed: int,
     threads: int | None,
     name: str,
+    between: str | None = None,
 ) -> str:
     """Choices of a search as the library takes them."""
     given: dict[str, Any] = {"basis": basis, "functions": names("functions", functions), "gyroscopic": bool(gyroscopic)}
     given |= {"friction": bool(friction), "noise": noise, "scale": scale, "bootstraps": whole("bootstraps", bootstraps, 1, 10_000)}
-    return as_json(given | {"seed": whole("seed", seed), "threads": thread_count(threads), "name": str(name)})
+    return as_json(given | {"seed": whole("seed", seed), "threads": thread_count(threads), "name": str(name), "between": between})
 
 
 def read_formula(text: str) -> Formula:
@@ -227,6 +231,13 @@ def read_formula(text: str) -> Formula:
         residual=number(found["residual"]),
         noise=np.array(found["noise"], float),
         noise_resolved=found["noise_resolved"],
+        several=found["several"],
+        rival=None if found["rival"] is None else (tuple(found["rival"]["terms"]), found["rival"]["cost"]),
+        blocks=tuple(map(tuple, found["blocks"])),
+        basis=found["basis"],
+        tried=tuple(found["tried"]),
+        doubts=tuple(found["doubts"]),
+        notes=tuple(found["notes"]),
         left=tuple(map(tuple, found["left"])),
         searched=found["searched"],
         removed=found["removed"],

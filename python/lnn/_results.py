@@ -265,7 +265,15 @@ class Formula:
     Attributes
     ----------
     verdict : str
-        ``"found"``, or ``"not in the library"``.
+        ``"found"``, ``"not in the library"``, or ``"undecided"`` for the reasons of `doubts`.
+    several : bool
+        Whether other formulas explain the motion as well; `rival` is the next best one, its terms and its cost in units of noise.
+    blocks : tuple of tuple of str
+        Coordinates in groups that do not act on each other: the masses of one group relative to those of another are not determined.
+    basis, tried : str, tuple of str
+        Functions that the formula was found among, and all that were searched.
+    doubts, notes : tuple of str
+        Why the verdict is in doubt, and what else is to be known of the search.
     lagrangian, dissipation : str
         L, and Rayleigh's function D, in the grammar of system files.
     terms : tuple of str
@@ -300,6 +308,13 @@ class Formula:
     residual: float
     noise: np.ndarray
     noise_resolved: bool
+    several: bool
+    rival: tuple[tuple[str, ...], float] | None
+    blocks: tuple[tuple[str, ...], ...]
+    basis: str
+    tried: tuple[str, ...]
+    doubts: tuple[str, ...]
+    notes: tuple[str, ...]
     left: tuple[tuple[str, float, float, float, int], ...]
     searched: int
     removed: int

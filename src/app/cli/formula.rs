@@ -1,6 +1,7 @@
 //! `lnn formula`: the Lagrangian of recorded motion, or of a model, as a formula.
 
 use crate::cli::files::OutputFile;
+use crate::cli::identify::Way;
 use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
@@ -10,6 +11,8 @@ use crate::formula::{
     Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, formula_of_model,
     formula_of_motion,
 };
+use crate::identification::Between;
+use crate::recording::LoadedRecording;
 use crate::report::formula_text;
 use std::path::{Path, PathBuf};
 
@@ -20,9 +23,10 @@ pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
     /// Functions that terms are made of, by family and total degree: polynomial, trigonometric (of sums and differences of
-    /// angles too), radial, reciprocal.
-    #[arg(long, value_name = "FAMILY:DEGREE,..", default_value = "polynomial:2,trigonometric:2", value_parser = families)]
-    basis: Families,
+    /// angles too), radial, reciprocal [default: of motion larger and larger ones until one explains it, of a model
+    /// polynomial:2,trigonometric:2].
+    #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = families)]
+    basis: Option<Families>,
     /// A function of the coordinates beside them, such as exp(-x); may be repeated.
     #[arg(long, value_name = "FORMULA", allow_hyphen_values = true)]
     function: Vec<String>,
@@ -35,6 +39,9 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
+    /// Known forces between the samples [default: what meets the motion best].
+    #[arg(long, value_enum, value_name = "WAY")]
+    between: Option<Way>,
     /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
     /// the forces where they are known].
     #[arg(long, value_name = "TERM=VALUE", value_parser = scale)]
@@ -117,6 +124,7 @@ impl Args {
             gyroscopic: !self.no_gyroscopic,
             friction: self.friction,
             noise: self.noise.clone(),
+            between: self.between.map(Between::from),
             scale: self.scale.clone(),
             bootstraps: self.bootstraps,
             seed: self.seed,
@@ -175,13 +183,15 @@ fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
     let units = args.recording.meaning().coordinate_units();
-    formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? }).map_err(refused)
+    formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
+        .map_err(|error| in_file(error, &reading))
 }
 
 fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     let columns = [
         ("--coords", args.recording.coords.is_empty()),
         ("--noise", args.noise.is_none()),
+        ("--between", args.between.is_none()),
         ("--trajectory", args.recording.trajectory.is_none()),
     ];
     if let Some((option, _)) = columns.iter().find(|(_, unused)| !unused) {
@@ -193,6 +203,16 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     let (units, time_unit) = probe.units();
     let options = FormulaOptions { units, time_unit, ..args.options()? };
     formula_of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)
+}
+
+/// [`refused`], with the row of the file.
+fn in_file(error: FormulaError, reading: &LoadedRecording) -> CliError {
+    match &error {
+        FormulaError::Wild { track, sample, .. } => {
+            CliError::data(format_args!("row {}: {error}", reading.rows[*track].row(*sample)))
+        }
+        _ => refused(error),
+    }
 }
 
 /// What the user chose, or what the data are.

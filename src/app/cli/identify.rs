@@ -90,7 +90,7 @@ impl From<Met> for Targets {
 
 /// Known forces between the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Way {
+pub(crate) enum Way {
     /// As they were at the sample before.
     Held,
     /// On straight lines.

@@ -52,7 +52,8 @@ pub fn formula_of_model(
     (q, v): (&[f64], &[f64]),
     options: &FormulaOptions,
 ) -> Result<FoundFormula, FormulaError> {
-    let extent = Extent { families: options.families, gyroscopic: options.gyroscopic, friction: options.friction };
+    let families = options.families.unwrap_or_default();
+    let extent = Extent { families, gyroscopic: options.gyroscopic, friction: options.friction };
     let library = Library::new(names, periodic, extent, &options.functions)?;
     let n = library.n();
     let mut rng = RngStream::Region.generator(options.seed);
@@ -121,11 +122,15 @@ pub fn formula_of_model(
     let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
     let m = choice.set.len();
     let rest = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
-    // The motion leaves the common factor free.
+    // The motion leaves the common factor of every group free.
     let weight =
         (0..m).map(|k| normal.matrix[k * m + k] * choice.coefficients[choice.set[k]].powi(2)).fold(0.0, f64::max);
-    let pinned: Vec<f64> =
-        (0..m * m).map(|at| normal.matrix[at] + weight * normal.size[at / m] * normal.size[at % m]).collect();
+    let mut pinned = normal.matrix.clone();
+    for group in windows.groups(&choice.set) {
+        for &i in &group.places {
+            group.places.iter().for_each(|&j| pinned[i * m + j] += weight * normal.size[i] * normal.size[j]);
+        }
+    }
     let covariance = inverse_with(m, &pinned, RIDGE).unwrap_or(vec![f64::NAN; m * m]);
     let covariance: Vec<f64> = covariance.into_iter().map(|x| x * rest).collect();
     let of = Model {
@@ -139,6 +144,7 @@ pub fn formula_of_model(
     found.residual = residual;
     found.noise = sigma;
     found.searched = (library.searched, quotient.removed);
+    (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
     (found.bounds, found.speeds) = (bounds, speeds);
     found.rescale(options.scale.as_ref())?;
     found.name_constants();
@@ -239,7 +245,8 @@ fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64],
         let normal = windows.normal(&choice.coefficients, &all, sigma, &used);
         let mut places: Vec<usize> = (0..all.len()).collect();
         while places.len() > choice.set.len() {
-            let Some(costs) = normal.of(&places).costs(windows.driven()) else { break };
+            let left: Vec<usize> = places.iter().map(|&k| all[k]).collect();
+            let Some(costs) = normal.of(&places).costs(&windows.groups(&left)) else { break };
             let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
             places.remove(gone);
         }
@@ -288,7 +295,7 @@ mod tests {
         let mut draw =
             |low: f64, high: f64| (0..400).map(|_| low + (high - low) * rng.random::<f64>()).collect::<Vec<f64>>();
         let (q, v) = (draw(0.5, 2.0), draw(-1.0, 1.0));
-        let families = "polynomial:1,radial:2".parse().unwrap();
+        let families = Some("polynomial:1,radial:2".parse().unwrap());
         let options = FormulaOptions { families, units: vec!["m".to_string(); 2], ..FormulaOptions::default() };
         let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
         let seen: Vec<(&str, &str, Option<&str>)> =

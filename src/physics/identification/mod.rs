@@ -45,7 +45,7 @@ pub use found::{Combination, Constant, Identified, Residual, Undetermined};
 pub use found::{Outlier, SensorConstant};
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
-pub(crate) use stages::{choose_steps, joined, spread_of};
+pub(crate) use stages::{choose_steps, joined, spread_of, thinned};
 
 use crate::cancellation::Cancellation;
 use crate::recording::Targets;

@@ -288,16 +288,20 @@ fn cut(recording: &Recording, smoothed: &[Option<Smoothed>], samples: usize, n: 
             segments.push(Segment { track, first, samples: end - first, start: [q, v].concat() });
         }
     }
+    thinned(segments)
+}
+
+/// Segments of as many samples as are followed: runs of segments that follow each other, so that they can be joined later.
+pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
+    const RUN: usize = 16;
     let all: usize = segments.iter().map(|segment| segment.samples).sum();
-    if all > MOST_SAMPLES {
-        // Runs of segments that follow each other, so that they can be joined later.
-        const RUN: usize = 16;
-        let runs = segments.len().div_ceil(RUN);
-        let kept = (runs * MOST_SAMPLES / all).max(1);
-        let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
-        segments = segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect();
+    if all <= MOST_SAMPLES {
+        return segments;
     }
-    segments
+    let runs = segments.len().div_ceil(RUN);
+    let kept = (runs * MOST_SAMPLES / all).max(1);
+    let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
+    segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }
 
 /// The fit of the first segments; those that cannot be followed are left out.
