@@ -213,6 +213,10 @@ class Constraints:
         Trajectories, and candidates that did not hold on those that were left out.
     noise : (n,)
         Of each coordinate over its size: smaller deviations are not seen.
+    still : dict of str to str
+        Columns that do not move, in words; they take no part.
+    limits : list of str
+        Where the search was cut short, in words.
     """
 
     count: int
@@ -221,11 +225,13 @@ class Constraints:
     trajectories: int
     refuted: int
     noise: np.ndarray
+    still: dict[str, str]
+    limits: list[str]
 
     @property
     def formulas(self) -> dict[str, str]:
         """Formulas of the constraints of the system, as `System` takes them under ``constraints``."""
-        of_system = [found.formula for found in self.constraints if found.kind != "per-trajectory"]
+        of_system = [found.formula for found in self.constraints if found.kind in ("holonomic", "nonholonomic")]
         return {f"found {k + 1}": text for k, text in enumerate(of_system)}
 
 

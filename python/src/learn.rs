@@ -185,7 +185,7 @@ struct Choices {
 }
 
 /// Keys of the configuration of a fit that are decided before its data are divided.
-const EARLY: [&str; 5] = ["targets", "held_out", "window", "noise", "constraints"];
+const EARLY: [&str; 6] = ["targets", "held_out", "window", "noise", "between", "constraints"];
 
 impl Choices {
     /// The choices that come before the configuration of a fit, taken out of the changes.
@@ -196,8 +196,8 @@ impl Choices {
         let given =
             EARLY.iter().filter_map(|key| self.changes.remove(*key).map(|new| (key.to_string(), new))).collect();
         let config = FitConfig { constraints: self.constraints.clone(), ..FitConfig::default() };
-        let FitConfig { targets, held_out, window, noise, constraints, .. } = changed(&config, &given)?;
-        Ok(FitOptions { targets, held_out, window, noise, constraints, seed: self.seed })
+        let FitConfig { targets, held_out, window, noise, between, constraints, .. } = changed(&config, &given)?;
+        Ok(FitOptions { targets, held_out, window, noise, between, constraints, seed: self.seed })
     }
 }
 

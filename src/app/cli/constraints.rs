@@ -111,7 +111,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), CliError> {
     let constraints = found.formulas();
     if constraints.is_empty() {
-        return Err(CliError::data("--out: no constraints were found: there is nothing to write"));
+        return Err(CliError::data("--out: no constraint was found within the noise: there is nothing to write"));
     }
     let text = toml::to_string(&Table { constraints }).map_err(CliError::data)?;
     out.write(text.as_bytes())
@@ -124,11 +124,13 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         ConstraintKind::Holonomic => "holonomic",
         ConstraintKind::Nonholonomic => "nonholonomic",
         ConstraintKind::PerTrajectory => "per trajectory",
+        ConstraintKind::Nearly => "nearly",
+        ConstraintKind::Branching => "branching",
     };
     let on = pluralize(found.trajectories, "trajectory", "trajectories");
     let _ = match found.count {
         0 => writeln!(text, "no constraints found on {on}"),
-        count => writeln!(text, "{} found on {on}", pluralize(count, "constraint", "constraints")),
+        count => writeln!(text, "{} found within the noise on {on}", pluralize(count, "constraint", "constraints")),
     };
     let row = |found: &FoundConstraint| {
         let sign = if found.kind == ConstraintKind::PerTrajectory { "const" } else { "0" };
@@ -144,8 +146,27 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         .map(|(name, &noise)| format!("{name} {}", percent(noise.max(1e-6))))
         .collect();
     let _ = writeln!(text, "\nsmaller deviations are not seen than the noise: {}", noise.join(", "));
+    for (column, how) in &found.still {
+        let _ = writeln!(text, "{column} {how}: it takes no part");
+    }
+    let has = |kind| found.constraints.iter().any(|found| found.kind == kind);
+    if has(ConstraintKind::Nearly) {
+        let _ = writeln!(
+            text,
+            "nearly: vanishes, but by more than the noise explains; something stiff, or a curve that looks straight"
+        );
+    }
+    if has(ConstraintKind::Branching) {
+        let _ = writeln!(
+            text,
+            "branching: its gradient vanishes along the motion, where a second branch begins; no roll-out can be held by it"
+        );
+    }
     if let Some(gap) = found.gap {
         let _ = writeln!(text, "the next combination of coordinates varies by {} times as much", rounded(gap, 3));
+    }
+    for limit in &found.limits {
+        let _ = writeln!(text, "{limit}");
     }
     if found.refuted > 0 {
         let what = pluralize(found.refuted, "candidate does", "candidates do");
@@ -225,6 +246,12 @@ pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
     if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
 }
 
+/// Where the constraints of a file stand in it.
+fn lines(file: &Path) -> Result<impl Fn(&str) -> usize, CliError> {
+    let lines = config::lines(&config::read_text(file)?.1);
+    Ok(move |name: &str| lines.get(&format!("constraints.{name}")).copied().unwrap_or(usize::MAX))
+}
+
 /// The model under the constraints of a file's table, as far as these are independent at some states.
 ///
 /// # Errors
@@ -244,6 +271,7 @@ pub fn constrained<S: Scalar>(
     let plain = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
     let constraints =
         FormulaConstraints::new(&columns[..columns.len() / 2], formulas).map_err(|error| wrong(&error))?;
+    let constraints = constraints.in_order(lines(file)?);
     let (constraints, _) = constraints.independent(&plain(q), &plain(v)).map_err(|error| wrong(&error))?;
     constraints.constrain(model).map_err(|error| wrong(&error))
 }

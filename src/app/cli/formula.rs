@@ -1,7 +1,6 @@
 //! `lnn formula`: the Lagrangian of recorded motion, or of a model, as a formula.
 
 use crate::cli::files::OutputFile;
-use crate::cli::identify::Way;
 use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
@@ -41,7 +40,7 @@ pub struct Args {
     noise: Option<Vec<f64>>,
     /// Known forces between the samples [default: what meets the motion best].
     #[arg(long, value_enum, value_name = "WAY")]
-    between: Option<Way>,
+    between: Option<Between>,
     /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
     /// the forces where they are known].
     #[arg(long, value_name = "TERM=VALUE", value_parser = scale)]
@@ -124,7 +123,7 @@ impl Args {
             gyroscopic: !self.no_gyroscopic,
             friction: self.friction,
             noise: self.noise.clone(),
-            between: self.between.map(Between::from),
+            between: self.between,
             scale: self.scale.clone(),
             bootstraps: self.bootstraps,
             seed: self.seed,

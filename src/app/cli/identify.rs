@@ -49,7 +49,7 @@ pub struct Args {
     targets: Option<Met>,
     /// Known forces between the samples [default: what meets the motion best].
     #[arg(long, value_enum, value_name = "WAY")]
-    between: Option<Way>,
+    between: Option<Between>,
     /// Length of the segments that are followed, in s [default: what makes the constants best known].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = seconds)]
     segment: Option<f64>,
@@ -88,30 +88,6 @@ impl From<Met> for Targets {
     }
 }
 
-/// Known forces between the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Way {
-    /// As they were at the sample before.
-    Held,
-    /// On straight lines.
-    Linear,
-    /// On curves of the third degree through the four nearest samples.
-    Cubic,
-    /// Without frequencies above half the rate of the samples.
-    BandLimited,
-}
-
-impl From<Way> for Between {
-    fn from(way: Way) -> Self {
-        match way {
-            Way::Held => Self::Held,
-            Way::Linear => Self::Linear,
-            Way::Cubic => Self::Cubic,
-            Way::BandLimited => Self::BandLimited,
-        }
-    }
-}
-
 /// Columns are those of the system unless others are named.
 fn of_the_system(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
@@ -146,7 +122,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         delays: args.delay.clone(),
         noise: args.noise.clone(),
         targets: args.targets.map(Targets::from),
-        between: args.between.map(Between::from),
+        between: args.between,
         segment: args.segment,
         robust: args.robust,
         threads: threads(args.threads),
@@ -377,12 +353,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         text += &format!(" in {segments} of {} s", number(found.segment_seconds));
     }
     if let Some(between) = found.between {
-        let way = match between {
-            Between::Held => "held",
-            Between::Linear => "linear",
-            Between::Cubic => "cubic",
-            Between::BandLimited => "band-limited",
-        };
+        let way = between.name();
         text += &format!(", forces {way} between the samples");
     }
     text += "\n";

@@ -129,7 +129,7 @@ pub fn evaluate_hold_out(
         .estimated()
         .iter()
         .zip(&plan.part.states)
-        .flat_map(|(e, states)| Window::cut(e.track, (e.q, e.v), states.interior(), n, horizon))
+        .flat_map(|(e, states)| Window::cut(*e, states.interior(), n, horizon))
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();

@@ -49,22 +49,8 @@ pub(crate) use stages::{choose_steps, joined, spread_of, thinned};
 
 use crate::cancellation::Cancellation;
 use crate::recording::Targets;
-use serde::{Deserialize, Serialize};
-
-/// Known forces between the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Between {
-    /// Each as it was at the sample before: zero-order hold, what a converter or a controller does.
-    Held,
-    /// On straight lines.
-    Linear,
-    /// On curves of the third degree, each through the four nearest samples: for forces that are smooth from sample to sample.
-    Cubic,
-    /// By the smooth curve without frequencies above half the rate of the samples: a windowed sum of `sin(x)/x`.
-    BandLimited,
-}
+pub use crate::rollout::Between;
+use serde::Deserialize;
 
 /// What is identified, and how.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
