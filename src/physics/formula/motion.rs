@@ -4,7 +4,7 @@
 use super::find::Prepared;
 use super::library::{Library, Values};
 use crate::identification::linear::times;
-use crate::identification::{Between, Course, Problem, Segment, choose_steps};
+use crate::identification::{Between, Course, Disturbances, Problem, Segment, choose_steps};
 use crate::lagrangian::system::Range;
 use crate::linalg::{self, Workspace, dot};
 use std::collections::BTreeMap;
@@ -134,6 +134,7 @@ impl Motion<'_> {
             sigma_of: data.sigma_of.clone(),
             spread: data.spread.clone(),
             robust: true,
+            disturbances: Disturbances::default(),
             threads: self.threads,
         };
         Some(work(&mut problem, x))
