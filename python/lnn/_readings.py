@@ -185,6 +185,7 @@ def identify(
     found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
     found["combinations"] = tuple(Combination(dict(sum.pop("terms")), **sum) for sum in found["combinations"])
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
+    found["force_noise"] = tuple(found["force_noise"])
     found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)
 

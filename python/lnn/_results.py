@@ -509,11 +509,15 @@ class Identified:
     over_noise : float
         Residuals over the noise, root mean square, all coordinates together.
     explained : bool
-        Whether residuals are as large as the noise and white: the form explains the motion.
+        Whether the form explains the motion.
+    verdict : dict
+        Why: the ``kind`` of the verdict, with the numbers behind it.
     outliers : tuple of Outlier
         The farthest first, 100 at most of `outlier_count`.
     inflation : float
-        Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+        Mean factor by which variances are larger than those of independent residuals; 1 for these.
+    force_noise : tuple of float
+        Standard deviation of the noise of the known forces, as the motion shows it; empty if it shows none.
     samples, segments, segment_seconds, substeps
         Samples and segments that were followed, the usual length of these in s, integration steps from sample to sample.
     between : str or None
@@ -528,9 +532,11 @@ class Identified:
     residuals: dict[str, Residual]
     over_noise: float
     explained: bool
+    verdict: dict
     outliers: tuple[Outlier, ...]
     outlier_count: int
     inflation: float
+    force_noise: tuple[float, ...]
     samples: int
     segments: int
     segment_seconds: float

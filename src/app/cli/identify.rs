@@ -249,8 +249,11 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
             "coordinates": found.residuals,
             "over_noise": found.over_noise,
             "explained": found.explained,
+            "verdict": found.verdict,
+            "says": found.verdict.to_string(),
             "inflation": found.inflation,
         },
+        "force_noise": found.force_noise,
         "outliers": outliers,
         "outlier_count": found.outlier_count,
         "samples": found.samples,
@@ -328,7 +331,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         text += &format!("\ncorrelations of errors beyond 0.9: {}\n", listed.collect::<Vec<_>>().join(", "));
     }
     let rows = found.residuals.iter().map(|r| {
-        let white = if r.white { "as noise" } else { "not noise" };
+        let white = if r.white { "independent" } else { "correlated" };
         vec![
             r.coordinate.clone(),
             number(r.rms),
@@ -341,12 +344,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let what = if found.segments == 0 { "force on" } else { "coordinate" };
     let headers = [what, "residual", "noise", "spread", "of neighbours", ""];
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
-    text += match found.explained {
-        true => "the form explains what was measured\n",
-        false => {
-            "the form does not explain what was measured: something is missing, and errors are those of a wrong form\n"
-        }
-    };
+    text += &format!("{}\n", found.verdict);
     text += &pluralize(found.samples, "sample", "samples");
     if found.segments > 0 {
         let segments = pluralize(found.segments, "segment", "segments");
@@ -355,6 +353,10 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     if let Some(between) = found.between {
         let way = between.name();
         text += &format!(", forces {way} between the samples");
+    }
+    if !found.force_noise.is_empty() {
+        let sizes: Vec<String> = found.force_noise.iter().map(|size| rounded(*size, 2)).collect();
+        text += &format!(", noise of forces {}", sizes.join(", "));
     }
     text += "\n";
     if found.outlier_count > 0 {

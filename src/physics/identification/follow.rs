@@ -49,6 +49,16 @@ impl State {
         Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
     }
 
+    /// Slopes of positions and velocities by the starts, `(lanes, 2n, 2n)`, of derivatives with `columns` numbers.
+    pub fn by_starts(&self, n: usize, columns: usize) -> Vec<f64> {
+        let lane = |(q, v): (&[f64], &[f64])| {
+            let rows = q.chunks_exact(columns).chain(v.chunks_exact(columns));
+            rows.flat_map(|row| &row[..2 * n]).copied().collect::<Vec<f64>>()
+        };
+        let lanes = self.q_slopes.chunks_exact(n * columns).zip(self.v_slopes.chunks_exact(n * columns));
+        lanes.flat_map(lane).collect()
+    }
+
     /// `from` moved by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
     fn moved(&mut self, from: &Self, (h, widths): (&[f64], [usize; 2]), along: &Self) {
         let [n, columns] = widths;

@@ -25,11 +25,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bootstrap;
 mod by_forces;
+mod covariance;
 mod determined;
 mod error;
 mod follow;
 mod found;
+mod innovations;
 pub(crate) mod linear;
 mod quality;
 mod smoothed;
@@ -37,15 +40,18 @@ mod solve;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod verdict;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
 pub use found::{Combination, Constant, Identified, Residual, Undetermined};
 #[doc(hidden)]
 pub use found::{Outlier, SensorConstant};
+pub(crate) use innovations::Disturbances;
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
 pub(crate) use stages::{choose_steps, joined, spread_of, thinned};
+pub use verdict::Verdict;
 
 use crate::cancellation::Cancellation;
 use crate::recording::Targets;
