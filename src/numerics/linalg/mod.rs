@@ -37,6 +37,8 @@ pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
 pub(crate) use components::components;
 #[doc(hidden)]
+pub use components::components;
+#[doc(hidden)]
 pub use condition::condition_number;
 pub use eigen::{eigenvalues, eigh};
 pub use inertia::Inertia;
