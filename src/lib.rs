@@ -37,6 +37,7 @@
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
+//! | end a long search, or see how far it is | [`cancellation::Cancellation`] |
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! [`prelude`] holds the names that most programs need. Internally, the modules are arranged on six floors, `numerics`, `support`,

@@ -24,9 +24,12 @@ pub struct SearchProgress {
 
 impl fmt::Display for SearchProgress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, iteration {}", self.stage, self.iteration)?;
+        f.write_str(self.stage)?;
+        if self.iteration > 0 {
+            write!(f, ", iteration {}", self.iteration)?;
+        }
         self.residual.map_or(Ok(()), |residual| write!(f, ", residual {residual:.3} of the noise"))?;
-        write!(f, ", {} batches", self.pieces)
+        if self.pieces > 0 { write!(f, ", batch {}", self.pieces) } else { Ok(()) }
     }
 }
 

@@ -63,7 +63,7 @@ impl CliError {
         if error.kind() == io::ErrorKind::BrokenPipe {
             return Self { kind: Kind::ClosedPipe, message: "standard output was closed".to_string() };
         }
-        Self::data(format_args!("standard output: {error}"))
+        Self::data(format_args!("standard output: cannot write: {error}"))
     }
     /// Signals that cannot be watched for.
     pub fn signals(error: io::Error) -> Self {

@@ -3,6 +3,7 @@
 use crate::cli::CliError;
 use crate::cli::files::OutputFile;
 use crate::cli::learned::{Learned, model_file};
+use crate::cli::motion::place;
 use crate::report::page;
 use std::path::PathBuf;
 
@@ -31,5 +32,5 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let system = learned.system(&path).ok();
     let text = page(&learned.header, &learned.network, system.as_ref()).map_err(|e| CliError::file(&path, e))?;
     out.write(text.as_bytes())?;
-    OutputFile::print(Some(out), &format!("{}: {} kB\n", args.out.display(), text.len().div_ceil(1000)))
+    OutputFile::print(Some(out), &format!("{}: {} kB\n", place(&args.out), text.len().div_ceil(1000)))
 }

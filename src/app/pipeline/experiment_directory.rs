@@ -100,7 +100,9 @@ impl LockedDirectory {
     pub(crate) fn remove(&self, name: &str) -> Result<(), PipelineError> {
         let path = self.directory.path().join(name);
         match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(PipelineError::output(&path, error)),
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                Err(PipelineError::output(&path, format_args!("cannot remove: {error}")))
+            }
             _ => Ok(()),
         }
     }
