@@ -491,12 +491,12 @@ impl Subject {
             for points in chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed)) {
                 geometries(model, points, &velocity)?.into_iter().for_each(|one| found.push(n, one));
             }
-            Ok(found)
+            Ok::<_, GeometryError>(found)
         })?;
-        let Geometries { numbers, signatures, failures } = found.map_err(|error: GeometryError| value(error))?;
+        let Geometries { numbers, signatures, failures } = found.map_err(value)?;
         let arrays = PyDict::new(py);
         for ((name, _), numbers) in FIELDS.iter().zip(numbers) {
-            arrays.set_item(name, numbers.into_pyarray(py))?;
+            arrays.set_item(*name, numbers.into_pyarray(py))?;
         }
         Ok((arrays, signatures.into_pyarray(py), failures))
     }
