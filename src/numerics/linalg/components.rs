@@ -1,28 +1,17 @@
-//! Connected components: which of `n` things act on each other, directly or through others.
+//! Connected components of what acts on each other.
 
-/// Groups of `0..n` that no coupling joins: each ascending, in the order of their first members. A coupling that holds in either order
-/// joins both.
-pub(crate) fn components(n: usize, coupled: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
-    let mut seen = vec![false; n];
-    let mut groups = Vec::new();
-    for first in 0..n {
-        if std::mem::replace(&mut seen[first], true) {
-            continue;
-        }
-        let (mut group, mut next) = (vec![first], 0);
-        while let Some(&i) = group.get(next) {
-            next += 1;
-            for j in 0..n {
-                if !seen[j] && (coupled(i, j) || coupled(j, i)) {
-                    seen[j] = true;
-                    group.push(j);
-                }
-            }
-        }
-        group.sort_unstable();
-        groups.push(group);
+/// Indices below `n` in groups that no pair joins, `(first, second)` being joined; ascending, by their first member.
+///
+/// Coordinates of a Lagrangian that is a sum over such groups do not act on each other, and every group has a common factor of its own that
+/// motion leaves free.
+pub fn components(n: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Vec<Vec<usize>> {
+    let mut label: Vec<usize> = (0..n).collect();
+    for (a, b) in pairs {
+        let (low, high) = (label[a].min(label[b]), label[a].max(label[b]));
+        label.iter_mut().filter(|label| **label == high).for_each(|label| *label = low);
     }
-    groups
+    let group = |root: usize| (0..n).filter(|&i| label[i] == root).collect::<Vec<_>>();
+    (0..n).map(group).filter(|group| !group.is_empty()).collect()
 }
 
 #[cfg(test)]
@@ -30,10 +19,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chains_join_and_nothing_else_does() {
-        let of = |n: usize, pairs: &[(usize, usize)]| components(n, |i, j| pairs.contains(&(i, j)));
-        assert_eq!(of(0, &[]), Vec::<Vec<usize>>::new());
-        assert_eq!(of(3, &[]), [[0], [1], [2]]);
-        assert_eq!(of(5, &[(4, 2), (0, 4), (3, 3)]), [vec![0, 2, 4], vec![1], vec![3]]);
+    fn what_is_joined_by_others_is_one_group() {
+        assert_eq!(components(5, [(4, 1), (3, 1), (0, 0)]), [vec![0], vec![1, 3, 4], vec![2]]);
+        assert!(components(0, []).is_empty());
     }
 }

@@ -39,6 +39,8 @@ pub(crate) use batch::{Buffer, LANES};
 #[cfg(feature = "rollout")]
 pub(crate) use components::components;
 #[doc(hidden)]
+pub use components::components;
+#[doc(hidden)]
 pub use condition::condition_number;
 pub use eigen::{eigenvalues, eigh};
 pub use inertia::Inertia;

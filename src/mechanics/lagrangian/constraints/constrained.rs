@@ -10,21 +10,15 @@ use crate::scalar::{Dd, Real, Scalar};
 /// A row at unit length whose part beside the rows before it is below this at every state follows from them.
 const REDUNDANT: f64 = 1e-6;
 
-/// What there is to say of a constraint that no state satisfies.
-fn missed(defect: f64) -> String {
-    if defect.is_finite() {
-        format!("contradicts the others: the nearest states miss it by {defect:.3e}")
-    } else {
-        "is not finite at any of the states that were tried".to_string()
-    }
-}
-
 /// Why constraints leave no motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintError {
     /// No state was found that satisfies all of them.
-    #[error("constraint `{name}` {}", missed(*defect))]
+    #[error("constraint `{name}` {}", match defect.is_finite() {
+        true => format!("contradicts the others: the nearest states miss it by {defect:.3e}"),
+        false => "is not finite at any of the states that were tried".to_string(),
+    })]
     Contradiction {
         /// The constraint that is missed most.
         name: String,
