@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _lnn
-from ._arrays import thread_count
+from ._arrays import as_json, doubles_list, names, real, thread_count, whole
 from ._recorded import recorded
 from ._mechanics import System
 from ._results import Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
@@ -42,7 +42,8 @@ def find_constraints(
     """
     more = {"dt": dt, "t": t, "v": v, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
-    found = json.loads(_lnn.find_constraints(motion, (degree, velocity_degree)))
+    degrees = whole("degree", degree, 1, 8), whole("velocity_degree", velocity_degree, 0, 8)
+    found = json.loads(_lnn.find_constraints(motion, degrees))
     of = lambda c: Constraint(**{**c, "range": {name: tuple(ends) for name, ends in c["range"].items()}})
     found["constraints"], found["noise"] = tuple(map(of, found["constraints"])), np.array(found["noise"])
     return Constraints(**found)
@@ -101,7 +102,7 @@ def formula(
     """
     more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
-    noise = None if noise is None else [float(x) for x in noise]
+    noise = None if noise is None else doubles_list("noise", noise, positive=True)
     choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between)
     return read_formula(_lnn.formula(motion, choices))
 
@@ -172,10 +173,11 @@ def identify(
     more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
     named = {"constants": constants, "offsets": offsets, "gains": gains, "delays": delays}
-    choices: dict[str, Any] = {key: [str(name) for name in names] for key, names in named.items()}
-    choices |= {"noise": None if noise is None else [float(x) for x in noise], "targets": targets, "between": between, "robust": bool(robust)}
-    choices |= {"segment": None if segment is None else float(segment), "threads": thread_count(threads)}
-    found = json.loads(_lnn.identify(motion, system._subject, json.dumps(choices)))
+    choices: dict[str, Any] = {key: names(key, given) for key, given in named.items()}
+    choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
+    choices["segment"] = None if segment is None else real("segment", segment, positive=True)
+    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads)}
+    found = json.loads(_lnn.identify(motion, system._subject, as_json(choices)))
     found["constants"] = {constant["symbol"]: IdentifiedConstant(**constant) for constant in found["constants"]}
     found["sensors"] = tuple(SensorConstant(**sensor) for sensor in found["sensors"])
     unknowns = len(found["constants"]) + len(found["sensors"])
@@ -183,6 +185,7 @@ def identify(
     found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
     found["combinations"] = tuple(Combination(dict(sum.pop("terms")), **sum) for sum in found["combinations"])
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
+    found["force_noise"] = tuple(found["force_noise"])
     found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)
 
@@ -205,9 +208,9 @@ def formula_choices(
     between: str | None = None,
 ) -> str:
     """Choices of a search as the library takes them."""
-    given: dict[str, Any] = {"basis": basis, "functions": list(functions), "gyroscopic": gyroscopic, "friction": friction, "noise": noise}
-    given |= {"scale": scale, "bootstraps": bootstraps, "seed": seed, "threads": thread_count(threads), "name": name, "between": between}
-    return json.dumps(given)
+    given: dict[str, Any] = {"basis": basis, "functions": names("functions", functions), "gyroscopic": bool(gyroscopic)}
+    given |= {"friction": bool(friction), "noise": noise, "scale": scale, "bootstraps": whole("bootstraps", bootstraps, 1, 10_000)}
+    return as_json(given | {"seed": whole("seed", seed), "threads": thread_count(threads), "name": str(name), "between": between})
 
 
 def read_formula(text: str) -> Formula:

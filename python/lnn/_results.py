@@ -213,6 +213,10 @@ class Constraints:
         Trajectories, and candidates that did not hold on those that were left out.
     noise : (n,)
         Of each coordinate over its size: smaller deviations are not seen.
+    still : dict of str to str
+        Columns that do not move, in words; they take no part.
+    limits : list of str
+        Where the search was cut short, in words.
     """
 
     count: int
@@ -221,11 +225,13 @@ class Constraints:
     trajectories: int
     refuted: int
     noise: np.ndarray
+    still: dict[str, str]
+    limits: list[str]
 
     @property
     def formulas(self) -> dict[str, str]:
         """Formulas of the constraints of the system, as `System` takes them under ``constraints``."""
-        of_system = [found.formula for found in self.constraints if found.kind != "per-trajectory"]
+        of_system = [found.formula for found in self.constraints if found.kind in ("holonomic", "nonholonomic")]
         return {f"found {k + 1}": text for k, text in enumerate(of_system)}
 
 
@@ -503,11 +509,15 @@ class Identified:
     over_noise : float
         Residuals over the noise, root mean square, all coordinates together.
     explained : bool
-        Whether residuals are as large as the noise and white: the form explains the motion.
+        Whether the form explains the motion.
+    verdict : dict
+        Why: the ``kind`` of the verdict, with the numbers behind it.
     outliers : tuple of Outlier
         The farthest first, 100 at most of `outlier_count`.
     inflation : float
-        Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+        Mean factor by which variances are larger than those of independent residuals; 1 for these.
+    force_noise : tuple of float
+        Standard deviation of the noise of the known forces, as the motion shows it; empty if it shows none.
     samples, segments, segment_seconds, substeps
         Samples and segments that were followed, the usual length of these in s, integration steps from sample to sample.
     between : str or None
@@ -522,9 +532,11 @@ class Identified:
     residuals: dict[str, Residual]
     over_noise: float
     explained: bool
+    verdict: dict
     outliers: tuple[Outlier, ...]
     outlier_count: int
     inflation: float
+    force_noise: tuple[float, ...]
     samples: int
     segments: int
     segment_seconds: float

@@ -21,9 +21,10 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
         }
     }
     let source = Source::of(motion)?;
-    whole(py, |_| {
+    whole(py, None, |watch| {
         let recording = source.read()?.recording;
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
+        let samples = samples.watched(&watch.cancellation());
         let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
         serde_json::to_string(&found).map_err(runtime)
     })?
@@ -32,9 +33,10 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
 /// The Lagrangian of recorded motion as a formula, as JSON.
 #[pyfunction]
 pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String> {
-    let (options, name) = FormulaChoices::read(choices)?;
+    let (mut options, name) = FormulaChoices::read(choices)?;
     let source = Source::of(motion)?;
-    whole(py, |_| {
+    whole(py, None, |watch| {
+        options.cancellation = watch.cancellation();
         let recording = source.read()?.recording;
         let n = recording.coordinates.len();
         if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
@@ -48,10 +50,11 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
 #[pyfunction]
 pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str) -> PyResult<String> {
     // The other choices have their types from Python.
-    let options: IdentifyOptions =
-        serde_json::from_str(choices).map_err(|error| value(format_args!("between: {error}")))?;
+    let mut options: IdentifyOptions =
+        serde_json::from_str(choices).map_err(|error| value(format_args!("targets, between: {error}")))?;
     let (source, instance) = (Source::of(motion)?, system.system_instance()?);
-    whole(py, |_| {
+    whole(py, None, |watch| {
+        options.cancellation = watch.cancellation();
         let loaded = source.read()?;
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?;
         let outliers: Vec<_> = found

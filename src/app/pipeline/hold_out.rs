@@ -8,10 +8,10 @@ use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
-use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::constraint_figures::constraint_figures;
 use crate::pipeline::energy::{Balance, balance, energy_figure};
 use crate::pipeline::force_errors::ForceError;
+use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot, text_table};
@@ -111,7 +111,7 @@ pub fn evaluate_hold_out(
     options: &HoldOutOptions<'_>,
     watch: &Watch,
 ) -> Result<HoldOut, PipelineError> {
-    let (cancellation, plan) = (&Cancellation::new(watch, WINDOWS), options);
+    let (judging, plan) = (&Judging::new(watch, WINDOWS), options);
     let (n, recording) = (model.coordinates(), &plan.part.recording);
     if recording.tracks.is_empty() {
         return Ok(HoldOut::nothing());
@@ -129,7 +129,7 @@ pub fn evaluate_hold_out(
         .estimated()
         .iter()
         .zip(&plan.part.states)
-        .flat_map(|(e, states)| Window::cut(e.track, (e.q, e.v), states.interior(), n, horizon))
+        .flat_map(|(e, states)| Window::cut(*e, states.interior(), n, horizon))
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();
@@ -139,9 +139,9 @@ pub fn evaluate_hold_out(
             let _ = project(manifold, q, v);
         }
     }
-    let watched = cancellation.watched(model);
+    let watched = judging.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
-    let predicted = HeldOutPredictions::new(model, windows, plan.threads, cancellation)?;
+    let predicted = HeldOutPredictions::new(model, windows, plan.threads, judging)?;
     let (windows, motion) = (&predicted.windows, &predicted.predictions);
     let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
@@ -179,7 +179,7 @@ pub fn evaluate_hold_out(
     }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, TIMES) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
-    cancellation.check()?;
+    judging.check()?;
     let (model, constant_velocity) = (tabled(motion), tabled(&straight));
     let apart = |predictions: &Predictions| -> Vec<Vec<f64>> {
         model.iter().map(|error| coordinate_errors(windows, predictions, periodic, error.seconds)).collect()

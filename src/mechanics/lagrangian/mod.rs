@@ -27,6 +27,7 @@ pub use configure::{SystemError, SystemInstance, build, configure, systems};
 pub use configure::{configure_system, configure_values, find};
 #[doc(hidden)]
 pub use constrained_systems::constrained_systems;
+pub(crate) use constraints::dot;
 #[cfg(feature = "data")]
 pub(crate) use constraints::take_out;
 #[cfg(feature = "training")]

@@ -35,6 +35,7 @@ mod solve;
 pub use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
+pub(crate) use components::components;
 #[doc(hidden)]
 pub use components::components;
 #[doc(hidden)]

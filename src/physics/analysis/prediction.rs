@@ -5,8 +5,9 @@
 
 use super::statistics::quantile;
 use super::{ValidTime, angle_difference, relative_error, valid_time};
+use crate::data::StateEstimate;
 use crate::lagrangian::EulerLagrange;
-use crate::recording::{RecordedTrajectory, hermite};
+use crate::recording::hermite;
 use crate::rollout::{Force, Options, RolloutError, SampledForce, Start, rollout_each};
 use serde::{Deserialize, Serialize};
 
@@ -27,10 +28,9 @@ pub struct Window {
 
 impl Window {
     /// Windows of `seconds` one after the other through the samples `interior` of a track of `n` coordinates, with the
-    /// estimated states `q` and `v`, `(samples, n)`, at its samples; a rest that is shorter is left out.
+    /// estimated states, `(samples, n)`, at its samples; a rest that is shorter is left out.
     pub fn cut(
-        track: &RecordedTrajectory,
-        (q, v): (&[f64], &[f64]),
+        StateEstimate { track, q, v, between }: StateEstimate<'_>,
         interior: std::ops::Range<usize>,
         n: usize,
         seconds: f64,
@@ -49,7 +49,7 @@ impl Window {
             }
             let force = track.force.get(start * n..end * n).and_then(|values| {
                 let times = track.times[start..end].iter().map(|t| t - origin).collect();
-                SampledForce::new(n, times, values.to_vec()).ok()
+                SampledForce::new(n, times, values.to_vec()).ok().map(|force| force.between(between))
             });
             windows.push(Self {
                 q: state(q, start),
@@ -228,7 +228,14 @@ pub fn window_valid_times(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::RecordedTrajectory;
+    use crate::rollout::Between;
     use crate::rollout::models::{OSCILLATOR, SINGULAR};
+
+    /// The track with its own positions and these velocities as states.
+    fn estimate<'a>(track: &'a RecordedTrajectory, v: &'a [f64]) -> StateEstimate<'a> {
+        StateEstimate { track, q: &track.q, v, between: Between::Linear }
+    }
 
     /// A swing `cos t` every tenth of a second.
     fn swing(samples: usize) -> (RecordedTrajectory, Vec<f64>) {
@@ -241,19 +248,19 @@ mod tests {
     #[test]
     fn windows_follow_each_other() {
         let (track, v) = swing(40);
-        let windows = Window::cut(&track, (&track.q, &v), 2..38, 1, 0.5);
+        let windows = Window::cut(estimate(&track, &v), 2..38, 1, 0.5);
         assert_eq!(windows.len(), 7);
         assert_eq!((windows[1].q[0], windows[1].v[0]), (track.q[7], v[7]));
         assert_eq!((windows[1].times.len(), windows[1].measured[4]), (5, track.q[12]));
         assert!((windows[1].times[4] - 0.5).abs() < 1e-12);
-        assert!(Window::cut(&track, (&track.q, &v), 2..38, 1, 9.0).is_empty());
-        assert!(Window::cut(&track, (&track.q, &v), 2..38, 1, 0.01).is_empty());
+        assert!(Window::cut(estimate(&track, &v), 2..38, 1, 9.0).is_empty());
+        assert!(Window::cut(estimate(&track, &v), 2..38, 1, 0.01).is_empty());
     }
 
     #[test]
     fn the_right_model_predicts_and_a_straight_line_does_not() {
         let (track, v) = swing(60);
-        let windows = Window::cut(&track, (&track.q, &v), 0..60, 1, 1.0);
+        let windows = Window::cut(estimate(&track, &v), 0..60, 1, 1.0);
         let error = |predictions: &Predictions| prediction_error(&windows, predictions, (&[false], &[1.0]), 1.0);
         let motion = error(&predict_by_motion(&OSCILLATOR, &windows, 2));
         // Tolerances of the roll-out, and interpolation over a tenth of a radian.
@@ -277,7 +284,7 @@ mod tests {
         let (mut track, mut v) = swing(30);
         track.q.fill(0.0);
         v.fill(-1.0);
-        let windows = Window::cut(&track, (&track.q, &v), 0..30, 1, 1.4);
+        let windows = Window::cut(estimate(&track, &v), 0..30, 1, 1.4);
         let error = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), (&[false], &[1.0]), 1.4);
         assert!(error.missing == error.windows && error.rms.is_nan() && error.median == f64::INFINITY, "{error:?}");
         let early = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), (&[false], &[1.0]), 0.1);

@@ -1,5 +1,6 @@
 //! Why no formula was looked for.
 
+use crate::cancellation::Cancelled;
 use crate::recording::smooth::SmoothError;
 use thiserror::Error;
 
@@ -7,6 +8,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FormulaError {
+    /// The search was ended from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// Too many coordinates, or none.
     #[error("expected 1 to {most} coordinates, found {found}")]
     Coordinates {

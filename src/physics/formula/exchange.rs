@@ -36,7 +36,7 @@ impl Search<'_> {
         blocks: &mut BTreeMap<usize, BlockSum>,
     ) -> Option<Exchanged> {
         let mut rival: Option<Exchanged> = None;
-        for _ in 0..ROUNDS {
+        for _ in (0..ROUNDS).take_while(|_| self.motion.data.cancellation.go_on()) {
             let Some((proposals, noise)) = self.proposals(model, segments, blocks) else { break };
             let before = self.motion.settle(model, segments, 1).0;
             let mut best: Option<(Exchanged, Vec<Segment>)> = None;

@@ -10,6 +10,7 @@ use super::prepared::{LEAST_SAMPLES, Prepared};
 use super::search::{Search, THRESHOLD, covariance, left_over, shorten};
 use super::select::{Choice, Path, eliminate_backward};
 use super::weak::{Windows, is_regular};
+use crate::cancellation::Cancellation;
 use crate::identification::{Between, Segment};
 use crate::names::rounded;
 use crate::random::RngStream;
@@ -45,6 +46,8 @@ pub struct FormulaOptions {
     pub seed: u64,
     /// Threads; the result does not depend on them.
     pub threads: usize,
+    /// Ends the search, and receives reports of how far it is.
+    pub cancellation: Cancellation,
 }
 
 impl Default for FormulaOptions {
@@ -62,6 +65,7 @@ impl Default for FormulaOptions {
             bootstraps: 40,
             seed: 0,
             threads: 1,
+            cancellation: Cancellation::default(),
         }
     }
 }
@@ -102,7 +106,10 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     if let Some((_, Err(error))) = libraries.first() {
         return Err(error.clone());
     }
+    let stop = &options.cancellation;
+    stop.stage("smoothed motion");
     let data = Prepared::new(recording, options)?;
+    stop.check()?;
     let held = constrained(recording, options.noise.as_ref())?;
     let judges = held_out(&data, options.seed);
     let (mut searched, mut refused) = (Vec::new(), None);
@@ -114,12 +121,14 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
             continue;
         };
         searched.push(families.to_string());
+        stop.check()?;
         let followed = WeakForm::new(&data, library, &judges, options).and_then(|weak| {
             // Only a library that meets accelerations better is worth following the motion.
             let (error, before) = (weak.least(), least);
             least = least.min(error);
             if error > BETTER * before { Ok(None) } else { weak.follow(&data, &judges, options).map(Some) }
         });
+        stop.check()?;
         match followed {
             Err(error) => refused = refused.or(Some(error)),
             Ok(None) => {}
@@ -145,6 +154,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     }
     found.rescale(options.scale.as_ref())?;
     found.name_constants();
+    stop.check()?;
     Ok(found)
 }
 
@@ -195,15 +205,19 @@ impl WeakForm {
                 false => FormulaError::Stretches { seconds: width },
             });
         }
+        let stop = &options.cancellation;
+        stop.stage("choice of terms");
         let windows = Windows::new(&library, &kept, &stretches, width);
         let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
         let eliminate = |set: &[usize], speeds: &[f64]| {
             let start = windows.unit_mass(&library, &kept, speeds);
-            eliminate_backward(&windows, (set, &start), &data.sigma, &complexity, &|block| held.contains(&block))
+            let judges = |block| held.contains(&block);
+            eliminate_backward(&windows, (set, &start), (&data.sigma, &complexity), &judges, stop)
         };
         let mut path = Path::default();
         // A search that ends at a nearly singular mass matrix starts again from other ones.
         for speeds in data.starts() {
+            stop.check()?;
             path = eliminate(&windows.apart(&[]), &speeds);
             if best(&path).is_some() {
                 break;
@@ -213,6 +227,7 @@ impl WeakForm {
         // those that move by themselves.
         let mut alone: Vec<usize> = (0..data.n).collect();
         while data.n > 1 && !alone.is_empty() {
+            stop.check()?;
             let apart = eliminate(&windows.apart(&alone), &data.speeds);
             let Some(choice) = best(&apart) else { break };
             if best(&path).is_none_or(|whole| judged(choice) <= START_ERROR * judged(whole)) {
@@ -264,12 +279,16 @@ impl WeakForm {
             values
         });
         let mut search = Search { library, motion, candidates, states: states.collect() };
+        let stop = &options.cancellation;
+        stop.stage("short segments");
         search.motion.settle(&model, &mut learned, 4);
         search.motion.choose_steps(&model, &learned);
         search.converge(&mut model, &mut learned, ROUNDS);
         if options.between.is_none() && data.forced.contains(&true) {
             search.motion.choose_between(&mut model, &mut learned);
         }
+        stop.check()?;
+        stop.stage("longer segments");
         // Longer segments say more of the constants; their starts are known by now.
         let before = (model.clone(), learned.clone());
         let short = search.motion.settle(&model, &mut learned, 1);
@@ -289,7 +308,10 @@ impl WeakForm {
         }
         search.motion.settle(&model, &mut judges, 6);
         let mut judges = data.joined(&judges);
+        stop.check()?;
+        stop.stage("probabilities");
         let resampled = search.resample(&model, &blocks, &learned, (options.bootstraps, options.seed));
+        stop.check()?;
         let shortened = shorten(&search, &self.quotient, &mut model, &mut learned);
         let (covariance, settled) = covariance(&search, &mut model, &mut learned, &resampled);
         let (square, count) = search.motion.settle(&model, &mut judges, 8);

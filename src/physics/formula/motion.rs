@@ -5,7 +5,7 @@ use super::library::{Library, Values};
 use super::prepared::Prepared;
 use super::search::PASSES;
 use crate::identification::linear::times;
-use crate::identification::{Between, Course, Problem, Segment, choose_steps};
+use crate::identification::{Between, Course, Disturbances, Problem, Segment, choose_steps};
 use crate::lagrangian::system::Range;
 use crate::linalg::{self, Workspace, dot};
 use std::collections::BTreeMap;
@@ -137,7 +137,9 @@ impl Motion<'_> {
             sigma_of: data.sigma_of.clone(),
             spread: data.spread.clone(),
             robust: true,
+            disturbances: Disturbances::default(),
             threads: self.threads,
+            cancellation: data.cancellation.clone(),
         };
         Some(work(&mut problem, x))
     }

@@ -4,6 +4,7 @@ use super::FormulaOptions;
 use super::error::FormulaError;
 use super::obstacles;
 use super::weak::Stretch;
+use crate::cancellation::Cancellation;
 use crate::identification::{Segment, joined, spread_of, thinned};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::{Clock, RecordedTrajectory, Recording};
@@ -44,6 +45,8 @@ pub(super) struct Prepared<'a> {
     pub speeds: Vec<f64>,
     /// Time in which the motion changes, in s.
     pub pace: f64,
+    /// Ends the search.
+    pub cancellation: Cancellation,
     pub n: usize,
 }
 
@@ -124,6 +127,7 @@ impl<'a> Prepared<'a> {
             bounds,
             speeds,
             pace,
+            cancellation: options.cancellation.clone(),
             n,
         })
     }

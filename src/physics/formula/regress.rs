@@ -60,7 +60,10 @@ pub fn formula_of_model(
     let mut terms = Terms::default();
     let mut known: Vec<Asked> = Vec::new();
     let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_STATES);
+    let stop = &options.cancellation;
+    stop.stage("states of the model");
     for (q, v) in rows() {
+        stop.check()?;
         let fine = model.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms).is_ok();
         if fine && terms.acceleration.iter().chain(&terms.mass_matrix).all(|x| x.is_finite()) {
             let (mass, own) = (terms.mass_matrix.clone(), terms.acceleration.clone());
@@ -80,9 +83,11 @@ pub fn formula_of_model(
     }
     let (kept, quotient) = library.independent(&bounds, options.seed);
     let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
+    stop.stage("choice of terms");
     let all: Vec<usize> = (0..kept.len()).collect();
-    let search =
-        |windows: &Windows, start: &[f64]| eliminate_backward(windows, (&all, start), &sigma, &complexity, &judges);
+    let search = |windows: &Windows, start: &[f64]| {
+        eliminate_backward(windows, (&all, start), (&sigma, &complexity), &judges, stop)
+    };
     // Its own motion, which holds nothing of the mass matrix but what moves it.
     let moving = known.iter().map(|Asked { q, v, own, .. }| {
         let (q, v, a) = (q.clone(), v.clone(), own.clone());
@@ -102,6 +107,7 @@ pub fn formula_of_model(
     let start = masses.unwrap_or_else(|| windows.unit_mass(&library, &kept, &vec![1.0; n]));
     let none = || FormulaError::NotFinite { failed, states };
     let mut path = search(&windows, &start);
+    stop.check()?;
     let mut choice = elbow(&path, n).cloned().ok_or_else(none)?;
     let residual = |choice: &Choice| (choice.held_out / n as f64).sqrt();
     choice = refit((&motion, &windows), choice, &sigma);
@@ -144,6 +150,7 @@ pub fn formula_of_model(
     (found.bounds, found.speeds) = (bounds, speeds);
     found.rescale(options.scale.as_ref())?;
     found.name_constants();
+    stop.check()?;
     Ok(found)
 }
 
@@ -235,7 +242,7 @@ fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64],
     let mut counts = vec![0.0; windows.terms];
     let mut all: Vec<usize> = path.order.iter().take(2 * choice.set.len() + 6).copied().collect();
     all.extend(choice.set.iter().filter(|k| !path.order.iter().take(2 * choice.set.len() + 6).any(|o| o == *k)));
-    for _ in 0..options.bootstraps {
+    for _ in (0..options.bootstraps).take_while(|_| options.cancellation.go_on()) {
         let used: Vec<bool> = (0..windows.len()).map(|_| rng.random()).collect();
         let normal = windows.normal(&choice.coefficients, &all, sigma, &used);
         let mut places: Vec<usize> = (0..all.len()).collect();

@@ -110,7 +110,7 @@ impl Search<'_> {
             self.motion.settle(model, segments, 4);
             self.motion.fit(model, segments, PASSES);
             let blocks = self.motion.blocks(model, &self.candidates, segments);
-            if round >= rounds {
+            if round >= rounds || self.motion.data.cancellation.is_cancelled() {
                 return (blocks, rounds == 0);
             }
             let Some(found) = self.survivors(model, segments, &blocks, &|_| 1.0) else { return (blocks, true) };
@@ -152,7 +152,7 @@ impl Search<'_> {
         let mut rng = RngStream::Segments.generator(seed);
         let names: Vec<usize> = blocks.keys().copied().collect();
         let mut drawn: Vec<Survivors> = Vec::new();
-        for _ in 0..draws {
+        for _ in (0..draws).take_while(|_| self.motion.data.cancellation.go_on()) {
             let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
             for _ in &names {
                 *weights.entry(names[rng.random_range(0..names.len())]).or_default() += 1.0;
@@ -219,7 +219,9 @@ pub(super) fn shorten(
                 best = Some((cost, gone, Model { terms, coefficients: x }));
             }
         }
-        let Some((_, gone, shorter)) = best else { return replaced };
+        let Some((_, gone, shorter)) = best.filter(|_| search.motion.data.cancellation.go_on()) else {
+            return replaced;
+        };
         let old = gone.iter().flat_map(|&k| replaced.get(&model.terms[k]).cloned().unwrap_or(vec![model.terms[k]]));
         replaced.insert(shorter.terms[shorter.terms.len() - 1], old.collect());
         *model = shorter;

@@ -1,6 +1,7 @@
 //! Backward elimination by the weak form, with refits and exchanges.
 
 use super::weak::{Group, Normal, Windows};
+use crate::cancellation::Cancellation;
 use crate::identification::linear::{inverse, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
@@ -219,13 +220,13 @@ impl Search<'_> {
 /// Eliminates terms of a set, from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
 ///
 /// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks
-/// that judge alone.
+/// that judge alone. What is returned after a cancellation is of no use.
 pub(super) fn eliminate_backward(
     windows: &Windows,
     (all, start): (&[usize], &[f64]),
-    sigma: &[f64],
-    complexity: &[f64],
+    (sigma, complexity): (&[f64], &[f64]),
     held_out: &dyn Fn(usize) -> bool,
+    cancellation: &Cancellation,
 ) -> Path {
     let held_out: Vec<bool> = windows.blocks.iter().map(|&block| held_out(block)).collect();
     let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
@@ -240,11 +241,11 @@ pub(super) fn eliminate_backward(
     }
     let mut order = Vec::new();
     // Many at once while there are many.
-    while set.len() > FEW {
+    while set.len() > FEW && cancellation.go_on() {
         let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
         let mut places: Vec<usize> = (0..set.len()).collect();
         let goal = (set.len() * 9 / 10).max(FEW);
-        while places.len() > goal {
+        while places.len() > goal && cancellation.go_on() {
             let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
             let Some(costs) = normal.of(&places).costs(&windows.groups(&left)) else { break };
             let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
@@ -269,7 +270,7 @@ pub(super) fn eliminate_backward(
     let mut best: BTreeMap<usize, Choice> = BTreeMap::new();
     let mut choice = search.choice(&set, &coefficients, 0);
     while let Some(found) = choice {
-        choice = if found.set.len() > 1 { search.shorter(&found) } else { None };
+        choice = if found.set.len() > 1 && cancellation.go_on() { search.shorter(&found) } else { None };
         if let Some(next) = &choice {
             order.extend(found.set.iter().filter(|k| !next.set.contains(k)));
         } else {
@@ -282,7 +283,7 @@ pub(super) fn eliminate_backward(
     for _ in 0..EXCHANGES {
         let mut changed = false;
         let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= EXCHANGED).collect();
-        for size in sizes {
+        for size in sizes.into_iter().take_while(|_| cancellation.go_on()) {
             let Some(from) = best.get(&size).cloned() else { continue };
             for longer in search.longer(&from, all) {
                 if let Some(shorter) = search.shorter(&longer) {

@@ -8,7 +8,7 @@ use crate::linalg::{Workspace, dot, eigh};
 
 /// Eigenvalue of the matrix of correlations below which the motion does not depend on a direction: the ridge under the starts leaves about
 /// this much of one that is none.
-const NULL: f64 = 1e-8;
+pub(super) const NULL: f64 = 1e-8;
 /// Relative standard error from which on a direction is open.
 const OPEN: f64 = 1.0;
 /// Part of the effect of a change below which a constant has none in it: rounding.

@@ -63,7 +63,8 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
         square += values(track).map(|x| (x - mean).powi(2)).sum::<f64>();
         count += samples;
     }
-    let still = noise.resolved && (square / count).sqrt() <= MOVES * noise.sigma;
+    // Numbers whose squares overflow say nothing.
+    let still = noise.resolved && noise.sigma.is_finite() && (square / count).sqrt() <= MOVES * noise.sigma;
     still.then_some(Stillness::Noise(noise.sigma))
 }
 

@@ -15,7 +15,10 @@ const REDUNDANT: f64 = 1e-6;
 #[non_exhaustive]
 pub enum ConstraintError {
     /// No state was found that satisfies all of them.
-    #[error("constraint `{name}` contradicts the others: the nearest states miss it by {defect:.3e}")]
+    #[error("constraint `{name}` {}", match defect.is_finite() {
+        true => format!("contradicts the others: the nearest states miss it by {defect:.3e}"),
+        false => "is not finite at any of the states that were tried".to_string(),
+    })]
     Contradiction {
         /// The constraint that is missed most.
         name: String,
