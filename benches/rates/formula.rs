@@ -58,8 +58,8 @@ struct System {
 
 impl System {
     fn new(coordinates: &'static [&'static str], starts: Vec<[f64; 2]>, law: Law) -> Self {
-        let periodic: &[bool] = &[false; 2][..coordinates.len()];
-        Self { coordinates, periodic, law, starts, terms: &[], seen: None }
+        const LINES: &[bool] = &[false; 2];
+        Self { coordinates, periodic: &LINES[..coordinates.len()], law, starts, terms: &[], seen: None }
     }
 
     /// Positions with independent noise.

@@ -133,7 +133,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
             Err(error) => refused = refused.or(Some(error)),
             Ok(None) => {}
             Ok(Some(mut found)) => {
-                let done = found.verdict == Verdict::Found;
+                let done = found.verdict != Verdict::NotInLibrary;
                 if done || best.as_ref().is_none_or(|best| found.residual < best.residual) {
                     found.basis = families.to_string();
                     best = Some(found);
@@ -209,14 +209,36 @@ impl WeakForm {
         stop.stage("choice of terms");
         let windows = Windows::new(&library, &kept, &stretches, width);
         let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
+        let eliminate = |set: &[usize], speeds: &[f64]| {
+            let start = windows.unit_mass(&library, &kept, speeds);
+            let judges = |block| held.contains(&block);
+            eliminate_backward(&windows, (set, &start), (&data.sigma, &complexity), &judges, stop)
+        };
         let mut path = Path::default();
         // A search that ends at a nearly singular mass matrix starts again from other ones.
         for speeds in data.starts() {
-            let start = windows.unit_mass(&library, &kept, &speeds);
             stop.check()?;
-            path =
-                eliminate_backward(&windows, &start, (&data.sigma, &complexity), &|block| held.contains(&block), stop);
-            if path.best.keys().any(|size| *size <= MOST_START) {
+            path = eliminate(&windows.apart(&[]), &speeds);
+            if best(&path).is_some() {
+                break;
+            }
+        }
+        // Together the size of coordinates that do not act on each other is a joint one, and one of them may vanish: all of them apart, then
+        // those that move by themselves.
+        let mut alone: Vec<usize> = (0..data.n).collect();
+        while data.n > 1 && !alone.is_empty() {
+            stop.check()?;
+            let apart = eliminate(&windows.apart(&alone), &data.speeds);
+            let Some(choice) = best(&apart) else { break };
+            if best(&path).is_none_or(|whole| judged(choice) <= START_ERROR * judged(whole)) {
+                path = apart.before(path);
+                break;
+            }
+            let errors = |choice: &Choice| windows.errors_by_coordinate(&choice.coefficients, &data.sigma);
+            let (own, whole) = (errors(choice), best(&path).map(errors).unwrap_or_default());
+            let before = alone.len();
+            alone.retain(|&i| whole.get(i).is_none_or(|whole| own[i] <= START_ERROR * whole));
+            if alone.len() == before || alone.len() + 1 >= data.n {
                 break;
             }
         }
@@ -226,8 +248,7 @@ impl WeakForm {
 
     /// The least error on what was held out of choices that the search through the motion may start with.
     fn least(&self) -> f64 {
-        let few = self.path.best.values().filter(|choice| choice.set.len() <= MOST_START);
-        few.map(judged).fold(f64::INFINITY, f64::min)
+        best(&self.path).map_or(f64::INFINITY, judged)
     }
 
     /// Goes on through the motion.
@@ -328,6 +349,9 @@ impl WeakForm {
         }
         found.doubts.extend(judged.doubts());
         found.verdict = judged.verdict(&found.doubts);
+        if found.verdict == Verdict::NotInLibrary {
+            found.doubts.clear();
+        }
         Ok(found)
     }
 }
@@ -423,6 +447,12 @@ fn beginning(path: &Path, windows: &Windows) -> Option<Vec<(usize, f64)>> {
     let definite = |most: f64| near(most).find(|choice| windows.is_definite(&choice.coefficients));
     let choice = definite(START_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(START_ERROR).next())?;
     Some(choice.set.iter().map(|&k| (k, choice.coefficients[k])).collect())
+}
+
+/// The choice of the least error that the search through the motion may start with.
+fn best(path: &Path) -> Option<&Choice> {
+    let few = path.best.values().filter(|choice| choice.set.len() <= MOST_START);
+    few.min_by(|a, b| judged(a).total_cmp(&judged(b)))
 }
 
 /// Error of a choice where it was held out.

@@ -84,8 +84,10 @@ pub fn formula_of_model(
     let (kept, quotient) = library.independent(&bounds, options.seed);
     let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
     stop.stage("choice of terms");
-    let search =
-        |windows: &Windows, start: &[f64]| eliminate_backward(windows, start, (&sigma, &complexity), &judges, stop);
+    let all: Vec<usize> = (0..kept.len()).collect();
+    let search = |windows: &Windows, start: &[f64]| {
+        eliminate_backward(windows, (&all, start), (&sigma, &complexity), &judges, stop)
+    };
     // Its own motion, which holds nothing of the mass matrix but what moves it.
     let moving = known.iter().map(|Asked { q, v, own, .. }| {
         let (q, v, a) = (q.clone(), v.clone(), own.clone());

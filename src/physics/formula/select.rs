@@ -39,6 +39,14 @@ pub(super) struct Path {
     pub settled: bool,
 }
 
+impl Path {
+    /// The choices of this path, its terms before those of another one.
+    pub fn before(mut self, other: Self) -> Self {
+        self.order.extend(other.order.into_iter().filter(|k| !self.order.contains(k)).collect::<Vec<_>>());
+        self
+    }
+}
+
 struct Search<'a> {
     windows: &'a Windows,
     sigma: &'a [f64],
@@ -209,13 +217,13 @@ impl Search<'_> {
     }
 }
 
-/// Eliminates terms from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
+/// Eliminates terms of a set, from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
 ///
 /// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks
 /// that judge alone. What is returned after a cancellation is of no use.
 pub(super) fn eliminate_backward(
     windows: &Windows,
-    start: &[f64],
+    (all, start): (&[usize], &[f64]),
     (sigma, complexity): (&[f64], &[f64]),
     held_out: &dyn Fn(usize) -> bool,
     cancellation: &Cancellation,
@@ -223,8 +231,7 @@ pub(super) fn eliminate_backward(
     let held_out: Vec<bool> = windows.blocks.iter().map(|&block| held_out(block)).collect();
     let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
     let search = Search { windows, sigma, complexity, learned, held_out };
-    let all: Vec<usize> = (0..windows.terms).collect();
-    let mut set = all.clone();
+    let mut set = all.to_vec();
     let mut coefficients = start.to_vec();
     for _ in 0..3 {
         let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
@@ -261,7 +268,7 @@ pub(super) fn eliminate_backward(
         }
     }
     let mut best: BTreeMap<usize, Choice> = BTreeMap::new();
-    let mut choice = search.judged(set, coefficients);
+    let mut choice = search.choice(&set, &coefficients, 0);
     while let Some(found) = choice {
         choice = if found.set.len() > 1 && cancellation.go_on() { search.shorter(&found) } else { None };
         if let Some(next) = &choice {
@@ -278,7 +285,7 @@ pub(super) fn eliminate_backward(
         let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= EXCHANGED).collect();
         for size in sizes.into_iter().take_while(|_| cancellation.go_on()) {
             let Some(from) = best.get(&size).cloned() else { continue };
-            for longer in search.longer(&from, &all) {
+            for longer in search.longer(&from, all) {
                 if let Some(shorter) = search.shorter(&longer) {
                     changed |= improve(&mut best, shorter);
                 }

@@ -4,6 +4,7 @@
 //! coefficients of the terms.
 
 use super::library::{Kind, Library, Term, Values, blocks};
+use super::select::mean;
 use crate::linalg::{self, Workspace};
 
 /// Positions and velocities of a stretch of motion at even steps, with known forces if there are any: `(samples, n)`.
@@ -228,9 +229,8 @@ impl Windows {
         4 * positive > 3 * self.len()
     }
 
-    /// Squared errors of the mean accelerations that some coefficients give, by window, in units of `sigma`; infinite where the mass
-    /// matrix is singular.
-    pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
+    /// Errors of the mean accelerations that some coefficients give, `(windows, n)`; `NaN` where the mass matrix is singular.
+    pub fn accelerations(&self, coefficients: &[f64]) -> Vec<f64> {
         let (n, count) = (self.n, self.terms);
         let used: Vec<usize> = (0..count).filter(|&k| coefficients[k] != 0.0).collect();
         let mut rest = Vec::with_capacity(self.len() * n);
@@ -242,8 +242,31 @@ impl Windows {
         let mut a = vec![0.0; rest.len()];
         // Windows that fail are NaN.
         let _ = linalg::solve(n, &self.masses(coefficients), &rest, &mut a, &mut Workspace::new());
+        a
+    }
+
+    /// Squared errors of the mean accelerations by window, in units of `sigma`; infinite where the mass matrix is singular.
+    pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
         let error = |a: &[f64]| a.iter().zip(sigma).map(|(a, s)| (a / s).powi(2)).sum::<f64>();
-        a.chunks_exact(n).map(error).map(|square| if square.is_nan() { f64::INFINITY } else { square }).collect()
+        let all = self.accelerations(coefficients);
+        all.chunks_exact(self.n).map(error).map(|square| if square.is_nan() { f64::INFINITY } else { square }).collect()
+    }
+
+    /// Mean squared errors of every coordinate's accelerations.
+    pub fn errors_by_coordinate(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
+        let all = self.accelerations(coefficients);
+        let used = vec![true; self.len()];
+        let of = |i: usize| {
+            let own = all.iter().skip(i).step_by(self.n).map(|a| (a / sigma[i]).powi(2));
+            mean(&own.map(|e| if e.is_nan() { f64::INFINITY } else { e }).collect::<Vec<_>>(), &used)
+        };
+        (0..self.n).map(of).collect()
+    }
+
+    /// Places of the terms that join none of the coordinates `alone` with another one.
+    pub fn apart(&self, alone: &[usize]) -> Vec<usize> {
+        let kept = |joined: &Vec<usize>| joined.iter().all(|i| !alone.contains(i) || joined.iter().all(|j| i == j));
+        (0..self.terms).filter(|&k| kept(&self.joined[k])).collect()
     }
 
     /// Normal equations of the errors of accelerations, the mass matrix being that of `coefficients`: matrix of the terms `set`, what the
