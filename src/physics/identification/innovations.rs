@@ -180,3 +180,43 @@ impl Problem<'_> {
         impulses
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn innovations_of_disturbed_motion_are_independent() {
+        const STEPS: usize = 6;
+        let slopes = |t: usize| [1.0, 0.4 * t as f64];
+        let impulse = |t: usize| [0.3 - 0.1 * t as f64, 0.5];
+        // Variance of what is seen: noise, and the changes of the start up to the earlier of two samples.
+        let of = |t: usize, s: usize| {
+            let both = (0..t.min(s)).map(|k| dot(&slopes(t), &impulse(k)) * dot(&slopes(s), &impulse(k)));
+            f64::from(u8::from(t == s)) + both.sum::<f64>()
+        };
+        let mut filter = Filter {
+            unknown_start: false,
+            variance: vec![0.0; 4],
+            expected: vec![vec![0.0; 2]; 3 + STEPS],
+            log_variance: 0.0,
+        };
+        // What the filter makes of a residual at one sample alone, in columns behind the slopes.
+        let map: Vec<Vec<f64>> = (0..STEPS)
+            .map(|t| {
+                let mut row = slopes(t).to_vec();
+                row.extend((0..STEPS).map(|k| f64::from(u8::from(k == t))));
+                filter.pass(0.0, &mut row);
+                filter.disturb(&impulse(t));
+                row[2..].to_vec()
+            })
+            .collect();
+        for (t, a) in map.iter().enumerate() {
+            for (s, b) in map.iter().enumerate() {
+                let pairs = (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j)));
+                let variance: f64 = pairs.map(|(i, j)| a[i] * of(i, j) * b[j]).sum();
+                assert!((variance - f64::from(u8::from(t == s))).abs() < 1e-12, "{t} {s} {variance}");
+            }
+        }
+    }
+}
