@@ -36,8 +36,6 @@ mod solve;
 pub use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
-#[cfg(feature = "rollout")]
-pub(crate) use components::components;
 #[doc(hidden)]
 pub use components::components;
 #[doc(hidden)]
