@@ -38,7 +38,8 @@ pub(crate) fn acting_groups<S: Scalar>(
         })
         .collect();
     // What cannot be evaluated may act.
-    components(n, pairs(n).filter(|&(j, i)| changes[j * n + i] > noise[i] || changes[j * n + i].is_nan()))
+    let acts = |&(j, i): &(usize, usize)| changes[j * n + i] > noise[i] || changes[j * n + i].is_nan();
+    components(n, pairs(n).filter(acts))
 }
 
 /// Root mean square of the finite ones of some numbers, `NaN` without any.

@@ -20,7 +20,6 @@
 
 mod batch;
 mod compiled;
-#[cfg(feature = "rollout")]
 mod components;
 mod condition;
 mod eigen;
