@@ -40,7 +40,7 @@ pub use constraints::{
 #[doc(hidden)]
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
-pub(crate) use description::pair;
+pub(crate) use description::{inertia_symbols, loss_symbols, pair};
 pub use description::{Description, DescriptionError};
 #[cfg(feature = "training")]
 pub(crate) use equations::{EquationPart, Equations};

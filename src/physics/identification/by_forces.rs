@@ -10,7 +10,8 @@ use super::found::{Identified, Outlier, Residual};
 use super::quality::{outliers, usual, whiteness};
 use super::smoothed::{Met, States};
 use super::solve::Problem;
-use super::stages::{EXPLAINED, Fitted, unknowns};
+use super::stages::{EXPLAINED, Fitted};
+use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::noise;
 use crate::recording::{deviation, rms};
@@ -79,6 +80,7 @@ pub(super) fn identify(
         let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
         Outlier { track, sample, time, coordinate, size }
     };
+    let normal_at = |x: &[f64]| states.normal(problem, x, Met::Forces);
     let (outliers, outlier_count) = outliers((&[whole], &[residuals]), n, far);
     Ok(Identified {
         explained,
@@ -88,7 +90,7 @@ pub(super) fn identify(
         outlier_count,
         inflation: widened,
         samples: count,
-        ..unknowns(instance, problem, &fitted, (&start, inflation), Met::Forces)
+        ..unknowns(instance, problem, &fitted, (&start, inflation), (Met::Forces, &normal_at))
     })
 }
 

@@ -25,22 +25,27 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bodies;
 mod by_forces;
+mod cure;
 mod determined;
 mod error;
 mod follow;
 mod found;
+mod invariants;
 pub(crate) mod linear;
+mod moves;
 mod quality;
 mod smoothed;
 mod solve;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod unknowns;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
-pub use found::{Combination, Constant, Identified, Residual, Undetermined};
+pub use found::{Bodies, Combination, Constant, Identified, Residual, Undetermined};
 #[doc(hidden)]
 pub use found::{Outlier, SensorConstant};
 pub(crate) use solve::{Linear, Problem};
