@@ -125,11 +125,11 @@ impl<'a> Moves<'a> {
             Kind::Sum => sums(&group.columns, &group.inside, x.len()),
         };
         let mut points = Vec::new();
-        for (column, factor) in group.columns.iter().flat_map(|column| FACTORS.map(|factor| (*column, factor))) {
+        for moves in moves_of(&group.columns) {
             if left.is_empty() {
                 break;
             }
-            let moved = self.refit(along(x, column, kind, factor));
+            let moved = self.refit(along(x, &moves, kind));
             let Some((moved, _)) = moved.filter(|(_, after)| after - square < AS_GOOD) else {
                 left.clear();
                 break;
@@ -164,16 +164,29 @@ impl<'a> Moves<'a> {
     }
 }
 
-/// Unknowns moved along a direction until its pivot has changed by a factor.
-fn along(x: &[f64], column: &Column, kind: Kind, factor: f64) -> Vec<f64> {
-    let own = column.change[column.pivot];
-    let pivot = x[column.pivot];
-    let part = |(&x, &change): (&f64, &f64)| match kind {
-        Kind::Product if x != 0.0 => x * factor.powf(change / x * pivot / own),
-        Kind::Product => x,
-        Kind::Sum => x + (factor - 1.0) * change,
-    };
-    x.iter().zip(&column.change).map(part).collect()
+/// Every direction alone, either way, and of several all together, alternately forth and back: what holds along each need not hold along
+/// all.
+fn moves_of<'a>(columns: &[&'a Column]) -> Vec<Vec<(&'a Column, f64)>> {
+    let alone = columns.iter().flat_map(|column| FACTORS.map(|factor| vec![(*column, factor)]));
+    let all =
+        |first: usize| columns.iter().enumerate().map(|(at, column)| (*column, FACTORS[(at + first) % 2])).collect();
+    alone.chain((0..2).filter(|_| columns.len() > 1).map(all)).collect()
+}
+
+/// Unknowns moved along directions until the pivot of each has changed by a factor.
+fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
+    let mut moved = x.to_vec();
+    for (column, factor) in moves {
+        let (pivot, own) = (x[column.pivot], column.change[column.pivot]);
+        for ((moved, &x), &change) in moved.iter_mut().zip(x).zip(&column.change) {
+            match kind {
+                Kind::Product if x != 0.0 => *moved *= factor.powf(change / x * pivot / own),
+                Kind::Product => {}
+                Kind::Sum => *moved += (factor - 1.0) * change,
+            }
+        }
+    }
+    moved
 }
 
 /// Moves `x` along directions to the least change from `start` in units of `size`.
