@@ -9,7 +9,7 @@ use crate::linalg::{Workspace, components, dot, eigh};
 
 /// Part of the squared effect of an unknown that the elimination of the starts leaves as rounding: their ridge is 1e-11, and sums over some
 /// hundred samples lose the rest.
-const ROUNDING: f64 = 1e-8;
+pub(super) const ROUNDING: f64 = 1e-8;
 /// Size of an unknown that starts at 0, in errors with the others held: it is compared with what the motion tells of it alone.
 const ALONE: f64 = 10.0;
 /// Part of the largest effect along a direction that is rounding of the eigenvectors; their unknowns are scaled to effects of at most 1e4.

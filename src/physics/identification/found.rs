@@ -1,6 +1,6 @@
 //! What was identified.
 
-use super::Between;
+use super::{Between, Verdict};
 use serde::{Serialize, Serializer};
 
 /// A constant of the system.
@@ -96,9 +96,9 @@ pub struct Residual {
     pub noise: f64,
     /// Standard deviation of what is met: of the positions, or of the forces.
     pub spread: f64,
-    /// Correlation of residuals that follow each other; that of noise is 0.
+    /// Correlation of residuals that follow each other, as far as the start of a segment does not make it; that of white noise is 0.
     pub autocorrelation: f64,
-    /// `true` if they follow each other as noise does.
+    /// `true` if residuals do not follow from the earlier ones, over all lags together at a level of 1 %.
     pub white: bool,
 }
 
@@ -136,14 +136,18 @@ pub struct Identified {
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
     pub over_noise: f64,
-    /// `true` if what is left is as large as the noise and white: the form explains the motion.
+    /// Whether the form explains what was measured, and if not, why.
+    pub verdict: Verdict,
+    /// `true` if it does: [`Verdict::explains`].
     pub explained: bool,
     /// Samples far from the motion, the farthest first, 100 at most.
     pub outliers: Vec<Outlier>,
     /// Number of all of them.
     pub outlier_count: usize,
-    /// Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+    /// Mean factor by which variances of the unknowns are larger than those of independent residuals of the same size; 1 for these.
     pub inflation: f64,
+    /// Standard deviation of the noise of the known force on every coordinate, as the motion shows it; empty if it shows none.
+    pub force_noise: Vec<f64>,
     /// Samples that were followed, or whose forces were met.
     pub samples: usize,
     /// Number of segments; none where forces were met.

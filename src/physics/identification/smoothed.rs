@@ -167,6 +167,9 @@ impl States {
         // Forces are often linear in the constants.
         let mut damping = if met == Met::Forces { 1e-9 } else { 1e-3 };
         for _ in 0..ITERATIONS {
+            if !problem.cancellation.iterate((best.square / best.count.max(1.0)).sqrt()) {
+                break;
+            }
             let mut right = best.right.clone();
             let mut damped: Vec<f64> =
                 (0..m * m).map(|at| best.matrix[at] * if at / m == at % m { 1.0 + damping } else { 1.0 }).collect();

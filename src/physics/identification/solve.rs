@@ -3,12 +3,14 @@
 //! Every segment has a start of its own, which is eliminated from the normal equations.
 
 use super::follow::{Course, Follower, LANES, Segment, State};
+use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
+use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
 /// Residuals beyond so many standard deviations count linearly where that is asked for.
-const HUBER: f64 = 3.0;
+pub(super) const HUBER: f64 = 3.0;
 /// Part of the diagonal that keeps normal equations regular.
 const RIDGE: f64 = 1e-11;
 /// Part of the effect of an unknown, squared, that other starts do not have; integrators are no better.
@@ -63,14 +65,18 @@ pub(crate) struct Problem<'a> {
     /// Spread of every coordinate over all samples.
     pub spread: Vec<f64>,
     pub robust: bool,
+    /// What moves the motion beside the equations.
+    pub disturbances: Disturbances,
     pub threads: usize,
+    /// Ends every loop.
+    pub cancellation: Cancellation,
 }
 
 /// Normal equations of a segment: start, constants, sensors.
 #[derive(Clone, Debug)]
 pub(crate) struct Linear {
-    matrix: Vec<f64>,
-    right: Vec<f64>,
+    pub(super) matrix: Vec<f64>,
+    pub(super) right: Vec<f64>,
     pub square: f64,
     pub count: f64,
 }
@@ -131,23 +137,26 @@ impl Problem<'_> {
     }
 
     /// Calls `visit(segment, sample, coordinate, residual, row)` along segments: residuals of positions in units of noise, and their
-    /// derivatives by start, constants and sensors of one lane if those are asked for.
-    fn residuals(
+    /// derivatives by start, constants and sensors of one lane if those are asked for; innovations where something disturbs the motion.
+    /// Gives the sum of the logarithms of the innovations' variances, in units of the noise.
+    pub(super) fn residuals(
         &self,
         x: &[f64],
         segments: &[&Segment],
         derivatives: bool,
         mut visit: impl FnMut(usize, usize, usize, f64, &[f64]),
-    ) {
+    ) -> f64 {
         let (n, m) = (self.n(), self.chosen.len());
         let values = self.parameters(x);
         let columns = 2 * n + m;
+        let mut filters = self.filters(segments.len(), columns + self.sensors.len());
+        let derivatives = derivatives || !filters.is_empty();
         let sensors: Vec<[f64; 3]> = (0..n).map(|i| self.sensor(x, i)).collect();
         let mut row = vec![0.0; if derivatives { columns + self.sensors.len() } else { 0 }];
         let mut a = vec![0.0; segments.len() * n];
-        let delayed = self.has_delay();
+        let (delayed, noisy) = (self.has_delay(), !self.disturbances.force.is_empty());
         let read = |follower: &mut Follower<'_>, sample: usize, state: &State| {
-            if delayed {
+            if delayed || noisy {
                 follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
             }
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
@@ -174,11 +183,20 @@ impl Problem<'_> {
                             };
                         }
                     }
+                    let residual = match filters.get_mut(lane) {
+                        Some(filter) => filter.pass(residual, &mut row),
+                        None => residual,
+                    };
                     visit(lane, sample, i, residual, &row);
                 }
             }
+            if noisy {
+                let impulses = self.impulses(&state.by_starts(n, columns), follower.mass(), self.course.step);
+                filters.iter_mut().zip(impulses.chunks_exact(2 * n * n)).for_each(|(filter, own)| filter.disturb(own));
+            }
         };
         Follower::new(&self.course).follow(&values, segments, derivatives, read);
+        filters.iter().map(|filter| filter.log_variance).sum()
     }
 
     /// Normal equations of a batch of segments; `None` for those that cannot be followed.
@@ -227,7 +245,7 @@ impl Problem<'_> {
                 let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
                 batch.iter().copied().zip(self.batch(x, &lanes)).collect::<Vec<_>>()
             };
-            batches.iter().flat_map(of).collect::<Vec<_>>()
+            batches.iter().take_while(|_| self.cancellation.go_on()).flat_map(of).collect::<Vec<_>>()
         };
         let share = batches.len().div_ceil(self.threads.max(1)).max(1);
         let mut found = vec![None; segments.len()];
@@ -249,7 +267,7 @@ impl Problem<'_> {
         let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * n]).collect();
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-        for batch in order.chunks(LANES) {
+        for batch in order.chunks(LANES).take_while(|_| self.cancellation.go_on()) {
             let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
             let put = |lane: usize, sample: usize, i: usize, r: f64, _: &[f64]| found[batch[lane]][sample * n + i] = r;
             self.residuals(x, &lanes, false, put);
@@ -311,7 +329,7 @@ impl Problem<'_> {
     }
 
     /// Inverse of the part of the start.
-    fn start_inverse(&self, linear: &Linear, damping: f64) -> Vec<f64> {
+    pub(super) fn start_inverse(&self, linear: &Linear, damping: f64) -> Vec<f64> {
         let starts = 2 * self.n();
         let width = starts + self.unknowns();
         let own = (0..starts * starts).map(|at| {
@@ -360,7 +378,7 @@ impl Problem<'_> {
                 }
             }
             let total: f64 = best.iter().flatten().map(|linear| linear.square).sum();
-            if gained < 1e-4 * total {
+            if gained < 1e-4 * total || self.cancellation.is_cancelled() {
                 break;
             }
         }
@@ -421,6 +439,9 @@ impl Problem<'_> {
         let mut damping = 1e-4;
         for _ in 0..iterations {
             let mut normal = self.normal(&best, segments, damping);
+            if !self.cancellation.iterate((square / normal.count.max(1.0)).sqrt()) {
+                break;
+            }
             let muted = self.without_effect(x, &normal);
             mute(&muted, &mut normal.matrix, &mut normal.right);
             let Some(inverse) = inverse_with(m, &normal.matrix, RIDGE) else { break };

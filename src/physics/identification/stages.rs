@@ -1,8 +1,12 @@
 //! From smoothed accelerations to longer and longer segments of motion.
 
+use super::covariance::{Root, Weighing, agreement, long_run, scores};
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual};
-use super::quality::{outliers, usual, whiteness};
+use super::innovations::Disturbances;
+use super::quality::{
+    CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
+};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem, Sensor, SensorKind};
 use super::unknowns::unknowns;
@@ -10,7 +14,7 @@ use super::{Between, IdentifyError, IdentifyOptions, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
-use crate::recording::{Recording, Targets, deviation};
+use crate::recording::{Recording, Targets, deviation, rms};
 
 /// Samples in a row that are needed.
 const LEAST_SAMPLES: usize = 12;
@@ -31,10 +35,8 @@ const WORSE: f64 = 1.5;
 const GAIN: f64 = 0.01;
 /// Segments from which on their scatter tells how far errors are to be widened.
 const MANY: usize = 8;
-/// Size of residuals over the noise up to which a form explains what was measured.
-pub(super) const EXPLAINED: f64 = 1.3;
-/// Standard deviations by which the pulls of segments may scatter more than noise does, if a form explains the motion.
-const ALIKE: f64 = 4.0;
+/// Residual over the spread of a coordinate up to which it is that of the integration, a few times [`LEAST_NOISE`].
+const EXACT: f64 = 5.0 * LEAST_NOISE;
 const ITERATIONS: usize = 40;
 
 /// Constants, sensors and starts with the normal equations there.
@@ -99,12 +101,16 @@ pub fn identify(
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
     let met = met(instance, recording, options)?;
+    let stop = &options.cancellation;
+    stop.stage("equations of motion");
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
     let longest = recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0);
     if longest < LEAST_SAMPLES {
         return Err(IdentifyError::Short { found: longest, needed: LEAST_SAMPLES });
     }
+    stop.check()?;
+    stop.stage("smoothed motion");
     let smoothing =
         Smoothing::choose(recording, &SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() })?;
     let smooth = |track: &crate::recording::RecordedTrajectory| {
@@ -134,12 +140,17 @@ pub fn identify(
         sigma_of: Vec::new(),
         spread,
         robust: options.robust,
+        disturbances: Disturbances::default(),
         threads: options.threads.max(1),
+        cancellation: options.cancellation.clone(),
     };
+
+    stop.check()?;
     let mut states = States::new(&problem, &smoothed);
     if met == Met::Forces {
         let segments = cut(recording, &smoothed, LEAST_SEGMENT, n);
-        return by_forces::identify(instance, &problem, &mut states, (x, segments));
+        stop.stage("forces");
+        return by_forces::identify(instance, &problem, (&smoothing, &mut states), (x, segments));
     }
     if states.len(n) > 0 && !states.fit(&problem, &mut x, met) {
         return Err(IdentifyError::Singular);
@@ -147,6 +158,7 @@ pub fn identify(
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
     let samples = first_samples(&states, (n, smoothing.step), options.segment)?;
     let segments = cut(recording, &smoothed, samples, n);
+    stop.stage("short segments");
     let mut fitted = first(&mut problem, x, segments)?;
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
@@ -154,23 +166,37 @@ pub fn identify(
     if forced && options.between.is_none() {
         fitted = best_between(&mut problem, fitted);
     }
+    if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+        refit(&problem, &mut fitted);
+    }
     if options.noise.is_none() {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
         refit(&problem, &mut fitted);
     }
+    stop.stage("longer segments");
     fitted = grown(&mut problem, fitted, options.segment);
+    if forced {
+        problem.estimate_force_noise(&fitted.x, &fitted.segments);
+    }
     if options.noise.is_none() {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
     }
     refit(&problem, &mut fitted);
-    Ok(result(instance, &problem, &fitted, (&start, &noise), options))
+    stop.check()?;
+    stop.stage("what is determined");
+    let found = result(instance, &problem, &fitted, (&start, &noise), options);
+    stop.check()?;
+    Ok(found)
 }
 
 /// What is met.
 fn met(instance: &SystemInstance<f64>, recording: &Recording, options: &IdentifyOptions) -> Result<Met, IdentifyError> {
     let driven = recording.is_driven();
+    // A joint that nothing drives has a known force of 0.
+    let mut forces = recording.tracks.iter().flat_map(|track| &track.force);
+    let pushed = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
     // Both belong to motion that is followed.
     let follows = options.segment.is_some()
         || [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
@@ -180,7 +206,7 @@ fn met(instance: &SystemInstance<f64>, recording: &Recording, options: &Identify
     };
     match options.targets {
         Some(Targets::Motion) => Ok(Met::Accelerations),
-        Some(Targets::Forces) if !driven => refused("motion, of a recording without known forces", "forces"),
+        Some(Targets::Forces) if !pushed => refused("motion, of a recording without known forces", "forces"),
         Some(Targets::Forces) if follows => {
             refused("motion, beside unknown constants of sensors or a length of segments", "forces")
         }
@@ -274,22 +300,27 @@ fn cut(recording: &Recording, smoothed: &[Option<Smoothed>], samples: usize, n: 
             segments.push(Segment { track, first, samples: end - first, start: [q, v].concat() });
         }
     }
+    thinned(segments)
+}
+
+/// Segments of as many samples as are followed: runs of segments that follow each other, so that they can be joined later.
+pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
+    const RUN: usize = 16;
     let all: usize = segments.iter().map(|segment| segment.samples).sum();
-    if all > MOST_SAMPLES {
-        // Runs of segments that follow each other, so that they can be joined later.
-        const RUN: usize = 16;
-        let runs = segments.len().div_ceil(RUN);
-        let kept = (runs * MOST_SAMPLES / all).max(1);
-        let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
-        segments = segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect();
+    if all <= MOST_SAMPLES {
+        return segments;
     }
-    segments
+    let runs = segments.len().div_ceil(RUN);
+    let kept = (runs * MOST_SAMPLES / all).max(1);
+    let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
+    segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }
 
 /// The fit of the first segments; those that cannot be followed are left out.
 fn first(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
     choose_steps(problem, &x, &segments);
     let followed = problem.all(&x, &segments);
+    problem.cancellation.check()?;
     let mut kept = followed.iter().map(Option::is_some);
     segments.retain(|_| kept.next().unwrap_or(false));
     if segments.is_empty() {
@@ -327,7 +358,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.sigma.len();
     let mut coarse = problem.ends(x, &probes);
-    while problem.course.substeps < MOST_SUBSTEPS {
+    while problem.course.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
         let mut finer = problem.clone();
         finer.course.substeps *= 2;
         let fine = finer.ends(x, &probes);
@@ -422,7 +453,7 @@ fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
 /// Shorter segments of a form that misses the motion, as long as constants become better known by them: what is missing adds up along a
 /// segment.
 fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
-    while fitted.mean_square() > EXPLAINED * EXPLAINED {
+    while fitted.mean_square() > EXPLAINED * EXPLAINED && !problem.cancellation.is_cancelled() {
         let segments = halved(problem, &fitted);
         if segments.len() == fitted.segments.len() {
             break;
@@ -443,7 +474,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
 fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
     let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
     let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * 1.5 < wanted);
-    while wanted_more != Some(false) {
+    while wanted_more != Some(false) && !problem.cancellation.is_cancelled() {
         let segments = joined(&fitted.segments);
         if segments.len() == fitted.segments.len() {
             break;
@@ -479,32 +510,26 @@ fn result(
     (start, noise): (&[f64], &[f64]),
     options: &IdentifyOptions,
 ) -> Identified {
-    let (n, m) = (problem.sigma.len(), fitted.x.len());
+    let n = problem.sigma.len();
     let recording = problem.course.recording;
     let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
-    let (mut inflation, widened) = fitted.inflation();
-    if options.noise.is_some() {
-        inflation = inflation.max(1.0);
-    }
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
     let numbers: f64 = residuals.iter().map(|r| r.len() as f64).sum();
-    let taken = (fitted.normal.count - m as f64).max(1.0) / numbers;
+    let taken = (fitted.normal.count - fitted.x.len() as f64).max(1.0) / numbers;
+    let weighing = Weighing::of(&residuals, problem.robust, taken);
+    let follow: Vec<Correlation> =
+        innovations(problem, &fitted.x, &fitted.segments).iter().map(|runs| correlation(runs)).collect();
+    let is_white = |of: &Correlation| of.probability * n as f64 >= CHANCE;
+    // Samples that stand out do not excuse the others.
+    let size = |i: usize| usual(&residuals, n, i) * problem.sigma[i] / taken.sqrt();
     let of = |i: usize| {
-        let own = || residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n)).filter(|r| r.is_finite());
-        let square = own().map(|r| r * r).sum::<f64>() / own().count().max(1) as f64 / taken;
-        let (autocorrelation, white) = whiteness(&residuals, n, i);
-        let rms = square.sqrt() * problem.sigma[i];
+        let own = residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n).copied());
+        let rms = rms(own.filter(|r| r.is_finite())) / taken.sqrt() * problem.sigma[i];
         let (coordinate, spread) = (recording.coordinates[i].clone(), problem.spread[i]);
+        let (autocorrelation, white) = (follow[i].neighbours, is_white(&follow[i]));
         Residual { coordinate, rms, noise: noise[i], spread, autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
-    let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
-    let over_noise = square.sqrt();
-    // Within short segments a wrong form may pass for right: each then has constants of its own.
-    let alike = widened <= 1.0 + ALIKE * (2.0 / fitted.segments.len() as f64).sqrt();
-    // Samples that stand out do not excuse the others.
-    let usual = (0..n).map(|i| usual(&residuals, n, i) * problem.sigma[i] / noise[i]).map(|r| r * r / taken);
-    let usual_over_noise = (usual.sum::<f64>() / n as f64).sqrt();
     let far = |track: usize, sample: usize, i: usize, size: f64| Outlier {
         track,
         sample,
@@ -513,18 +538,63 @@ fn result(
         size,
     };
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
+    let lags = follow.iter().filter(|of| !is_white(of)).map(|of| 2 * of.length).max();
+    let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
+    let (normal, inflation) = informed(problem, fitted, (weighing, lags), options.noise.is_some());
+    let verdict = Evidence {
+        converged: true,
+        sizes: (0..n).map(size).collect(),
+        exact: (0..n).map(|i| EXACT * problem.spread[i]).collect(),
+        residuals: &by_coordinate,
+        probabilities: follow.iter().map(|of| (of.probability * n as f64).min(1.0)).collect(),
+        outliers: outlier_count as f64 / numbers,
+        agreement,
+    }
+    .verdict();
     Identified {
-        explained: by_coordinate.iter().all(|r| r.white) && usual_over_noise < EXPLAINED && alike,
+        explained: verdict.explains(),
+        verdict,
+        over_noise: over_noise(&by_coordinate),
         residuals: by_coordinate,
-        over_noise,
         outliers,
         outlier_count,
-        inflation: widened,
+        inflation,
+        force_noise: problem.disturbances.force.clone(),
         samples: fitted.segments.iter().map(|segment| segment.samples).sum(),
         segments: fitted.segments.len(),
         segment_seconds: usual_samples(&fitted.segments) as f64 * problem.course.step,
         substeps: fitted.substeps,
         between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
-        ..unknowns(instance, problem, fitted, (start, inflation), (Met::Accelerations, &normal_at))
+        ..unknowns(
+            instance,
+            problem,
+            &Fitted { normal, ..fitted.clone() },
+            (start, 1.0),
+            (Met::Accelerations, &normal_at),
+        )
     }
+}
+
+/// The normal equations that know the unknowns as well as the residuals say, and the factor of variances by which correlated residuals
+/// know less than independent ones. Correlated ones have `lags`; with `given` noise residuals count as large as that at least.
+fn informed(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    (weighing, lags): (Weighing, Option<usize>),
+    given: bool,
+) -> (Normal, f64) {
+    let m = fitted.x.len();
+    let root = Root::of(m, &fitted.normal.matrix);
+    let bread = weighing.bread * weighing.bread;
+    let plain = weighing.square * bread;
+    let least = if given { plain.max(1.0) } else { plain.max(f64::MIN_POSITIVE) };
+    let Some(lags) = lags else {
+        let unit = vec![0.0; root.forward.len().pow(2)];
+        return (root.informed(&fitted.normal, &unit, least), 1.0);
+    };
+    let scores = scores(problem, &fitted.x, &fitted.segments);
+    let mut seen = root.seen(m, &long_run(&scores, &fitted.segments, m, lags));
+    seen.iter_mut().for_each(|x| *x *= bread);
+    let mean = mean_eigenvalue(&seen, root.forward.len());
+    (root.informed(&fitted.normal, &seen, least), (mean / plain).max(1.0))
 }

@@ -211,3 +211,53 @@ fn torques_of_a_log_tell_the_sums_of_the_constants_of_an_arm() {
     }
     lnn(&["identify", &data, "--system", ARM, "--targets", "forces"]).refused(2, &["--targets", "known forces"]);
 }
+
+/// A pendulum that is led along two tones, 300 a second over 6 s: an encoder of 3 mrad that repeats one reading in eight, a torque with noise.
+fn led(folder: &Folder) -> String {
+    let mut random = 1_u64;
+    let mut uniform = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let (mut csv, mut last) = (String::from("t,q,tau\n"), 0.0);
+    for k in 0..1800 {
+        let t = f64::from(k) / 300.0;
+        let [q, v, a] = [(1.1, 2.3, 0.3), (0.6, 5.1, 1.0)].iter().fold([0.0; 3], |[q, v, a], (size, rate, phase)| {
+            let (sin, cos) = (rate * t + phase).sin_cos();
+            [q + size * sin, v + size * rate * cos, a - size * rate * rate * sin]
+        });
+        let noise = 0.15 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+        if k == 0 || uniform() > 0.125 {
+            last = (q / 0.003).round() * 0.003;
+        }
+        csv += &format!("{t},{last},{}\n", 0.14 * a + 2.8 * q.sin() + 0.05 * v + noise);
+    }
+    folder.file("led.csv", csv)
+}
+
+#[test]
+fn readings_that_are_repeated_do_not_excuse_a_wrong_form() {
+    let folder = Folder::new();
+    let data = led(&folder);
+    let found = |weight: &str| {
+        let potential = if weight.is_empty() { String::new() } else { format!("{weight} = 2\n") };
+        let term = if weight.is_empty() { String::new() } else { format!(" + {weight}*cos(q)") };
+        let system = folder.file(
+            "swing.toml",
+            format!(
+                "name = \"swing\"\nlagrangian = \"I*q_dot^2/2{term}\"\ndissipation = \"b*q_dot^2/2\"\n[[coordinates]]\nname = \"q\"\n\
+                 periodic = true\nvelocity_bounds = [-10, 10]\n[parameters]\nI = 0.1\nb = 0.1\n{potential}"
+            ),
+        );
+        let run = lnn(&["identify", &data, "--system", &system, "--force", "tau", "--targets", "forces", "--json"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        serde_json::from_str::<Value>(&run.stdout).unwrap()
+    };
+    let (right, wrong) = (found("G"), found(""));
+    assert_eq!(right["residual"]["verdict"]["kind"], "explained", "{}", right["residual"]);
+    assert_eq!(wrong["residual"]["explained"], Value::Bool(false), "{}", wrong["residual"]);
+    for (name, truth) in [("I", 0.14), ("G", 2.8), ("b", 0.05)] {
+        let [value, error] = ["value", "standard_error"].map(|key| right["constants"][name][key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.2 * truth, "{name} {value} {error}");
+    }
+}

@@ -11,6 +11,7 @@
 use super::quantity::Decimal;
 use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
 use crate::lagrangian::system::Range;
+use crate::names::unknown;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -160,6 +161,7 @@ impl Description {
             (_, 1..=MAX_LINKS) => {}
             _ => return fault("links", format!("expected 1 to {MAX_LINKS} tables [[links]], found {count}")),
         }
+        plain.parameters.clear();
         if self.metric.is_some() {
             return fault("metric", "expected `[[links]]` or `[metric]`, found both".to_string());
         }
@@ -217,6 +219,16 @@ impl Description {
         if chain.friction {
             plain.dissipation = whole(losses, &self.dissipation);
         }
+        // What the file says of a constant counts; one that is neither of the links nor in a formula would be passed over in silence.
+        let known = || plain.parameters.keys().map(String::as_str);
+        let stray = |name: &&String| !plain.parameters.contains_key(*name) && !self.uses(name);
+        if let Some(name) = self.parameters.keys().find(stray) {
+            return fault(
+                &format!("parameters.{name}"),
+                unknown("constant of the links", name, known().collect::<Vec<_>>()),
+            );
+        }
+        plain.parameters.extend(self.parameters.clone());
         Ok(plain)
     }
 
@@ -307,17 +319,24 @@ impl Description {
         Ok([viscous, constant("Fc").times(&Term::name(dry))])
     }
 
-    /// Unknown constants of a link, unless the file says more of them.
+    /// Unknown constants of a link.
     fn add_constants(&mut self, number: usize, constants: &[(String, &str, f64)]) {
         for (name, unit, value) in constants {
-            let own = || ParameterDescription {
+            let own = ParameterDescription {
                 default: Decimal(value.to_string()),
                 unit: (*unit).to_string(),
                 range: Range::Any,
                 learn: true,
             };
-            self.parameters.entry(format!("{name}{number}")).or_insert_with(own);
+            self.parameters.insert(format!("{name}{number}"), own);
         }
+    }
+
+    /// `true` if a formula of the file holds a name.
+    fn uses(&self, name: &str) -> bool {
+        let formulas = [&self.lagrangian, &self.dissipation].into_iter().flatten();
+        let mut formulas = formulas.chain(self.definitions.values()).chain(self.constraints.values());
+        formulas.any(|text| text.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name))
     }
 
     /// A sum of terms as one: a definition if it takes one.
@@ -473,6 +492,8 @@ mod tests {
         assert_eq!(of(r#""links": [{}, {"alpha": "1/0"}]"#), "links[1].alpha");
         assert_eq!(of(r#""links": [{}], "metric": {}"#), "metric");
         assert_eq!(of(r#""links": [{}], "definitions": {"link1_s": "1"}"#), "definitions.link1_s");
+        assert_eq!(of(r#""links": [{}], "parameters": {"lzz1": 1}"#), "parameters.lzz1");
+        assert_eq!(of(r#""links": [{}], "parameters": {"k": 1}, "lagrangian": "-kk*q1^2""#), "parameters.k");
         let coordinates = r#""coordinates": [{"name": "a", "velocity_bounds": [-1, 1], "periodic": true}]"#;
         assert_eq!(of(&format!(r#""links": [{{}}, {{}}], {coordinates}"#)), "coordinates");
         assert_eq!(of(&format!(r#""links": [{}]"#, vec!["{}"; MAX_LINKS + 1].join(","))), "links");
