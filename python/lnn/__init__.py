@@ -21,7 +21,7 @@ _WHERE = {
     **dict.fromkeys(["Model", "System", "systems"], "_mechanics"),
     **dict.fromkeys(["fit", "learn", "train"], "_learning"),
     **dict.fromkeys(["find_constraints", "formula", "identify"], "_readings"),
-    **dict.fromkeys(["Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
+    **dict.fromkeys(["Bodies", "Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
     **dict.fromkeys(["Identified", "IdentifiedConstant", "Learned", "Outlier", "OwnConstraints", "Residual"], "_results"),
     **dict.fromkeys(["SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ._mechanics import Model, System, systems
     from ._readings import find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
-    from ._results import Certificate, Combination, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
+    from ._results import Bodies, Certificate, Combination, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
     from ._results import Learned, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory, Undetermined
     from .reader import Terms
 

@@ -12,7 +12,7 @@ from . import _lnn
 from ._arrays import as_json, doubles_list, names, real, thread_count, whole
 from ._recorded import recorded
 from ._mechanics import System
-from ._results import Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
+from ._results import Bodies, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
 
 
@@ -183,15 +183,17 @@ def identify(
     unknowns = len(found["constants"]) + len(found["sensors"])
     found["correlations"] = np.array(found["correlations"], float).reshape(unknowns, unknowns)
     found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
-    found["combinations"] = tuple(Combination(dict(sum.pop("terms")), **sum) for sum in found["combinations"])
+    found["combinations"] = tuple(Combination(**known) for known in found["combinations"])
+    found["bodies"] = Bodies(**{**found["bodies"], "moved": tuple(found["bodies"]["moved"])}) if found["bodies"] else None
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
     found["force_noise"] = tuple(found["force_noise"])
     found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)
 
 
-def _undetermined(constants: Any, direction: Any, known: Any, **more: Any) -> Undetermined:
-    return Undetermined(tuple(constants), np.array(direction, float), dict(known), **more)
+def _undetermined(constants: Any, directions: Any, known: Any, **more: Any) -> Undetermined:
+    combinations = {one["name"]: Combination(**one) for one in known}
+    return Undetermined(tuple(constants), np.array(directions, float).reshape(-1, len(constants)), combinations, **more)
 
 
 def formula_choices(

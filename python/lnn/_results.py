@@ -399,25 +399,25 @@ class SensorConstant:
 
 @dataclass(frozen=True)
 class Undetermined:
-    """A direction in which constants change without an effect on the recorded motion.
+    """Constants that can change, alone or together, without an effect on the recorded motion.
 
     Attributes
     ----------
     constants : tuple of str
         The constants.
-    direction : (k,)
-        Relative change of each, the largest 1.
-    known : dict of str to float
-        Combinations that are known nevertheless.
+    directions : (d, k)
+        Relative change of each constant along each open direction, the largest 1; none where sums alone are known.
+    known : dict of str to Combination
+        Combinations that are known nevertheless, by their formula.
     relative_error : float or None
-        Standard error along the direction over the values; None where the motion does not depend on it at all.
+        Largest standard error along a direction over the values; None where the motion does not depend on one at all.
     text, cure : str
         What is open, and what would determine it, in words.
     """
 
     constants: tuple[str, ...]
-    direction: np.ndarray
-    known: dict[str, float]
+    directions: np.ndarray
+    known: dict[str, Combination]
     relative_error: float | None
     text: str
     cure: str
@@ -425,20 +425,45 @@ class Undetermined:
 
 @dataclass(frozen=True)
 class Combination:
-    """A sum of constants that is known though they are not: a base parameter of a robot.
+    """A sum or a product of powers of constants that is known though they are not, such as a base parameter of a robot.
 
     Attributes
     ----------
+    name : str
+        Its formula.
+    product : bool
+        Whether it is a product.
     terms : dict of str to float
-        Factors of the constants by symbol.
+        Factors of the constants by symbol, exponents in a product.
     value, standard_error : float
     unit : str
     """
 
+    name: str
+    product: bool
     terms: dict[str, float]
     value: float
     standard_error: float
     unit: str
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """How the inertias of a chain of links became those of bodies.
+
+    Attributes
+    ----------
+    moved : tuple of int
+        Links whose constants had to be moved, from 1.
+    largest_change : float
+        Largest change of a known sum by it, in standard errors of the sum.
+    exist : bool
+        Whether bodies have the known sums within their errors.
+    """
+
+    moved: tuple[int, ...]
+    largest_change: float
+    exist: bool
 
 
 @dataclass(frozen=True)
@@ -504,6 +529,8 @@ class Identified:
         What the motion leaves open.
     combinations : tuple of Combination
         Sums of constants that are known, where forces are met and are linear in the constants.
+    bodies : Bodies or None
+        How inertias became those of bodies; None for a system that is no chain of links.
     residuals : dict of str to Residual
         By coordinate.
     over_noise : float
@@ -529,6 +556,7 @@ class Identified:
     correlations: np.ndarray
     undetermined: tuple[Undetermined, ...]
     combinations: tuple[Combination, ...]
+    bodies: Bodies | None
     residuals: dict[str, Residual]
     over_noise: float
     explained: bool

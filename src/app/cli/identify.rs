@@ -6,7 +6,9 @@ use crate::cli::recording_args::RecordingArgs;
 use crate::cli::source::parameter;
 use crate::cli::watch::search;
 use crate::cli::{CliError, parse_system, system_arg};
-use crate::identification::{Between, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
+use crate::identification::{
+    Between, Bodies, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify,
+};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{number, pluralize, rounded};
 use crate::recording::{LoadedRecording, Targets};
@@ -222,28 +224,12 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
             json!({ "trajectory": trajectory, "row": row, "t": o.time, "coordinate": o.coordinate, "size": o.size })
         })
         .collect();
-    let undetermined: Vec<Value> = found
-        .undetermined
-        .iter()
-        .map(|u| {
-            let known: Map<String, Value> = u.known.iter().map(|(text, value)| (text.clone(), json!(value))).collect();
-            json!({ "constants": u.constants, "direction": u.direction, "known": known,
-                "relative_error": u.relative_error, "text": u.text, "cure": u.cure })
-        })
-        .collect();
-    let combinations: Vec<Value> = found
-        .combinations
-        .iter()
-        .map(|sum| {
-            let terms: Map<String, Value> = sum.terms.iter().map(|(name, x)| (name.clone(), json!(x))).collect();
-            json!({ "terms": terms, "value": sum.value, "standard_error": sum.standard_error, "unit": sum.unit })
-        })
-        .collect();
     let whole = json!({
         "constants": constants,
         "sensors": found.sensors,
-        "undetermined": undetermined,
-        "combinations": combinations,
+        "undetermined": found.undetermined,
+        "combinations": found.combinations,
+        "bodies": found.bodies,
         "correlations": { "names": names, "matrix": matrix },
         "residual": {
             "coordinates": found.residuals,
@@ -279,6 +265,23 @@ fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
     [rounded(value, digits.clamp(1, 17) as usize), rounded(error, 2)]
 }
 
+/// What became of the inertias of links.
+fn bodies(bodies: &Bodies) -> String {
+    let Bodies { moved, largest_change, exist } = bodies;
+    let links = moved.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    let change = rounded(*largest_change, 2);
+    match (moved.is_empty(), exist) {
+        (_, false) if moved.is_empty() => "\nno bodies have the constants that are given\n".into(),
+        (_, false) => format!(
+            "\nno bodies have these sums within their errors: the nearest ones are {change} standard errors away; is the form complete?\n"
+        ),
+        (true, true) => String::new(),
+        (false, true) => format!(
+            "\nthe constants of links {links} are the nearest to the start that bodies have; known sums change by {change} standard errors at most\n"
+        ),
+    }
+}
+
 fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let row = |name: String, (value, error): (f64, Option<f64>), unit: &str, start: f64| {
         let [value, error] = with_error(value, error);
@@ -298,27 +301,19 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     });
     let headers = ["constant", "value", "standard error", "unit", "start"];
     let mut text = text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
-    let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1).map(|sum| {
-        let term = |(at, (name, factor)): (usize, &(String, f64))| {
-            let (sign, size) = if *factor < 0.0 { ("-", -factor) } else { ("+", *factor) };
-            let sign = if at == 0 { String::new() } else { format!(" {sign} ") };
-            let size = rounded(size, 4);
-            if size == "1.000" { format!("{sign}{name}") } else { format!("{sign}{size}*{name}") }
-        };
-        let [value, error] = with_error(sum.value, Some(sum.standard_error));
-        vec![sum.terms.iter().enumerate().map(term).collect(), value, error, sum.unit.clone()]
+    let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1);
+    let known = sums.chain(found.undetermined.iter().flat_map(|open| &open.known)).map(|known| {
+        let [value, error] = with_error(known.value, Some(known.standard_error));
+        vec![known.name.clone(), value, error, known.unit.clone()]
     });
-    let sums: Vec<Vec<String>> = sums.collect();
-    if !sums.is_empty() {
-        text += &format!("\n{}", text_table(&["sum of constants", "value", "standard error", "unit"], &sums));
+    let known: Vec<Vec<String>> = known.collect();
+    if !known.is_empty() {
+        text += &format!("\n{}", text_table(&["combination", "value", "standard error", "unit"], &known));
     }
-    for Undetermined { text: open, cure, known, .. } in &found.undetermined {
-        text += &format!("\n{open}\n");
-        for (combination, value) in known {
-            text += &format!("  {combination} = {}\n", rounded(*value, 6));
-        }
-        text += &format!("  it takes {cure}\n");
+    for Undetermined { text: open, cure, .. } in &found.undetermined {
+        text += &format!("\n{open}\n  it takes {cure}\n");
     }
+    text += &found.bodies.as_ref().map(bodies).unwrap_or_default();
     let m = found.constants.len() + found.sensors.len();
     let names: Vec<String> =
         found.constants.iter().map(|c| c.symbol.clone()).chain(found.sensors.iter().map(sensor)).collect();

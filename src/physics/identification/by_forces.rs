@@ -12,7 +12,8 @@ use super::found::{Identified, Outlier, Residual};
 use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
 use super::smoothed::{Met, States};
 use super::solve::Problem;
-use super::stages::{Fitted, unknowns};
+use super::stages::Fitted;
+use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::{Smoothing, noise};
 use crate::recording::{deviation, quantile, rms};
@@ -126,6 +127,7 @@ pub(super) fn identify(
         None => (normal, 1.0),
     };
     let fitted = Fitted { x, segments, normal, substeps: 0 };
+    let normal_at = |x: &[f64]| states.normal(problem, x, Met::Forces);
     problem.cancellation.check()?;
     Ok(Identified {
         explained: verdict.explains(),
@@ -136,7 +138,7 @@ pub(super) fn identify(
         outlier_count,
         inflation,
         samples: count,
-        ..unknowns(instance, problem, &fitted, (&start, 1.0), Met::Forces)
+        ..unknowns(instance, problem, &fitted, (&start, 1.0), (Met::Forces, &normal_at))
     })
 }
 

@@ -4,7 +4,7 @@
 //! matrix and `B` the long-run covariance of the scores: the mean of the outer products of their sums over all windows of one length, which is
 //! Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
-use super::determined::NULL;
+use super::determined::ROUNDING;
 use super::follow::{LANES, Segment};
 use super::linear::times;
 use super::quality::tail;
@@ -114,7 +114,7 @@ impl Root {
         let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
         // Finite by construction.
         let _ = eigh(m, &scaled, &mut values, &mut vectors, &mut Workspace::new());
-        let told = || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > NULL);
+        let told = || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > ROUNDING);
         let each = |vector: &[f64], of: &dyn Fn(usize, f64) -> f64| {
             vector.iter().enumerate().map(|(k, x)| of(k, *x)).collect::<Vec<f64>>()
         };

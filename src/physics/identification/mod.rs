@@ -25,26 +25,31 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bodies;
 mod bootstrap;
 mod by_forces;
 mod covariance;
+mod cure;
 mod determined;
 mod error;
 mod follow;
 mod found;
 mod innovations;
+mod invariants;
 pub(crate) mod linear;
+mod moves;
 mod quality;
 mod smoothed;
 mod solve;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod unknowns;
 mod verdict;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
-pub use found::{Combination, Constant, Identified, Residual, Undetermined};
+pub use found::{Bodies, Combination, Constant, Identified, Residual, Undetermined};
 #[doc(hidden)]
 pub use found::{Outlier, SensorConstant};
 pub(crate) use innovations::Disturbances;

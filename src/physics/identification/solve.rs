@@ -21,6 +21,8 @@ const NO_EFFECT: f64 = 1e-22;
 const FAILED: f64 = 1e8;
 /// Damping beyond which nothing gets better.
 const MOST_DAMPING: f64 = 1e9;
+/// Rounds in which starts follow other unknowns.
+const SETTLING: usize = 6;
 /// Relative decrease of the sum of squares that is none.
 const CONVERGED: f64 = 1e-9;
 
@@ -382,6 +384,13 @@ impl Problem<'_> {
         }
         segments.iter_mut().zip(starts).for_each(|(segment, start)| segment.start = start);
         best.iter().zip(segments).map(|(b, s)| b.as_ref().map_or(FAILED * s.samples as f64, |b| b.square)).sum()
+    }
+
+    /// Undamped normal equations at other unknowns, the starts of the segments fitted to them.
+    pub fn normal_at(&self, x: &[f64], segments: &[Segment]) -> Normal {
+        let mut segments = segments.to_vec();
+        self.settle(x, &mut segments, SETTLING);
+        self.normal(&self.all(x, &segments), &segments, 0.0)
     }
 
     /// A change of the unknowns, applied to them; constants that must be positive stay so.

@@ -1,15 +1,15 @@
 //! From smoothed accelerations to longer and longer segments of motion.
 
 use super::covariance::{Root, Weighing, agreement, long_run, scores};
-use super::determined::{Determined, Examiner};
 use super::follow::{Course, Segment};
-use super::found::{Combination, Constant, Identified, Outlier, Residual, SensorConstant};
+use super::found::{Identified, Outlier, Residual};
 use super::innovations::Disturbances;
 use super::quality::{
     CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
 };
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem, Sensor, SensorKind};
+use super::unknowns::unknowns;
 use super::{Between, IdentifyError, IdentifyOptions, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
@@ -503,90 +503,6 @@ fn usual_samples(segments: &[Segment]) -> usize {
     samples.get(samples.len() / 2).copied().unwrap_or(0)
 }
 
-/// The part of the result about constants and sensors; the caller adds the residuals.
-pub(super) fn unknowns(
-    instance: &SystemInstance<f64>,
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    (start, inflation): (&[f64], f64),
-    met: Met,
-) -> Identified {
-    let (n, m) = (problem.sigma.len(), fitted.x.len());
-    let recording = problem.course.recording;
-    let determined = Determined::new(problem, &fitted.x, &fitted.normal, inflation);
-    let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
-    let sensor_name = |sensor: &Sensor| {
-        let kind = kind(sensor.kind);
-        format!("{kind} of {}", recording.coordinates[sensor.coordinate])
-    };
-    let names: Vec<String> = (0..problem.chosen.len())
-        .map(|k| parameter(k).symbol.to_string())
-        .chain(problem.sensors.iter().map(sensor_name))
-        .collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let examiner = Examiner {
-        problem,
-        x: &fitted.x,
-        segments: &fitted.segments,
-        coordinates: &recording.coordinates,
-        bounds: instance.system.validation(n),
-        names: &names,
-    };
-    let (undetermined, combinations) = match met {
-        // What sums are known says what is open.
-        Met::Forces if problem.is_linear(&fitted.segments) => {
-            let units: Vec<&str> = (0..m).map(|k| parameter(k).unit.as_ref()).collect();
-            (examiner.together(&determined.null), determined.base_parameters(&names, &units, &fitted.x))
-        }
-        _ => {
-            let open = determined.open.iter();
-            (open.map(|(direction, error)| examiner.describe(direction, *error)).collect(), Vec::new())
-        }
-    };
-    let alone: Vec<&str> = combinations
-        .iter()
-        .filter(|sum: &&Combination| sum.terms.len() == 1)
-        .map(|sum| sum.terms[0].0.as_str())
-        .collect();
-    let errors: Vec<Option<f64>> = match combinations.is_empty() {
-        true => determined.errors.clone(),
-        false => {
-            let error = |k: usize| alone.contains(&names[k]).then(|| determined.covariance[k * m + k].sqrt());
-            (0..m).map(error).collect()
-        }
-    };
-    let constants = start.iter().enumerate().map(|(k, &start)| Constant {
-        symbol: parameter(k).symbol.to_string(),
-        value: fitted.x[k],
-        standard_error: errors[k],
-        unit: parameter(k).unit.to_string(),
-        start,
-    });
-    let sensors = problem.sensors.iter().zip(start.len()..).map(|(sensor, k)| SensorConstant {
-        kind: kind(sensor.kind),
-        coordinate: recording.coordinates[sensor.coordinate].clone(),
-        value: fitted.x[k],
-        standard_error: errors[k],
-    });
-    let correlation = |at: usize| {
-        let (i, j) = (at / m, at % m);
-        let root = |k: usize| determined.covariance[k * m + k].sqrt();
-        match (errors[i], errors[j]) {
-            _ if i == j => 1.0,
-            (Some(_), Some(_)) if root(i) * root(j) > 0.0 => determined.covariance[at] / (root(i) * root(j)),
-            _ => 0.0,
-        }
-    };
-    Identified {
-        constants: constants.collect(),
-        sensors: sensors.collect(),
-        correlations: (0..m * m).map(correlation).collect(),
-        undetermined,
-        combinations,
-        ..Identified::default()
-    }
-}
-
 fn result(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
@@ -596,6 +512,7 @@ fn result(
 ) -> Identified {
     let n = problem.sigma.len();
     let recording = problem.course.recording;
+    let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
     let numbers: f64 = residuals.iter().map(|r| r.len() as f64).sum();
     let taken = (fitted.normal.count - fitted.x.len() as f64).max(1.0) / numbers;
@@ -648,7 +565,13 @@ fn result(
         segment_seconds: usual_samples(&fitted.segments) as f64 * problem.course.step,
         substeps: fitted.substeps,
         between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
-        ..unknowns(instance, problem, &Fitted { normal, ..fitted.clone() }, (start, 1.0), Met::Accelerations)
+        ..unknowns(
+            instance,
+            problem,
+            &Fitted { normal, ..fitted.clone() },
+            (start, 1.0),
+            (Met::Accelerations, &normal_at),
+        )
     }
 }
 
@@ -674,12 +597,4 @@ fn informed(
     seen.iter_mut().for_each(|x| *x *= bread);
     let mean = mean_eigenvalue(&seen, root.forward.len());
     (root.informed(&fitted.normal, &seen, least), (mean / plain).max(1.0))
-}
-
-fn kind(kind: SensorKind) -> &'static str {
-    match kind {
-        SensorKind::Offset => "offset",
-        SensorKind::Gain => "gain",
-        SensorKind::Delay => "delay",
-    }
 }

@@ -134,6 +134,16 @@ fn cross(a: &Vector, b: &Vector, i: usize) -> [Term; 2] {
     [a[j].times(&b[k]), a[k].times(&b[j]).scaled(-1.0)]
 }
 
+/// Symbols of the ten constants of a link, from 1: its mass, first moments and inertia about the origin of its frame.
+pub(crate) fn inertia_symbols(link: usize) -> [String; 10] {
+    ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"].map(|what| format!("{what}{link}"))
+}
+
+/// Symbols of the constants of a joint, from 1, that are not negative: the inertia of its drive, viscous and dry friction.
+pub(crate) fn loss_symbols(link: usize) -> [String; 3] {
+    ["Ia", "Fv", "Fc"].map(|what| format!("{what}{link}"))
+}
+
 impl Description {
     /// The same with links written out; as it is if they are wrong, which its compilation says.
     pub(crate) fn plain(&self) -> Self {
@@ -456,6 +466,17 @@ mod tests {
         let push = 2.75 * a[0] + 0.2 * (cosine * a[1] - sine * v[1] * v[1]);
         let swing = 0.08 * a[1] + 0.2 * cosine * a[0] - 0.2 * 9.81 * sine;
         close(&forces(&cart, STATE), &[push, swing]);
+    }
+
+    #[test]
+    fn constants_of_links_have_their_symbols() {
+        let arm = instance(r#"{"friction": true, "armature": true}"#, r#"[{}, {"prismatic": true}]"#, &[]);
+        let mut own: Vec<String> = arm.system.parameters.iter().map(|known| known.symbol.to_string()).collect();
+        let mut symbols: Vec<String> =
+            (1..=2).flat_map(|link| [&inertia_symbols(link)[..], &loss_symbols(link)].concat()).collect();
+        own.sort();
+        symbols.sort();
+        assert_eq!(own, symbols);
     }
 
     #[test]

@@ -14,6 +14,7 @@ use super::expression::{ExpressionError, Formula};
 use super::system::{Range, ShellAdvice};
 use crate::scalar::Real;
 use chain::{ChainDescription, LinkDescription};
+pub(crate) use chain::{inertia_symbols, loss_symbols};
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
