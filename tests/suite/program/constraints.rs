@@ -310,3 +310,56 @@ fn degenerate_lagrangians_are_named_with_their_directions() {
     let end = columns(&fs::read_to_string(&out).unwrap())[10][1..3].to_vec();
     assert!((end[0] + 4.905 / 2.0).abs() < 1e-6 && (end[1] - 1.0 - 4.905 / 2.0).abs() < 1e-6, "{end:?}");
 }
+
+const SLIDER: &str = "name = \"slider\"\n\
+    lagrangian = \"m1*(x1_dot^2+y1_dot^2)/2 - m1*g*y1 + m2*x2_dot^2/2\"\n\
+    [[coordinates]]\nname = \"x1\"\nbounds = [-2, 2]\nvelocity_bounds = [-2, 2]\n\
+    [[coordinates]]\nname = \"y1\"\nbounds = [-2, 2]\nvelocity_bounds = [-2, 2]\n\
+    [[coordinates]]\nname = \"x2\"\nbounds = [-4, 4]\nvelocity_bounds = [-2, 2]\n\
+    [parameters]\nm1 = 1\nm2 = 1\ng = 9.81\nr = 1\nl = 2\n\
+    [constraints]\ncrank = \"x1^2 + y1^2 - r^2\"\nrod = \"(x2-x1)^2 + y1^2 - l^2\"\nagain = \"2*(x2-x1)^2 + 2*y1^2 - 2*l^2\"\n";
+
+#[test]
+fn the_later_of_two_constraints_follows_and_inverse_dynamics_divides_the_force() {
+    let folder = Folder::new();
+    let file = folder.file("slider.toml", SLIDER);
+    let said = json(&lnn(&["constraints", &file, "--json"]).stdout);
+    assert_eq!(said["redundant"], serde_json::json!(["again"]), "{said}");
+    let columns = "x1,y1,x2,x1_dot,y1_dot,x2_dot,x1_ddot,y1_ddot,x2_ddot";
+    let inverse = |a: &str| {
+        let states = folder.file("states.csv", format!("{columns}\n0.6,0.8,2.433030277982336,0,0,0,{a}\n"));
+        lnn(&["inspect", "--system", &file, "--states", &states, "--inverse"])
+    };
+    // Held still: a force from outside and the rods carry the weight of 9.81 N together.
+    let found = json(&inverse("0,0,0").stdout);
+    let of = |name: &str| -> Vec<f64> { found[name].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
+    let (outside, carried) = (of("external_force"), of("constraint_force"));
+    for (i, weight) in [0.0, 9.81, 0.0].into_iter().enumerate() {
+        assert!((outside[i] + carried[i] - weight).abs() < 1e-9, "{found}");
+    }
+    // The crank turns (-0.8, 0.6) at the joint, and the slider with it: the shortest force lies along that.
+    let along = [-0.8, 0.6, -0.8 - 0.6 * 0.8 / 1.833_030_277_982_336];
+    let factor = outside[1] / along[1];
+    assert!(outside.iter().zip(along).all(|(f, x)| (f - factor * x).abs() < 1e-9) && factor > 0.0, "{found}");
+    assert_eq!(of("multipliers").len(), 2);
+    // No motion of the crank has this acceleration.
+    inverse("1,0,0").refused(1, &["row 2", "away from what the constraints allow", "crank"]);
+}
+
+#[test]
+fn a_motion_at_a_second_branch_ends_with_its_time_and_names_the_constraint() {
+    let folder = Folder::new();
+    let wheels = "name = \"gear\"\nlagrangian = \"(a_dot^2 + 2*b_dot^2)/2\"\n\
+        [[coordinates]]\nname = \"a\"\nunit = \"rad\"\nbounds = [-3, 3]\nvelocity_bounds = [-2, 2]\n\
+        [[coordinates]]\nname = \"b\"\nunit = \"rad\"\nbounds = [-3, 3]\nvelocity_bounds = [-2, 2]\n\
+        [constraints]\nmesh = \"FORMULA\"\n";
+    let roll = |formula: &str| {
+        let file = folder.file("gear.toml", wheels.replace("FORMULA", formula));
+        let out = text(&folder.path("motion.csv"));
+        let start = ["--state", "0,0.3,1,2", "--t-end", "6", "--dt", "0.05", "--overwrite", "--out", &out];
+        lnn(&[&["rollout", "--system", &file], &start[..]].concat())
+    };
+    // b reaches a half turn at (pi - 0.3)/2 = 1.42 s.
+    roll("cos(b) - cos(2*a + 0.3)").refused(1, &["`mesh`", "second branch", "t = 1.42"]);
+    roll("sin(b - 2*a - 0.3)").succeeded();
+}

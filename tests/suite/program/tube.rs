@@ -50,3 +50,13 @@ fn a_tube_comes_from_motion_that_was_held_out_or_from_other_recordings() {
     fs::remove_file(folder.path("run").join("config.toml")).unwrap();
     rollout(&["--tube", "0.9"]).refused(1, &["config.toml", "--tube"]);
 }
+
+#[test]
+fn a_system_has_no_tube() {
+    let folder = Folder::new();
+    let out = text(&folder.path("motion.csv"));
+    let roll =
+        ["rollout", "--system", "harmonic-oscillator", "--state", "1,0", "--t-end", "1", "--dt", "0.1", "--out", &out];
+    lnn(&[&roll[..], &["--tube", "0.9"]].concat()).refused(2, &["--tube"]);
+    assert!(!folder.path("motion.csv").exists());
+}
