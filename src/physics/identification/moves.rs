@@ -4,6 +4,7 @@ use super::determined::{Column, Determined};
 use super::invariants::{Invariant, Kind, products, sums};
 use super::linear::{inverse_with, times};
 use super::solve::{Normal, Problem, mute};
+use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
 /// Factors by which a pivot is moved.
@@ -77,6 +78,9 @@ impl<'a> Moves<'a> {
         let followed = |x: &[f64]| (self.normal_at)(x).filter(|n| n.failed == 0 && n.square.is_finite());
         let mut best = followed(&x)?;
         for _ in 0..STEPS {
+            if self.problem.cancellation.is_cancelled() {
+                return None;
+            }
             let (mut matrix, mut right) = (best.matrix.clone(), best.right.clone());
             mute(&held, &mut matrix, &mut right);
             let mut change = times(m, &inverse_with(m, &matrix, RIDGE)?, &right);
@@ -160,7 +164,16 @@ impl<'a> Moves<'a> {
                 }
             }
         }
-        self.refit(near).map_or_else(|| x.to_vec(), |(x, _)| x)
+        let near = Some(near).filter(|near| self.is_in_range(near)).and_then(|near| self.refit(near));
+        near.map_or_else(|| x.to_vec(), |(x, _)| x)
+    }
+
+    fn is_in_range(&self, x: &[f64]) -> bool {
+        self.problem.chosen.iter().zip(x).all(|(&k, &x)| match self.problem.ranges[k] {
+            Range::Positive => x > 0.0,
+            Range::AtLeastZero => x >= 0.0,
+            Range::Any => true,
+        })
     }
 }
 
