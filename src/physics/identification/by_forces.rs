@@ -9,7 +9,7 @@ use super::follow::{Follower, LANES, Segment};
 use super::found::{Identified, Outlier, Residual};
 use super::quality::{outliers, usual, whiteness};
 use super::smoothed::{Met, States};
-use super::solve::Problem;
+use super::solve::{Normal, Problem};
 use super::stages::{EXPLAINED, Fitted, unknowns};
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::noise;
@@ -42,22 +42,23 @@ pub(super) fn identify(
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let mut sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
+    let mut search = Normal::default();
     for _ in 0..ROUNDS {
         states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
-        if !states.fit(problem, &mut x, Met::Forces) {
-            return Err(IdentifyError::Singular);
-        }
+        search = states.fit(problem, &mut x, Met::Forces).ok_or(IdentifyError::Singular)?;
         let residuals = [states.force_residuals(problem, &x)];
         let left: Vec<f64> = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
         let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
         sigma = left;
         tracing::debug!(?sigma, "residuals of force");
+        search.converged &= settled;
         if settled {
             break;
         }
     }
     states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
-    let normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;
+    let mut normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;
+    (normal.converged, normal.decrement, normal.held) = (search.converged, search.decrement, search.held);
     let fitted = Fitted { x, segments, normal, substeps: 0 };
     let (inflation, widened) = fitted.inflation();
     let residuals = states.force_residuals(problem, &fitted.x);
@@ -71,7 +72,7 @@ pub(super) fn identify(
     };
     let by_coordinate: Vec<Residual> = (0..n).map(left).collect();
     let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
-    let explained = (0..n).all(|i| sigma[i] < EXPLAINED * by_coordinate[i].noise);
+    let explained = fitted.normal.converged && (0..n).all(|i| sigma[i] < EXPLAINED * by_coordinate[i].noise);
     // States of all trajectories in a row.
     let whole = Segment { track: 0, first: 0, samples: count, start: Vec::new() };
     let far = |_, state: usize, i: usize, size: f64| {
@@ -81,6 +82,8 @@ pub(super) fn identify(
     };
     let (outliers, outlier_count) = outliers((&[whole], &[residuals]), n, far);
     Ok(Identified {
+        converged: fitted.normal.converged,
+        decrement: fitted.normal.decrement,
         explained,
         residuals: by_coordinate,
         over_noise: square.sqrt(),

@@ -1,9 +1,9 @@
 //! Constants by least squares on smoothed motion: on its accelerations, where the fit through the motion begins, or on known forces.
 
+use super::descent::{LEAST_DAMPING, MOST_DAMPING};
 use super::follow::{Follower, LANES, forces};
-use super::linear::{inverse_with, times};
-use super::solve::{Normal, Problem, mute, without_effect};
-use crate::linalg::dot;
+use super::pieces::Piece;
+use super::solve::{Normal, Problem};
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
 
@@ -12,10 +12,6 @@ const MOST_STATES: usize = 12_000;
 /// Errors beyond so many standard deviations count linearly.
 const HUBER: f64 = 3.0;
 const ITERATIONS: usize = 60;
-/// Relative decrease of the sum of squares that is none.
-const CONVERGED: f64 = 1e-8;
-/// Part of the diagonal that keeps normal equations regular.
-const RIDGE: f64 = 1e-11;
 /// Effect of a constant on accelerations, over these and squared, that is rounding alone.
 const NO_EFFECT: f64 = 1e-20;
 
@@ -42,16 +38,17 @@ pub(super) enum Met {
 
 impl States {
     /// Of the samples with full windows.
-    pub fn new(problem: &Problem<'_>, smoothed: &[Option<Smoothed>]) -> Self {
+    pub fn new(problem: &Problem<'_>, pieces: &[Piece]) -> Self {
         let n = problem.course.equations.n;
         let (mut states, mut force) = (Self::default(), vec![0.0; n]);
+        let smoothed = || pieces.iter().filter_map(|piece| Some((piece.track, piece.smoothed.as_ref()?)));
         let full = |s: &Smoothed| s.interior().filter(|&at| s.is_full(at)).collect::<Vec<_>>();
-        let all: usize = smoothed.iter().flatten().map(|s| full(s).len()).sum();
+        let all: usize = smoothed().map(|(_, (s, _))| full(s).len()).sum();
         let stride = all.div_ceil(MOST_STATES).max(1);
-        for (at, (track, smoothed)) in problem.course.recording.tracks.iter().zip(smoothed).enumerate() {
-            let Some(smoothed) = smoothed else { continue };
-            for sample in full(smoothed).into_iter().step_by(stride) {
-                let range = sample * n..(sample + 1) * n;
+        for (at, (smoothed, samples)) in smoothed() {
+            let track = &problem.course.recording.tracks[at];
+            for state in full(smoothed).into_iter().step_by(stride) {
+                let (sample, range) = (samples[state], state * n..(state + 1) * n);
                 states.places.push((at, sample));
                 states.q.extend(&smoothed.q[range.clone()]);
                 states.v.extend(&smoothed.v[range.clone()]);
@@ -158,43 +155,28 @@ impl States {
         all
     }
 
-    /// Moves constants to where smoothed motion is met best; `false` if no residual is finite.
-    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> bool {
-        let m = problem.chosen.len();
-        let Some(mut best) = self.normal(problem, x, met) else { return false };
+    /// Moves constants to where smoothed motion is met best; the normal equations there, `None` if no residual is finite.
+    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> Option<Normal> {
+        let mut best = self.normal(problem, x, met)?;
         let given = if met == Met::Forces { &self.force } else { &self.a };
         let size: f64 = given.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
         // Forces are often linear in the constants.
         let mut damping = if met == Met::Forces { 1e-9 } else { 1e-3 };
         for _ in 0..ITERATIONS {
-            let mut right = best.right.clone();
-            let mut damped: Vec<f64> =
-                (0..m * m).map(|at| best.matrix[at] * if at / m == at % m { 1.0 + damping } else { 1.0 }).collect();
-            mute(&without_effect(&x[..m], &best.matrix, NO_EFFECT * size), &mut damped, &mut right);
-            let Some(inverse) = inverse_with(m, &damped, RIDGE) else { break };
-            let mut change = times(m, &inverse, &right);
-            if dot(&change, &right) < CONVERGED * best.square {
+            let muted = problem.too_weak(x, &best, NO_EFFECT * size);
+            problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
+            if best.converged || damping > MOST_DAMPING {
                 break;
             }
-            change.resize(x.len(), 0.0);
-            let moved = problem.moved(x, &change);
+            let moved = problem.moved(x, &problem.step(x, &best, &muted, damping).change, &best);
             match self.normal(problem, &moved, met) {
                 Some(tried) if tried.square < best.square => {
-                    let done = best.square - tried.square < CONVERGED * best.square;
                     (*x, best) = (moved, tried);
-                    damping = f64::max(damping / 10.0, 1e-10);
-                    if done {
-                        break;
-                    }
+                    damping = f64::max(damping / 10.0, LEAST_DAMPING);
                 }
-                _ => {
-                    damping *= 10.0;
-                    if damping > 1e9 {
-                        break;
-                    }
-                }
+                _ => damping *= 10.0,
             }
         }
-        true
+        Some(best)
     }
 }
