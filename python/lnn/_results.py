@@ -347,6 +347,8 @@ class IdentifiedConstant:
     unit : str
     start : float
         Value at which the search started.
+    at_bound : bool
+        Whether it lies at the bound of its range, beyond which the data would be met better: it has no symmetric error.
     """
 
     symbol: str
@@ -354,6 +356,7 @@ class IdentifiedConstant:
     standard_error: float | None
     unit: str
     start: float
+    at_bound: bool
 
 
 @dataclass(frozen=True)
@@ -487,6 +490,12 @@ class Identified:
         By coordinate.
     over_noise : float
         Residuals over the noise, root mean square, all coordinates together.
+    obstacles : tuple of str
+        What is to be known before all else: coordinates that stand still.
+    converged : bool
+        Whether the search arrived; if not, the constants are where it stopped.
+    decrement : float
+        The decrease of the sum of squares that was left to gain, over the variance of the noise.
     explained : bool
         Whether residuals are as large as the noise and white: the form explains the motion.
     outliers : tuple of Outlier
@@ -506,6 +515,9 @@ class Identified:
     combinations: tuple[Combination, ...]
     residuals: dict[str, Residual]
     over_noise: float
+    obstacles: tuple[str, ...]
+    converged: bool
+    decrement: float
     explained: bool
     outliers: tuple[Outlier, ...]
     outlier_count: int

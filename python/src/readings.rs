@@ -48,11 +48,14 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
 #[pyfunction]
 pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str) -> PyResult<String> {
     // The other choices have their types from Python.
-    let options: IdentifyOptions =
+    let mut options: IdentifyOptions =
         serde_json::from_str(choices).map_err(|error| value(format_args!("between: {error}")))?;
-    let (source, instance) = (Source::of(motion)?, system.system_instance()?);
+    let (source, instance) = (Source::whole(motion)?, system.system_instance()?);
     whole(py, |_| {
-        let loaded = source.read()?;
+        let mut loaded = source.read()?;
+        if options.errors.is_empty() {
+            options.errors = std::mem::take(&mut loaded.errors);
+        }
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?;
         let outliers: Vec<_> = found
             .outliers

@@ -1,13 +1,13 @@
 //! `lnn identify`: the constants of a system whose form is known, from recorded motion.
 
 use crate::cli::number::{positive, seconds, thread_count, threads};
-use crate::cli::recording_args::RecordingArgs;
+use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::source::parameter;
 use crate::cli::{CliError, output, parse_system, system_arg};
 use crate::identification::{Between, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{number, pluralize, rounded};
-use crate::recording::{LoadedRecording, Targets};
+use crate::recording::{Columns, LoadedRecording, Targets};
 use crate::report::text_table;
 use crate::storage::{check_target, write_atomically};
 use serde_json::{Map, Value, json};
@@ -43,6 +43,9 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
+    /// Columns of the standard deviations of the positions, row by row, one per coordinate and in its unit; residuals are weighed by them.
+    #[arg(long, value_name = "COLUMN,..", value_delimiter = ',', conflicts_with = "noise")]
+    error: Vec<String>,
     /// What the constants are fitted to: the motion, or the known forces [default: the forces of a chain of links, else the motion].
     #[arg(long, value_enum, value_name = "WHAT")]
     targets: Option<Met>,
@@ -144,6 +147,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         gains: args.gain.clone(),
         delays: args.delay.clone(),
         noise: args.noise.clone(),
+        errors: reading.errors.clone(),
         targets: args.targets.map(Targets::from),
         between: args.between.map(Between::from),
         segment: args.segment,
@@ -177,7 +181,8 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
         let angles = recording.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
         recording.periodic = angles.map(|(column, _)| column.clone()).collect();
     }
-    recording.read()
+    let columns = Columns { error: args.error.clone(), whole: true, ..recording.meaning() };
+    read_files(&recording.data, &columns)
 }
 
 /// What the user chose, or what the data are.
@@ -226,7 +231,7 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
         .iter()
         .map(|c| {
             let value =
-                json!({ "value": c.value, "standard_error": c.standard_error, "unit": c.unit, "start": c.start });
+                json!({ "value": c.value, "standard_error": c.standard_error, "unit": c.unit, "start": c.start, "at_bound": c.at_bound });
             (c.symbol.clone(), value)
         })
         .collect();
@@ -262,6 +267,9 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
     let whole = json!({
         "constants": constants,
         "sensors": found.sensors,
+        "obstacles": found.obstacles,
+        "converged": found.converged,
+        "decrement": found.decrement,
         "undetermined": undetermined,
         "combinations": combinations,
         "correlations": { "names": names, "matrix": matrix },
@@ -303,18 +311,22 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     };
     // Where sums are known, constants that they alone tell have no row of their own.
     let alone = |c: &&Constant| found.combinations.is_empty() || c.standard_error.is_some();
-    let rows = found
-        .constants
-        .iter()
-        .filter(alone)
-        .map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
+    let rows = found.constants.iter().filter(alone).map(|c| {
+        let mut row = row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start);
+        if c.at_bound {
+            row[2] = "at its bound".to_string();
+        }
+        row
+    });
     let perfect = |kind: &str| if kind == "gain" { 1.0 } else { 0.0 };
     let sensors = found.sensors.iter().map(|s| {
         let unit = if s.kind == "delay" { "s" } else { "" };
         row(sensor(s), (s.value, s.standard_error), unit, perfect(s.kind))
     });
     let headers = ["constant", "value", "standard error", "unit", "start"];
-    let mut text = text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
+    let said: String =
+        found.obstacles.iter().map(|obstacle| format!("{obstacle}; nothing can be learned of it\n")).collect();
+    let mut text = said + &text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
     let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1).map(|sum| {
         let term = |(at, (name, factor)): (usize, &(String, f64))| {
             let (sign, size) = if *factor < 0.0 { ("-", -factor) } else { ("+", *factor) };
@@ -362,11 +374,19 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let headers = [what, "residual", "noise", "spread", "of neighbours", ""];
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
     text += match found.explained {
+        _ if !found.converged => "",
         true => "the form explains what was measured\n",
         false => {
             "the form does not explain what was measured: something is missing, and errors are those of a wrong form\n"
         }
     };
+    if !found.converged {
+        text += &format!(
+            "the search did not converge: {} times the variance of the noise is left to gain, and constants and errors are those where it \
+             stopped\n",
+            number(found.decrement)
+        );
+    }
     text += &pluralize(found.samples, "sample", "samples");
     if found.segments > 0 {
         let segments = pluralize(found.segments, "segment", "segments");
