@@ -5,6 +5,7 @@
 //! gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
 mod constraints;
+mod convergence;
 mod formula;
 mod identify;
 mod readings;
@@ -63,7 +64,7 @@ impl Part {
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
-            Self::Identify => identify::rates(seeds),
+            Self::Identify => Ok([identify::rates(seeds)?, convergence::convergence(seeds)?].concat()),
             Self::Formula => formula::rates(seeds),
             Self::Constraints => constraints::rates(seeds),
             Self::Readings => readings::rates(seeds),
