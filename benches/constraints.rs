@@ -12,7 +12,7 @@ mod networks;
 use clap::Parser;
 use lnn::analysis::mass_matrix_error_within;
 use lnn::configuration::Penalty;
-use lnn::constraints::{ConstraintKind, ConstraintSearch, FoundConstraints, MotionSamples, find_constraints};
+use lnn::constraints::{ConstraintSearch, FoundConstraints, MotionSamples, find_constraints};
 use lnn::data::Dataset;
 use lnn::lagrangian::{
     Constrained, Constraints, EulerLagrange, ExpressionConstraints, ManifoldRows, Mechanics, Request, SystemInstance,
@@ -152,7 +152,7 @@ fn search(recording: &Recording, degree: usize) -> FoundConstraints {
 /// Largest distance of exact states from a found constraint, over the size of the coordinates.
 fn distance(exact: &Recording, found: &FoundConstraints) -> f64 {
     let names: Vec<&str> = exact.coordinates.iter().map(String::as_str).collect();
-    let of_system = found.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
+    let of_system = found.constraints.iter().filter(|found| found.kind.is_imposed());
     let formulas: Vec<(String, &str)> =
         of_system.enumerate().map(|(k, found)| (k.to_string(), found.formula.as_str())).collect();
     let formulas: Vec<(&str, &str)> = formulas.iter().map(|(name, formula)| (name.as_str(), *formula)).collect();

@@ -255,7 +255,7 @@ fn metric(case: &Metric, structure: Structure, seed: u64, show: bool) {
     let names: Vec<String> = coordinates.iter().map(|c| c.name.to_string()).collect();
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
     let options = FormulaOptions {
-        families: case.basis.parse().expect("families"),
+        families: Some(case.basis.parse().expect("families")),
         functions: case.functions.iter().map(ToString::to_string).collect(),
         gyroscopic: false,
         seed,

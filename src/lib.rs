@@ -37,6 +37,7 @@
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
+//! | end a long search, or see how far it is | [`cancellation::Cancellation`] |
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! [`prelude`] holds the names that most programs need. Internally, the modules are arranged on six floors, `numerics`, `support`,
@@ -189,6 +190,7 @@ pub use physics::{analysis, formula, identification};
 pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
+pub use support::cancellation;
 pub(crate) use support::names;
 #[doc(hidden)]
 pub use support::storage;

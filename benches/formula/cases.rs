@@ -154,7 +154,8 @@ impl Case {
     }
 
     pub fn options(&self, seed: u64) -> FormulaOptions {
-        let families = if self.basis.is_empty() { Families::default() } else { self.basis.parse().expect("families") };
+        let families =
+            Some(if self.basis.is_empty() { Families::default() } else { self.basis.parse().expect("families") });
         FormulaOptions {
             families,
             friction: !self.dissipation.is_empty(),

@@ -6,6 +6,7 @@
 
 mod constraints;
 mod convergence;
+mod determined;
 mod formula;
 mod identify;
 mod readings;
@@ -64,7 +65,10 @@ impl Part {
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
-            Self::Identify => Ok([identify::rates(seeds)?, convergence::convergence(seeds)?].concat()),
+            Self::Identify => {
+                let parts = [identify::rates, convergence::convergence, determined::determined];
+                Ok(parts.into_iter().map(|rates| rates(seeds)).collect::<Outcome<Vec<_>>>()?.concat())
+            }
             Self::Formula => formula::rates(seeds),
             Self::Constraints => constraints::rates(seeds),
             Self::Readings => readings::rates(seeds),

@@ -11,6 +11,7 @@ results can be pickled, and be used from any thread. `lnn.reader` is the part th
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
@@ -20,20 +21,20 @@ _WHERE = {
     **dict.fromkeys(["Model", "System", "systems"], "_mechanics"),
     **dict.fromkeys(["fit", "learn", "train"], "_learning"),
     **dict.fromkeys(["find_constraints", "formula", "identify"], "_readings"),
-    **dict.fromkeys(["Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
+    **dict.fromkeys(["Bodies", "Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
     **dict.fromkeys(["Identified", "IdentifiedConstant", "Learned", "Outlier", "OwnConstraints", "Residual"], "_results"),
     **dict.fromkeys(["SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
 }
-__all__ = [*_WHERE]
+__all__ = [name for name, where in _WHERE.items() if where != "_regressor" or find_spec("sklearn")]
 
 if TYPE_CHECKING:
     from ._learning import fit, learn, train
     from ._mechanics import Model, System, systems
     from ._readings import find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
-    from ._results import Certificate, Combination, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
+    from ._results import Bodies, Certificate, Combination, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
     from ._results import Learned, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory, Undetermined
     from .reader import Terms
 
@@ -43,7 +44,12 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'lnn' has no attribute {name!r}")
     from importlib import import_module
 
-    found = getattr(import_module(f".{_WHERE[name]}", __name__), name)
+    try:
+        found = getattr(import_module(f".{_WHERE[name]}", __name__), name)
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.split(".")[0] == __name__:
+            raise
+        raise AttributeError(f"lnn.{name} needs {error.name}, which is not installed") from error
     globals()[name] = found
     return found
 

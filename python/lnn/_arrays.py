@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import math
+import operator
 import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
@@ -19,16 +22,27 @@ if TYPE_CHECKING:
     Numbers = ArrayLike | DLPack
 
 DOUBLE = np.dtype(np.float64)
+# Largest whole number that configurations hold, seeds for one.
+MOST = 2**63 - 1
 
 
 def doubles(what: str, x: Any) -> np.ndarray:
     """Anything that is an array, or says by DLPack that it is, as doubles."""
     if type(x) is np.ndarray and x.dtype is DOUBLE:
         return x
+    if isinstance(x, (Mapping, set, frozenset, str, bytes)):
+        raise TypeError(f"{what}: expected an array of numbers, found a {type(x).__name__}")
+    if isinstance(x, np.ma.MaskedArray):
+        if np.ma.is_masked(x):
+            raise ValueError(f"{what}: {np.ma.count_masked(x)} of {x.size} values are masked: leave their samples out")
+        x = x.data
     if not isinstance(x, np.ndarray):
         if hasattr(x, "__dlpack__") and not hasattr(x, "__array__"):
             x = np.from_dlpack(x)
-        x = np.asarray(x)
+        try:
+            x = np.asarray(x)
+        except ValueError as error:
+            raise ValueError(f"{what}: expected an array, found lists of different lengths") from error
     if x.dtype == np.float64 and x.dtype.isnative:
         return x
     if x.dtype.kind not in "fiub":
@@ -57,11 +71,76 @@ def thread_count(given: int | None) -> int:
     """Threads, those of the machine if none are given."""
     if given is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not 1 <= given <= 256:
-        raise ValueError(f"threads: expected a number from 1 to 256, found {given}")
-    return given
+    return whole("threads", given, 1, 256)
+
+
+def whole(what: str, given: Any, least: int = 0, most: int = MOST) -> int:
+    """A whole number within bounds."""
+    try:
+        number = operator.index(given)
+    except TypeError:
+        raise TypeError(f"{what}: expected a whole number, found {given!r}") from None
+    if not least <= number <= most:
+        raise ValueError(f"{what}: expected a whole number from {least} to {most}, found {number}")
+    return number
+
+
+def real(what: str, given: Any, *, positive: bool = False) -> float:
+    """A finite number."""
+    if isinstance(given, (str, bytes)):
+        raise TypeError(f"{what}: expected a number, found {given!r}")
+    try:
+        number = float(given)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{what}: expected a number, found {given!r}") from None
+    if not math.isfinite(number) or (positive and number <= 0):
+        raise ValueError(f"{what}: expected a {'positive' if positive else 'finite'} number, found {number}")
+    return number
+
+
+def doubles_list(what: str, given: Any, *, positive: bool = False) -> list[float]:
+    """A list of finite numbers."""
+    return [real(what, x, positive=positive) for x in doubles(what, given).ravel().tolist()]
+
+
+def names(what: str, given: Any) -> list[str]:
+    """A list of names; a text alone is none."""
+    if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
+        raise TypeError(f"{what}: expected a list of names, found {given!r}")
+    return [str(name) for name in given]
+
+
+def as_json(given: Mapping[str, Any]) -> str:
+    """Choices as JSON; one that JSON does not hold is named."""
+    return json.dumps({str(key): _held(str(key), x) for key, x in given.items()})
+
+
+def _held(what: str, x: Any) -> Any:
+    """A value as JSON holds it."""
+    if isinstance(x, np.ndarray):
+        x = x.tolist()
+    elif isinstance(x, np.generic):
+        x = x.item()
+    if isinstance(x, Mapping):
+        return {str(key): _held(f"{what}.{key}", x) for key, x in x.items()}
+    if isinstance(x, (list, tuple)):
+        return [_held(what, x) for x in x]
+    if isinstance(x, float) and not math.isfinite(x):
+        raise ValueError(f"{what}: expected finite numbers, found {x}")
+    if isinstance(x, os.PathLike):
+        return os.fspath(x)
+    if x is not None and not isinstance(x, (bool, int, float, str)):
+        raise TypeError(f"{what}: expected numbers, texts, lists or dictionaries of them, found a {type(x).__name__}")
+    return x
 
 
 def bounds_of(given: Mapping | None) -> list[tuple[str, float, float]]:
-    """Bounds by column."""
-    return [(name, float(low), float(high)) for name, (low, high) in (given or {}).items()]
+    """Bounds by column, those of an argument `region`."""
+    bounds = []
+    for name, pair in (given or {}).items():
+        what = f"region: {name}"
+        ends = doubles_list(what, pair)
+        if len(ends) != 2 or not ends[0] < ends[1]:
+            raise ValueError(f"{what}: expected a lower and an upper bound, found {ends}")
+        bounds.append((str(name), ends[0], ends[1]))
+    return bounds

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _lnn
-from ._arrays import doubles, states, thread_count
+from ._arrays import as_json, doubles, names, states, thread_count, whole
 from ._mechanics import Model, System
 from ._progress import Progress, receiver
 from ._recorded import recorded
@@ -45,6 +45,7 @@ def train(
     threads: int | None = None,
     starts: int = 4,
     out: str | os.PathLike | None = None,
+    overwrite: bool = False,
     progress: Progress = None,
     config: Mapping[str, Any] | None = None,
 ) -> Learned:
@@ -69,22 +70,34 @@ def train(
     threads : int, optional
         Threads; results do not depend on them.
     out : path, optional
-        Directory for model, tables, pictures and report.
+        Directory for model, tables, pictures and report; one that holds a run is refused unless `overwrite` is set.
     progress : bool or callable, optional
         True for a line at the terminal, or a function of kind, two numbers and a text.
     config : dict, optional
         Any other choice by its path in the configuration: ``{"optimizer.batch": 64, "phase.0.rate": 1e-3}``.
     """
     system = System(system) if isinstance(system, str) else system
-    changes: dict[str, Any] = {"seed": seed, **_known(known)}
+    changes: dict[str, Any] = {"seed": whole("seed", seed), **_known(known)}
     if hidden is not None:
-        changes["network.hidden"] = [int(width) for width in hidden]
+        changes["network.hidden"] = _widths(hidden)
     if precision is not None:
         changes["precision"] = precision
     changes |= dict(config or {})
-    whole = _lnn.configuration(system._subject, preset, structure, epochs, json.dumps(changes))
-    directory = None if out is None else os.fspath(out)
-    return _learned(_lnn.train(system._subject, whole, (starts, thread_count(threads)), directory, receiver(progress)))
+    epochs = None if epochs is None else whole("epochs", epochs, 1)
+    complete = _lnn.configuration(system._subject, preset, structure, epochs, as_json(changes))
+    plan = whole("starts", starts, 1), thread_count(threads)
+    return _learned(_lnn.train(system._subject, complete, plan, _target(out, overwrite), receiver(progress)))
+
+
+def _target(out: str | os.PathLike | None, overwrite: bool) -> tuple[str, bool] | None:
+    """Where files go, and whether they replace those of another run."""
+    return None if out is None else (os.fspath(out), bool(overwrite))
+
+
+def _widths(hidden: Sequence[int]) -> list[int]:
+    if isinstance(hidden, (str, bytes)) or not hasattr(hidden, "__iter__"):
+        raise TypeError(f"hidden: expected the widths of the hidden layers, found {hidden!r}")
+    return [whole("hidden", width, 1) for width in hidden]
 
 
 def _known(known: System | None) -> dict[str, Any]:
@@ -149,12 +162,14 @@ def learn(
     q, v, shape = states(q, v, n)
     if shape != rows.shape[:1]:
         raise ValueError(f"expected as many states as accelerations, found {shape} and {rows.shape[:1]}")
-    names = [f"q{i + 1}" for i in range(n)] if coordinates is None else list(coordinates)
-    if len(names) != n:
-        raise ValueError(f"coordinates: expected {n} names, found {len(names)}")
+    columns = [f"q{i + 1}" for i in range(n)] if coordinates is None else names("coordinates", coordinates)
+    if len(columns) != n:
+        raise ValueError(f"coordinates: expected {n} names, found {len(columns)}")
     choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
-    choices |= {"dissipation": dissipation, "constraints": _constraints(constraints)}
-    found = _lnn.learn(q, v, np.ascontiguousarray(rows), (names, list(angles)), json.dumps(choices), receiver(progress))
+    choices["dissipation"] = None if dissipation is None else whole("dissipation", dissipation, 1)
+    choices["constraints"] = _constraints(constraints)
+    described = columns, names("angles", angles)
+    found = _lnn.learn(q, v, np.ascontiguousarray(rows), described, as_json(choices), receiver(progress))
     subject, history, validation, test, stop = found
     summary = {"validation_loss": validation, "test_loss": test}
     text = f"loss (paper): validation {validation:.4g}, fresh states {test:.4g}\n"
@@ -173,10 +188,10 @@ def _choices(
 ) -> dict[str, Any]:
     return {
         "structure": structure,
-        "hidden": None if hidden is None else [int(width) for width in hidden],
-        "epochs": epochs,
+        "hidden": None if hidden is None else _widths(hidden),
+        "epochs": None if epochs is None else whole("epochs", epochs, 1),
         "precision": precision,
-        "seed": seed,
+        "seed": whole("seed", seed),
         "threads": thread_count(threads),
         "changes": dict(config or {}),
     }
@@ -205,6 +220,7 @@ def fit(
     members: int = 1,
     threads: int | None = None,
     out: str | os.PathLike | None = None,
+    overwrite: bool = False,
     progress: Progress = None,
     config: Mapping[str, Any] | None = None,
 ) -> Learned:
@@ -237,13 +253,14 @@ def fit(
     members : int
         Networks that are trained one after another on the same recording, by `seed` and those that follow it, 32 at most: what they say
         differently is what the recording leaves open, or the training. ``summary["members"]`` compares them.
+    out : path, optional
+        Directory for model, tables, pictures and report; one that holds a run is refused unless `overwrite` is set.
     config : dict, optional
         Any other choice by its path in the configuration of a fit: ``{"held_out": 0.3, "training.optimizer.batch": 64}``.
     """
     more = {"dt": dt, "t": t, "v": v, "a": a, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
     choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
-    choices |= {"friction": friction, "members": int(members), "constraints": _constraints(constraints)}
+    choices |= {"friction": bool(friction), "members": whole("members", members, 1, 32), "constraints": _constraints(constraints)}
     choices["known"] = None if known is None else _description(known)
-    directory = None if out is None else os.fspath(out)
-    return _learned(_lnn.fit(motion, json.dumps(choices), directory, receiver(progress)))
+    return _learned(_lnn.fit(motion, as_json(choices), _target(out, overwrite), receiver(progress)))

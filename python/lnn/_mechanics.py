@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _lnn
-from ._arrays import bounds_of, doubles, states, thread_count
+from ._arrays import as_json, bounds_of, doubles, doubles_list, real, states, thread_count, whole
 from ._results import Certificate, Formula, Geometry, OwnConstraints, Symmetries, Trajectory
+from .reader import files
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
 
@@ -146,7 +147,8 @@ class Mechanics:
         """
         n = self._n
         starts, velocities, shape = states(q, v, n)
-        times, accuracy = (float(t0), float(t_end), float(dt)), (float(rtol), float(atol), step)
+        times = real("t0", t0), real("t_end", t_end), real("dt", dt, positive=True)
+        accuracy = real("rtol", rtol), real("atol", atol), None if step is None else real("step", step, positive=True)
         found = self._subject.rollout(starts, velocities, times, method, accuracy, bounded, thread_count(threads))
         # The longest motion has all times that any has.
         t = max((motion[0] for motion in found), key=len, default=np.empty(0))
@@ -171,18 +173,10 @@ class Mechanics:
         """
         n = self._n
         points, _, shape = states(q, q, n)
-        velocity = [0.0] * n if velocity is None else doubles("velocity", velocity).ravel().tolist()
-        found = self._subject.geometry(points, velocity)
-        fields: dict[str, Any] = {}
-        good = [point if isinstance(point, dict) else {} for point in found]
-        for name, rank in TENSORS.items():
-            rows = [np.asarray(point.get(name, np.full(n**rank, np.nan))) for point in good]
-            fields[name] = np.array(rows).reshape(*shape, *[n] * rank)
-        for name in "determinant", "scalar", "kretschmann":
-            fields[name] = np.array([point.get(name, np.nan) for point in good]).reshape(shape)
-        fields["signature"] = np.array([point.get("signature", (0, 0)) for point in good], int).reshape(*shape, 2)
-        failures = tuple((k, point) for k, point in enumerate(found) if isinstance(point, str))
-        return Geometry(**fields, failures=failures)
+        velocity = [0.0] * n if velocity is None else doubles_list("velocity", velocity)
+        numbers, signatures, failures = self._subject.geometry(points, velocity)
+        fields: dict[str, Any] = {name: x.reshape(*shape, *[n] * TENSORS.get(name, 0)) for name, x in numbers.items()}
+        return Geometry(**fields, signature=signatures.reshape(*shape, 2), failures=tuple(failures))
 
     def symmetries(
         self,
@@ -202,7 +196,9 @@ class Mechanics:
         basis : str, optional
             Functions that fields are made of, such as ``"polynomial:2,trigonometric:1"``.
         """
-        found = self._subject.symmetries(bounds_of(region), basis, points, seed, tolerance)
+        points = None if points is None else whole("points", points, 1)
+        tolerance = None if tolerance is None else real("tolerance", tolerance, positive=True)
+        found = self._subject.symmetries(bounds_of(region), basis, points, whole("seed", seed), tolerance)
         fields = json.loads(found)
         for name in "structure_constants", "singular_values":
             fields[name] = np.array(fields[name], float)
@@ -216,7 +212,7 @@ class Mechanics:
         seed : int
             Of the states at which the mass matrix is looked at.
         """
-        found = json.loads(self._subject.constraints(seed))
+        found = json.loads(self._subject.constraints(whole("seed", seed)))
         of = lambda key: {constraint["name"]: constraint[key] for constraint in found["constraints"]}
         return OwnConstraints(
             formulas=of("formula"),
@@ -270,8 +266,12 @@ class Mechanics:
         seconds, boxes
             Where the search ends.
         """
-        given = bounds_of(region), signature, condition, float(seconds), boxes, thread_count(threads)
-        fields = json.loads(self._subject.certify(*given))
+        if signature is not None:
+            positive, negative = signature
+            signature = whole("signature", positive), whole("signature", negative)
+        condition = None if condition is None else real("condition", condition, positive=True)
+        limits = real("seconds", seconds, positive=True), whole("boxes", boxes, 1), thread_count(threads)
+        fields = json.loads(self._subject.certify(bounds_of(region), signature, condition, *limits))
         return Certificate(**{**fields, "signature": tuple(fields["signature"])})
 
 
@@ -331,7 +331,7 @@ class System(Mechanics):
                 whole.setdefault(key, [-1.0, 1.0])
             whole = {key: list(x) if isinstance(x, tuple) else x for key, x in whole.items() if x is not None}
             description["coordinates"].append(whole)
-        self._describe(json.dumps({**description, "parameters": dict(parameters or {}), **more}), True, [])
+        self._describe(as_json({**description, "parameters": dict(parameters or {}), **more}), True, [])
 
     def _describe(self, text: str, is_json: bool, given: list) -> None:
         Mechanics.__init__(self, _lnn.Subject.described(text, is_json, given))
@@ -341,7 +341,7 @@ class System(Mechanics):
     def from_toml(cls, text: str, **parameters: Any) -> System:
         """A system by the text of its file, or by the file's path."""
         if isinstance(text, os.PathLike) or ("\n" not in text and text.endswith(".toml")):
-            text = Path(text).read_text()
+            text = files.read(text).decode()
         system = cls.__new__(cls)
         system._describe(text, False, _texts(parameters))
         return system
@@ -431,7 +431,7 @@ class Model(Mechanics):
     def load(cls, path: str | os.PathLike) -> Model:
         """Reads a model file, or that of the directory of a run."""
         path = Path(path)
-        return cls.from_bytes((path / "model.safetensors" if path.is_dir() else path).read_bytes())
+        return cls.from_bytes(files.read(path / "model.safetensors" if path.is_dir() else path))
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Model:
@@ -442,9 +442,9 @@ class Model(Mechanics):
         """The bytes of the file."""
         return self._subject.to_bytes()
 
-    def save(self, path: str | os.PathLike) -> None:
-        """Writes the file that the program and `load` read."""
-        Path(path).write_bytes(self.to_bytes())
+    def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Writes the file that the program and `load` read; one that is there already is kept unless `overwrite` is set."""
+        files.write(path, self.to_bytes(), overwrite)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model.from_bytes, (self.to_bytes(),)
@@ -488,9 +488,12 @@ class Model(Mechanics):
         """The model as functions of PyTorch tensors; see `ModelFile.to_torch`."""
         return self.file.to_torch(dtype)
 
-    def page(self, path: str | os.PathLike) -> None:
-        """Writes an interactive page: one HTML file that computes the motion, the exact one beside if it is known."""
-        Path(path).write_text(self._subject.page(), encoding="utf-8")
+    def page(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Writes an interactive page: one HTML file that computes the motion, the exact one beside if it is known.
+
+        A file that is there already is kept unless `overwrite` is set.
+        """
+        files.write(path, self._subject.page().encode(), overwrite)
 
     def evaluate(
         self,
@@ -513,5 +516,5 @@ class Model(Mechanics):
         from ._progress import receiver
 
         exact = None if system is None else system._subject
-        plan = starts, seed, thread_count(threads)
+        plan = whole("starts", starts, 1), whole("seed", seed), thread_count(threads)
         return json.loads(self._subject.evaluate(exact, plan, receiver(progress)))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from . import _lnn
-from ._arrays import thread_count
+from ._arrays import as_json, doubles_list, names, real, thread_count, whole
 from ._recorded import errors_beside, recorded
 from ._mechanics import System
-from ._results import Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
+from ._results import Bodies, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
 
 
@@ -42,7 +42,8 @@ def find_constraints(
     """
     more = {"dt": dt, "t": t, "v": v, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
-    found = json.loads(_lnn.find_constraints(motion, (degree, velocity_degree)))
+    degrees = whole("degree", degree, 1, 8), whole("velocity_degree", velocity_degree, 0, 8)
+    found = json.loads(_lnn.find_constraints(motion, degrees))
     of = lambda c: Constraint(**{**c, "range": {name: tuple(ends) for name, ends in c["range"].items()}})
     found["constraints"], found["noise"] = tuple(map(of, found["constraints"])), np.array(found["noise"])
     return Constraints(**found)
@@ -68,6 +69,7 @@ def formula(
     bootstraps: int = 40,
     seed: int = 0,
     threads: int | None = None,
+    between: str | None = None,
     name: str = "formula",
 ) -> Formula:
     """The Lagrangian of recorded motion as a formula.
@@ -81,8 +83,8 @@ def formula(
     noise : sequence of float, optional
         Standard deviation of the noise of every coordinate in SI units; estimated by default.
     basis : str, optional
-        Functions that terms are made of, by family and total degree; ``"polynomial:2,trigonometric:2"`` by default, ``radial`` and
-        ``reciprocal`` are others.
+        Functions that terms are made of, by family and total degree, such as ``"polynomial:2,trigonometric:2"``; ``radial`` and
+        ``reciprocal`` are others. By default larger and larger ones, until one explains the motion.
     functions : sequence of str
         Functions of the coordinates beside them, such as ``"exp(-x)"``.
     gyroscopic : bool
@@ -93,13 +95,15 @@ def formula(
         Resamplings of the trajectories that give every term a probability, 10000 at most.
     threads : int, optional
         Threads; the result does not depend on them.
+    between : str, optional
+        Known forces between the samples, as in `identify`; what meets the motion best by default.
     name : str
         Name of the system that the formula makes.
     """
     more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
-    noise = None if noise is None else [float(x) for x in noise]
-    choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name)
+    noise = None if noise is None else doubles_list("noise", noise, positive=True)
+    choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between)
     return read_formula(_lnn.formula(motion, choices))
 
 
@@ -176,24 +180,28 @@ def identify(
     more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": {**(columns or {}), **beside}}
     motion = recorded(data, coordinates, angles, **more)
     named = {"constants": constants, "offsets": offsets, "gains": gains, "delays": delays}
-    choices: dict[str, Any] = {key: [str(name) for name in names] for key, names in named.items()}
-    choices |= {"noise": None if noise is None else [float(x) for x in noise], "targets": targets, "between": between, "robust": bool(robust)}
-    choices |= {"segment": None if segment is None else float(segment), "threads": thread_count(threads), "errors": errors}
-    found = json.loads(_lnn.identify(motion, system._subject, json.dumps(choices)))
+    choices: dict[str, Any] = {key: names(key, given) for key, given in named.items()}
+    choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
+    choices["segment"] = None if segment is None else real("segment", segment, positive=True)
+    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors}
+    found = json.loads(_lnn.identify(motion, system._subject, as_json(choices)))
     found["constants"] = {constant["symbol"]: IdentifiedConstant(**constant) for constant in found["constants"]}
     found["obstacles"] = tuple(found["obstacles"])
     found["sensors"] = tuple(SensorConstant(**sensor) for sensor in found["sensors"])
     unknowns = len(found["constants"]) + len(found["sensors"])
     found["correlations"] = np.array(found["correlations"], float).reshape(unknowns, unknowns)
     found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
-    found["combinations"] = tuple(Combination(dict(sum.pop("terms")), **sum) for sum in found["combinations"])
+    found["combinations"] = tuple(Combination(**known) for known in found["combinations"])
+    found["bodies"] = Bodies(**{**found["bodies"], "moved": tuple(found["bodies"]["moved"])}) if found["bodies"] else None
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
+    found["force_noise"] = tuple(found["force_noise"])
     found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)
 
 
-def _undetermined(constants: Any, direction: Any, known: Any, **more: Any) -> Undetermined:
-    return Undetermined(tuple(constants), np.array(direction, float), dict(known), **more)
+def _undetermined(constants: Any, directions: Any, known: Any, **more: Any) -> Undetermined:
+    combinations = {one["name"]: Combination(**one) for one in known}
+    return Undetermined(tuple(constants), np.array(directions, float).reshape(-1, len(constants)), combinations, **more)
 
 
 def formula_choices(
@@ -207,11 +215,12 @@ def formula_choices(
     seed: int,
     threads: int | None,
     name: str,
+    between: str | None = None,
 ) -> str:
     """Choices of a search as the library takes them."""
-    given: dict[str, Any] = {"basis": basis, "functions": list(functions), "gyroscopic": gyroscopic, "friction": friction, "noise": noise}
-    given |= {"scale": scale, "bootstraps": bootstraps, "seed": seed, "threads": thread_count(threads), "name": name}
-    return json.dumps(given)
+    given: dict[str, Any] = {"basis": basis, "functions": names("functions", functions), "gyroscopic": bool(gyroscopic)}
+    given |= {"friction": bool(friction), "noise": noise, "scale": scale, "bootstraps": whole("bootstraps", bootstraps, 1, 10_000)}
+    return as_json(given | {"seed": whole("seed", seed), "threads": thread_count(threads), "name": str(name), "between": between})
 
 
 def read_formula(text: str) -> Formula:
@@ -233,6 +242,13 @@ def read_formula(text: str) -> Formula:
         residual=number(found["residual"]),
         noise=np.array(found["noise"], float),
         noise_resolved=found["noise_resolved"],
+        several=found["several"],
+        rival=None if found["rival"] is None else (tuple(found["rival"]["terms"]), found["rival"]["cost"]),
+        blocks=tuple(map(tuple, found["blocks"])),
+        basis=found["basis"],
+        tried=tuple(found["tried"]),
+        doubts=tuple(found["doubts"]),
+        notes=tuple(found["notes"]),
         left=tuple(map(tuple, found["left"])),
         searched=found["searched"],
         removed=found["removed"],

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._arrays import doubles
+from ._arrays import as_json, doubles, names, real
 
 if TYPE_CHECKING:
     from ._lnn import _Motion
@@ -29,20 +28,30 @@ def recorded(
     columns: Mapping[str, Any] | None = None,
 ) -> _Motion:
     """Recorded motion as the library takes it: files, trajectories, the meaning of their columns."""
+    if coordinates is not None:
+        coordinates = names("coordinates", coordinates)
+    angles = names("angles", angles)
     files: list[str] = []
     tracks: list[tuple[Any, ...]] = []
     meaning = dict(columns or {})
     if _is_path(data) or (isinstance(data, (list, tuple)) and data and all(map(_is_path, data))):
         if coordinates is None:
             raise TypeError("coordinates: expected the columns of the files")
+        for what, given in {"dt": dt, "t": t, "v": v, "a": a, "force": force}.items():
+            if given is not None:
+                raise TypeError(f"{what}: files have columns of their own, see `columns`")
         files = [os.fspath(path) for path in ([data] if _is_path(data) else data)]
         if trajectory is not None:
             meaning["trajectory"] = trajectory
     else:
+        if dt is not None and t is not None:
+            raise ValueError("dt: expected the time between samples or the times `t`, found both")
         if hasattr(data, "columns") and hasattr(data, "loc"):
             if coordinates is None:
                 raise TypeError("coordinates: expected the columns of the coordinates")
-            data, t, v, a, force = _of_frame(data, coordinates, trajectory, (t, v, a, force))
+            data, t, v, a, force = _of_frame(data, coordinates, trajectory, (t, v, a, force), dt)
+        elif trajectory is not None:
+            raise TypeError("trajectory: expected a column of files or of a DataFrame; give arrays as a list of trajectories")
         arrays, beside = _tracks(data, t, dt, v, a, force)
         n = arrays[0].shape[1]
         coordinates = [f"q{i + 1}" for i in range(n)] if coordinates is None else list(coordinates)
@@ -59,7 +68,7 @@ def recorded(
     unknown = [name for name in angles if name not in coordinates]
     if unknown:
         raise ValueError(f"angles: {unknown[0]!r} is none of the coordinates {list(coordinates)}")
-    return files, tracks, json.dumps({"coordinates": list(coordinates), "angles": list(angles), "columns": meaning})
+    return files, tracks, as_json({"coordinates": list(coordinates), "angles": list(angles), "columns": meaning})
 
 
 def errors_beside(data: Any, error: Any, trajectory: str | None) -> tuple[dict[str, Any], list[list[float]]]:
@@ -81,20 +90,31 @@ def _is_path(x: Any) -> bool:
     return isinstance(x, (str, os.PathLike))
 
 
-def _of_frame(frame: Any, coordinates: Sequence[str], trajectory: str | None, others: tuple[Any, ...]) -> Any:
+def _is_trajectory(x: Any) -> bool:
+    """Whether an element of a list is an array (samples, n)."""
+    if isinstance(x, (list, tuple)):
+        return len(x) > 0 and not np.isscalar(x[0])
+    return np.ndim(x) == 2
+
+
+def _of_frame(
+    frame: Any, coordinates: Sequence[str], trajectory: str | None, others: tuple[Any, ...], dt: float | None
+) -> Any:
     """Lists of arrays, one per trajectory, of a DataFrame."""
     time, *beside = others
-    time = next((name for name in ("t", "time") if name in frame.columns), None) if time is None else time
-    if time is None:
-        raise ValueError("t: expected the column of the times, found none called t or time")
+    if time is None and dt is None:
+        time = next((name for name in ("t", "time") if name in frame.columns), None)
+        if time is None:
+            raise ValueError("t: expected the column of the times, found none called t or time")
     groups = [frame] if trajectory is None else [group for _, group in frame.groupby(trajectory, sort=False)]
     of = lambda names: None if names is None else [group[list(names)].to_numpy(float) for group in groups]
-    return of(coordinates), [group[time].to_numpy(float) for group in groups], *map(of, beside)
+    times = None if time is None else [group[time].to_numpy(float) for group in groups]
+    return of(coordinates), times, *map(of, beside)
 
 
 def _tracks(data: Any, t: Any, dt: float | None, v: Any, a: Any, force: Any) -> tuple[list[np.ndarray], Any]:
     """Positions of the trajectories, and times, velocities, accelerations and forces beside them."""
-    several = isinstance(data, (list, tuple)) and len(data) > 0 and np.ndim(data[0]) == 2
+    several = isinstance(data, (list, tuple)) and len(data) > 0 and _is_trajectory(data[0])
     arrays = list(data) if several else [data]
     arrays = [doubles("data", x) for x in arrays]
     for x in arrays:
@@ -110,7 +130,8 @@ def _tracks(data: Any, t: Any, dt: float | None, v: Any, a: Any, force: Any) -> 
             raise ValueError(f"{name}: expected one array for each of {len(arrays)} trajectories, found {len(given)}")
         beside[name] = [np.empty(0)] * len(arrays) if given is None else [doubles(name, x) for x in given]
     if t is None:
-        if dt is None or not dt > 0:
+        if dt is None:
             raise ValueError("dt: expected the time between samples, or times `t`")
+        dt = real("dt", dt, positive=True)
         beside["t"] = [dt * np.arange(len(x)) for x in arrays]
     return arrays, beside.values()

@@ -145,7 +145,7 @@ class Symmetries:
         Every vector field as a formula, and the function by whose rate it changes L.
     structure_constants : (k, k, k)
     time_translation : bool
-        Whether the energy is conserved.
+        Whether ``p.v - L`` is conserved: the energy, or ``g(v, v)/2`` along geodesics of a metric with a time.
     singular_values : (unknowns,)
     basis : str
         Highest degrees of the functions that fields are made of.
@@ -213,6 +213,10 @@ class Constraints:
         Trajectories, and candidates that did not hold on those that were left out.
     noise : (n,)
         Of each coordinate over its size: smaller deviations are not seen.
+    still : dict of str to str
+        Columns that do not move, in words; they take no part.
+    limits : list of str
+        Where the search was cut short, in words.
     """
 
     count: int
@@ -221,11 +225,13 @@ class Constraints:
     trajectories: int
     refuted: int
     noise: np.ndarray
+    still: dict[str, str]
+    limits: list[str]
 
     @property
     def formulas(self) -> dict[str, str]:
         """Formulas of the constraints of the system, as `System` takes them under ``constraints``."""
-        of_system = [found.formula for found in self.constraints if found.kind != "per-trajectory"]
+        of_system = [found.formula for found in self.constraints if found.kind in ("holonomic", "nonholonomic")]
         return {f"found {k + 1}": text for k, text in enumerate(of_system)}
 
 
@@ -265,7 +271,15 @@ class Formula:
     Attributes
     ----------
     verdict : str
-        ``"found"``, or ``"not in the library"``.
+        ``"found"``, ``"not in the library"``, or ``"undecided"`` for the reasons of `doubts`.
+    several : bool
+        Whether other formulas explain the motion as well; `rival` is the next best one, its terms and its cost in units of noise.
+    blocks : tuple of tuple of str
+        Coordinates in groups that do not act on each other: the masses of one group relative to those of another are not determined.
+    basis, tried : str, tuple of str
+        Functions that the formula was found among, and all that were searched.
+    doubts, notes : tuple of str
+        Why the verdict is in doubt, and what else is to be known of the search.
     lagrangian, dissipation : str
         L, and Rayleigh's function D, in the grammar of system files.
     terms : tuple of str
@@ -300,6 +314,13 @@ class Formula:
     residual: float
     noise: np.ndarray
     noise_resolved: bool
+    several: bool
+    rival: tuple[tuple[str, ...], float] | None
+    blocks: tuple[tuple[str, ...], ...]
+    basis: str
+    tried: tuple[str, ...]
+    doubts: tuple[str, ...]
+    notes: tuple[str, ...]
     left: tuple[tuple[str, float, float, float, int], ...]
     searched: int
     removed: int
@@ -381,25 +402,25 @@ class SensorConstant:
 
 @dataclass(frozen=True)
 class Undetermined:
-    """A direction in which constants change without an effect on the recorded motion.
+    """Constants that can change, alone or together, without an effect on the recorded motion.
 
     Attributes
     ----------
     constants : tuple of str
         The constants.
-    direction : (k,)
-        Relative change of each, the largest 1.
-    known : dict of str to float
-        Combinations that are known nevertheless.
+    directions : (d, k)
+        Relative change of each constant along each open direction, the largest 1; none where sums alone are known.
+    known : dict of str to Combination
+        Combinations that are known nevertheless, by their formula.
     relative_error : float or None
-        Standard error along the direction over the values; None where the motion does not depend on it at all.
+        Largest standard error along a direction over the values; None where the motion does not depend on one at all.
     text, cure : str
         What is open, and what would determine it, in words.
     """
 
     constants: tuple[str, ...]
-    direction: np.ndarray
-    known: dict[str, float]
+    directions: np.ndarray
+    known: dict[str, Combination]
     relative_error: float | None
     text: str
     cure: str
@@ -407,20 +428,45 @@ class Undetermined:
 
 @dataclass(frozen=True)
 class Combination:
-    """A sum of constants that is known though they are not: a base parameter of a robot.
+    """A sum or a product of powers of constants that is known though they are not, such as a base parameter of a robot.
 
     Attributes
     ----------
+    name : str
+        Its formula.
+    product : bool
+        Whether it is a product.
     terms : dict of str to float
-        Factors of the constants by symbol.
+        Factors of the constants by symbol, exponents in a product.
     value, standard_error : float
     unit : str
     """
 
+    name: str
+    product: bool
     terms: dict[str, float]
     value: float
     standard_error: float
     unit: str
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """How the inertias of a chain of links became those of bodies.
+
+    Attributes
+    ----------
+    moved : tuple of int
+        Links whose constants had to be moved, from 1.
+    largest_change : float
+        Largest change of a known sum by it, in standard errors of the sum.
+    exist : bool
+        Whether bodies have the known sums within their errors.
+    """
+
+    moved: tuple[int, ...]
+    largest_change: float
+    exist: bool
 
 
 @dataclass(frozen=True)
@@ -486,6 +532,8 @@ class Identified:
         What the motion leaves open.
     combinations : tuple of Combination
         Sums of constants that are known, where forces are met and are linear in the constants.
+    bodies : Bodies or None
+        How inertias became those of bodies; None for a system that is no chain of links.
     residuals : dict of str to Residual
         By coordinate.
     over_noise : float
@@ -497,11 +545,15 @@ class Identified:
     decrement : float
         The decrease of the sum of squares that was left to gain, over the variance of the noise.
     explained : bool
-        Whether residuals are as large as the noise and white: the form explains the motion.
+        Whether the form explains the motion.
+    verdict : dict
+        Why: the ``kind`` of the verdict, with the numbers behind it.
     outliers : tuple of Outlier
         The farthest first, 100 at most of `outlier_count`.
     inflation : float
-        Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+        Mean factor by which variances are larger than those of independent residuals; 1 for these.
+    force_noise : tuple of float
+        Standard deviation of the noise of the known forces, as the motion shows it; empty if it shows none.
     samples, segments, segment_seconds, substeps
         Samples and segments that were followed, the usual length of these in s, integration steps from sample to sample.
     between : str or None
@@ -513,15 +565,18 @@ class Identified:
     correlations: np.ndarray
     undetermined: tuple[Undetermined, ...]
     combinations: tuple[Combination, ...]
+    bodies: Bodies | None
     residuals: dict[str, Residual]
     over_noise: float
     obstacles: tuple[str, ...]
     converged: bool
     decrement: float
     explained: bool
+    verdict: dict
     outliers: tuple[Outlier, ...]
     outlier_count: int
     inflation: float
+    force_noise: tuple[float, ...]
     samples: int
     segments: int
     segment_seconds: float

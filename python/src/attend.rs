@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(50);
 /// Stack of the work, that of a main thread.
 const STACK: usize = 8 << 20;
+/// Time that work whose loops are long has after a signal; then it is left to itself.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// An event as Python receives it: kind, two numbers, a text.
 type News = (&'static str, f64, f64, String);
@@ -49,7 +51,7 @@ pub fn attended<T: Send>(
                 work(watch)
             });
             let running = running.map_err(|error| runtime(format_args!("no thread can be started: {error}")))?;
-            let looked = look(&receiver, &flag, progress);
+            let looked = look(&receiver, &flag, progress, Duration::MAX);
             let done = running.join();
             looked?;
             done.map_err(|panic| {
@@ -64,19 +66,53 @@ pub fn attended<T: Send>(
 /// As [`attended`], for work whose part is worth nothing: after a signal its result is lost.
 ///
 /// # Errors
-/// `KeyboardInterrupt` after a signal, and a panic of the work.
-pub fn whole<T: Send>(py: Python<'_>, work: impl FnOnce(&Watch) -> T + Send) -> PyResult<T> {
-    let done = attended(py, None, |watch| (work(&watch), watch.interrupt.load(Ordering::SeqCst)))?;
+/// `KeyboardInterrupt` after a signal, what `progress` raises, and a panic of the work.
+pub fn whole<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Watch) -> T + Send,
+) -> PyResult<T> {
+    let done = attended(py, progress, |watch| (work(&watch), watch.interrupt.load(Ordering::SeqCst)))?;
     match done {
         (_, true) => Err(PyKeyboardInterrupt::new_err("interrupted")),
         (result, false) => Ok(result),
     }
 }
 
-/// Waits for the end of the work.
-fn look(receiver: &Receiver<Message>, flag: &AtomicBool, progress: Option<&Py<PyAny>>) -> PyResult<()> {
-    let mut failed = Ok(());
+/// As [`whole`], for work that owns what it needs and may not look at its flag for long: soon after a signal it is left to itself.
+///
+/// # Errors
+/// `KeyboardInterrupt` after a signal, and a panic of the work.
+pub fn left<T: Send + 'static>(py: Python<'_>, work: impl FnOnce(&Watch) -> T + Send + 'static) -> PyResult<T> {
+    let ((sender, receiver), flag) = (channel(), Arc::new(AtomicBool::new(false)));
+    let watch = Watch { events: None, interrupt: Arc::clone(&flag) };
+    let running = Builder::new().stack_size(STACK).spawn(move || {
+        let _end = End(sender);
+        work(&watch)
+    });
+    let running = running.map_err(|error| runtime(format_args!("no thread can be started: {error}")))?;
+    py.detach(move || {
+        look(&receiver, &flag, None, PATIENCE)?;
+        match running.join() {
+            _ if flag.load(Ordering::SeqCst) => Err(PyKeyboardInterrupt::new_err("interrupted")),
+            Ok(done) => Ok(done),
+            Err(_) => Err(runtime("a mistake in lnn itself")),
+        }
+    })
+}
+
+/// Waits for the end of the work, after a signal as long as there is patience.
+fn look(
+    receiver: &Receiver<Message>,
+    flag: &AtomicBool,
+    progress: Option<&Py<PyAny>>,
+    patience: Duration,
+) -> PyResult<()> {
+    let (mut failed, mut pressed) = (Ok(()), None);
     loop {
+        if pressed.is_some_and(|pressed: Instant| pressed.elapsed() > patience) {
+            return Err(PyKeyboardInterrupt::new_err("interrupted"));
+        }
         let message = receiver.recv_timeout(LOOK);
         if let Ok(Message::Done) | Err(RecvTimeoutError::Disconnected) = message {
             return failed;
@@ -87,7 +123,10 @@ fn look(receiver: &Receiver<Message>, flag: &AtomicBool, progress: Option<&Py<Py
             }
             // The first signal ends the work with what it has, as the program does.
             match py.check_signals() {
-                Err(_) if !flag.swap(true, Ordering::SeqCst) => Ok(()),
+                Err(_) if !flag.swap(true, Ordering::SeqCst) => {
+                    pressed = Some(Instant::now());
+                    Ok(())
+                }
                 outcome => outcome,
             }
         });

@@ -3,7 +3,9 @@
 use lnn::pipeline::PipelineError;
 use lnn::recording::read::{DataError, Problem};
 use pyo3::PyErr;
-use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{
+    PyFileExistsError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyValueError,
+};
 use std::fmt::Display;
 
 /// What was given is wrong.
@@ -20,7 +22,11 @@ pub fn runtime(error: impl Display) -> PyErr {
 pub fn pipeline(error: PipelineError) -> PyErr {
     let text = error.to_string();
     match error {
-        PipelineError::Interrupted => PyKeyboardInterrupt::new_err(text),
+        PipelineError::Interrupted | PipelineError::Unjudged(_) => PyKeyboardInterrupt::new_err(text),
+        PipelineError::Taken { path, name } => PyFileExistsError::new_err(format!(
+            "out: {}: there is {name} of another run; overwrite=True replaces it",
+            path.display()
+        )),
         PipelineError::Memory { .. } => PyMemoryError::new_err(text),
         PipelineError::Data(DataError::File { problem: Problem::Read(_), .. }) => PyOSError::new_err(text),
         PipelineError::Output { .. } | PipelineError::NoModel(_) | PipelineError::Held { .. } => {

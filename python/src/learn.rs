@@ -8,7 +8,7 @@ use lnn::configuration::{Config, Known, Precision};
 use lnn::data::Dataset;
 use lnn::network::Structure;
 use lnn::pipeline::{
-    Directory, Fit, FitConfig, FitConstraints, FitOptions, InMemory, Output, PipelineError, RunOptions,
+    Fit, FitConfig, FitConstraints, FitOptions, InMemory, LockedDirectory, Output, PipelineError, RunOptions, Unjudged,
 };
 use lnn::presets::{Preset, Trainer};
 use lnn::training::{Epoch, StopReason};
@@ -104,9 +104,12 @@ fn set_epochs(config: &mut Config, epochs: usize) {
     }
 }
 
-fn output(out: Option<PathBuf>) -> Result<Box<dyn Output>, PipelineError> {
+/// A directory to write into, and whether what is there may be replaced.
+type Target = (PathBuf, bool);
+
+fn output(out: Option<Target>) -> Result<Box<dyn Output>, PipelineError> {
     Ok(match out {
-        Some(path) => Box::new(Directory::create(&path)?),
+        Some((path, overwrite)) => Box::new(LockedDirectory::claim(&path, overwrite)?),
         None => Box::new(InMemory::default()),
     })
 }
@@ -131,7 +134,7 @@ pub fn train(
     system: &Subject,
     config: &str,
     plan: (usize, usize),
-    out: Option<PathBuf>,
+    out: Option<Target>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Learned> {
     let instance = system.system_instance()?;
@@ -140,11 +143,22 @@ pub fn train(
     let options = RunOptions { threads, starts, ..RunOptions::default() };
     let report = attended(py, progress.as_ref(), |watch| {
         lnn::pipeline::train(&config, &instance, &options, output(out)?.as_ref(), &watch)
-    })?
-    .map_err(pipeline)?;
+    })?;
+    let report = match report {
+        Err(PipelineError::Unjudged(learned)) => return unjudged(*learned),
+        report => report.map_err(pipeline)?,
+    };
     let (text, result, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
     let json = report.json().map_err(pipeline)?;
     Ok((vec![Subject::learned(report.header, report.network)?], result, json, text, stop))
+}
+
+/// A model whose judgement was interrupted: there are no figures of it.
+fn unjudged(learned: Unjudged) -> PyResult<Learned> {
+    let Unjudged { header, network, history: epochs, .. } = learned;
+    let (model, history) = (Subject::learned(header, network)?, history(&epochs)?);
+    let text = "interrupted while the model was judged: there are no figures\n".to_string();
+    Ok((vec![model], history, "{}".to_string(), text, Some("interrupted".to_string())))
 }
 
 /// Choices of [`learn`] and [`fit`], as JSON.
@@ -171,7 +185,7 @@ struct Choices {
 }
 
 /// Keys of the configuration of a fit that are decided before its data are divided.
-const EARLY: [&str; 5] = ["targets", "held_out", "window", "noise", "constraints"];
+const EARLY: [&str; 6] = ["targets", "held_out", "window", "noise", "between", "constraints"];
 
 impl Choices {
     /// The choices that come before the configuration of a fit, taken out of the changes.
@@ -182,8 +196,8 @@ impl Choices {
         let given =
             EARLY.iter().filter_map(|key| self.changes.remove(*key).map(|new| (key.to_string(), new))).collect();
         let config = FitConfig { constraints: self.constraints.clone(), ..FitConfig::default() };
-        let FitConfig { targets, held_out, window, noise, constraints, .. } = changed(&config, &given)?;
-        Ok(FitOptions { targets, held_out, window, noise, constraints, seed: self.seed })
+        let FitConfig { targets, held_out, window, noise, between, constraints, .. } = changed(&config, &given)?;
+        Ok(FitOptions { targets, held_out, window, noise, between, constraints, seed: self.seed })
     }
 }
 
@@ -261,7 +275,7 @@ pub fn fit(
     py: Python<'_>,
     motion: Motion,
     choices: &str,
-    out: Option<PathBuf>,
+    out: Option<Target>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Learned> {
     let mut choices: Choices = serde_json::from_str(choices).map_err(value)?;
@@ -275,7 +289,10 @@ pub fn fit(
     if let Some(problem) = refused.lock().ok().and_then(|mut result| result.take()) {
         return Err(value(problem));
     }
-    let report = report.map_err(pipeline)?;
+    let report = match report {
+        Err(PipelineError::Unjudged(learned)) => return unjudged(*learned),
+        report => report.map_err(pipeline)?,
+    };
     let (text, result, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
     let json = report.json().to_string();
     let models = [(report.header, report.network)].into_iter();
@@ -285,7 +302,7 @@ pub fn fit(
 }
 
 /// The fit with its choices; a change that the configuration refuses is put into `refused`.
-fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, out: Option<PathBuf>) -> Fit {
+fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, out: Option<Target>) -> Fit {
     let mut task = match source {
         Source::Files(files, columns) => Fit::files(files).columns(|own| *own = columns),
         Source::Memory(recording) => Fit::recording(recording),
@@ -294,8 +311,8 @@ fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, o
     if let Some(structure) = choices.structure {
         task = task.structure(structure);
     }
-    if let Some(out) = out {
-        task = task.out(out);
+    if let Some((path, overwrite)) = out {
+        task = task.out(path).overwrite(overwrite);
     }
     task.configure(move |config: &mut FitConfig| {
         if choices.known.is_some() {

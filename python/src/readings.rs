@@ -6,7 +6,7 @@ use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
 use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
 use lnn::formula::{FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
-use lnn::identification::{IdentifyOptions, identify as identified};
+use lnn::identification::{Between, IdentifyOptions, identify as identified};
 use lnn::recording::smooth::SmoothOptions;
 use pyo3::prelude::*;
 use serde_json::json;
@@ -21,9 +21,10 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
         }
     }
     let source = Source::of(motion)?;
-    whole(py, |_| {
+    whole(py, None, |watch| {
         let recording = source.read()?.recording;
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
+        let samples = samples.watched(&watch.cancellation());
         let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
         serde_json::to_string(&found).map_err(runtime)
     })?
@@ -32,9 +33,10 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
 /// The Lagrangian of recorded motion as a formula, as JSON.
 #[pyfunction]
 pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String> {
-    let (options, name) = FormulaChoices::read(choices)?;
+    let (mut options, name) = FormulaChoices::read(choices)?;
     let source = Source::of(motion)?;
-    whole(py, |_| {
+    whole(py, None, |watch| {
+        options.cancellation = watch.cancellation();
         let recording = source.read()?.recording;
         let n = recording.coordinates.len();
         if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
@@ -49,9 +51,10 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
 pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str) -> PyResult<String> {
     // The other choices have their types from Python.
     let mut options: IdentifyOptions =
-        serde_json::from_str(choices).map_err(|error| value(format_args!("between: {error}")))?;
+        serde_json::from_str(choices).map_err(|error| value(format_args!("targets, between: {error}")))?;
     let (source, instance) = (Source::whole(motion)?, system.system_instance()?);
-    whole(py, |_| {
+    whole(py, None, |watch| {
+        options.cancellation = watch.cancellation();
         let mut loaded = source.read()?;
         if options.errors.is_empty() {
             options.errors = std::mem::take(&mut loaded.errors);
@@ -85,6 +88,7 @@ pub struct FormulaChoices {
     seed: u64,
     threads: usize,
     name: String,
+    between: Option<Between>,
 }
 
 impl FormulaChoices {
@@ -93,11 +97,11 @@ impl FormulaChoices {
     /// # Errors
     /// `ValueError` for a choice that is none.
     pub fn read(choices: &str) -> PyResult<(FormulaOptions, String)> {
-        let Self { basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name } =
+        let Self { basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between } =
             serde_json::from_str(choices).map_err(value)?;
         let families = match basis {
-            Some(text) => text.parse().map_err(|problem| value(format_args!("basis: {problem}")))?,
-            None => FormulaOptions::default().families,
+            Some(text) => Some(text.parse().map_err(|problem| value(format_args!("basis: {problem}")))?),
+            None => None,
         };
         if !(1..=MOST_BOOTSTRAPS).contains(&bootstraps) {
             return Err(value(format_args!("bootstraps: expected 1 to {MOST_BOOTSTRAPS}, found {bootstraps}")));
@@ -118,6 +122,7 @@ impl FormulaChoices {
             bootstraps,
             seed,
             threads,
+            between,
             ..FormulaOptions::default()
         };
         Ok((options, name))
@@ -134,6 +139,8 @@ pub fn described(found: &FoundFormula, name: &str) -> String {
         "terms": found.terms, "residual": found.residual,
         "noise": found.noise, "noise_resolved": found.noise_resolved,
         "searched": found.searched.0, "removed": found.searched.1,
+        "basis": found.basis, "tried": found.tried, "blocks": found.blocks,
+        "rival": found.rival, "several": found.several, "doubts": found.doubts, "notes": found.notes,
         "left": found.left.iter().map(|left| json!([found.coordinates[left.coordinate], left.low, left.high, left.residual, left.samples])).collect::<Vec<_>>(),
         "coordinates": found.coordinates,
     })

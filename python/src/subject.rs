@@ -1,12 +1,12 @@
 //! Something that moves by a Lagrangian: a system or a model.
 
-use crate::attend::{attended, whole};
+use crate::attend::{left, whole};
 use crate::errors::{pipeline, runtime, value};
 use crate::readings::{FormulaChoices, described};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
 use lnn::constraints::{EXAMINED_STATES, examine};
 use lnn::formula::{MODEL_STATES, formula_of_model};
-use lnn::geometry::geometries;
+use lnn::geometry::{Geometry, GeometryError, geometries};
 use lnn::lagrangian::system::{Bounds, Size};
 use lnn::lagrangian::{
     Description, EulerLagrange, Interruptible, Request, SystemInstance, Terms, configure, configure_system,
@@ -14,7 +14,7 @@ use lnn::lagrangian::{
 };
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
-use lnn::pipeline::{EvaluationOptions, CONSTRAINTS_UNSUPPORTED, evaluate, trained_on};
+use lnn::pipeline::{CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, trained_on};
 use lnn::report::page;
 use lnn::rollout::{Integrator, Options, Rollout, RolloutError, rollout_many};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
@@ -25,9 +25,14 @@ use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::atomic::Ordering;
 
 /// States whose terms are computed at a time.
 const CHUNK: usize = 4096;
+/// Points whose geometry is computed at a time.
+const GEOMETRY_CHUNK: usize = 256;
+/// Components of Riemann tensors at once, at most: with all that stands beside them about 1 GB.
+const MOST_GEOMETRY: usize = 1 << 25;
 
 /// Origin of a Lagrangian.
 enum Kind {
@@ -218,11 +223,34 @@ impl Subject {
         Err(value(format_args!("{what}: expected {} numbers per state, found {columns}", self.n())))
     }
 
+    /// Terms of states; few of them, which are computed in a moment, without a look at signals.
+    fn attended(
+        &self,
+        py: Python<'_>,
+        states: (&[f64], &[f64]),
+        request: Request,
+        threads: usize,
+    ) -> PyResult<Vec<(Terms<f64>, usize)>> {
+        if states.0.len() <= CHUNK * self.n() {
+            return Ok(py.detach(|| self.computed(states, request, threads, &Watch::default())));
+        }
+        whole(py, None, |watch| self.computed(states, request, threads, watch))
+    }
+
     /// Terms of states, chunk by chunk, parts of them side by side.
-    fn computed(&self, q: &[f64], v: &[f64], request: Request, threads: usize) -> Vec<(Terms<f64>, usize)> {
+    fn computed(
+        &self,
+        (q, v): (&[f64], &[f64]),
+        request: Request,
+        threads: usize,
+        watch: &Watch,
+    ) -> Vec<(Terms<f64>, usize)> {
         let (n, model) = (self.n(), self.moving());
+        // The same work of many coordinates takes fewer states.
+        let chunk = (4 * CHUNK / (n * n)).clamp(64, CHUNK);
         let part = |q: &[f64], v: &[f64]| {
-            let chunks = q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n));
+            let chunks = q.chunks(chunk * n).zip(v.chunks(chunk * n));
+            let chunks = chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed));
             let terms = chunks.map(|(q, v)| {
                 let mut terms = Terms::default();
                 // Every row that fails is among the failures, its accelerations are NaN.
@@ -242,6 +270,49 @@ impl Subject {
             let running: Vec<_> = parts.map(|(q, v)| scope.spawn(move || part(q, v))).collect();
             running.into_iter().flat_map(|part| part.join().unwrap_or_default()).collect()
         })
+    }
+}
+
+/// What a geometry has of numbers at a point, by name and number of indices.
+const FIELDS: [(&str, u32); 10] = [
+    ("metric", 2),
+    ("inverse", 2),
+    ("christoffel", 3),
+    ("riemann", 4),
+    ("ricci", 2),
+    ("einstein", 2),
+    ("weyl", 4),
+    ("determinant", 0),
+    ("scalar", 0),
+    ("kretschmann", 0),
+];
+
+/// Geometries of points, field by field; `NaN` at the points that fail.
+#[derive(Default)]
+struct Geometries {
+    numbers: [Vec<f64>; FIELDS.len()],
+    signatures: Vec<i64>,
+    failures: Vec<(usize, String)>,
+}
+
+impl Geometries {
+    fn push(&mut self, n: usize, found: Result<Geometry<f64>, GeometryError>) {
+        let parts = match found {
+            Ok(Geometry { metric, connection, curvature }) => {
+                self.signatures.extend([metric.signature.positive as i64, metric.signature.negative as i64]);
+                let tensors =
+                    [metric.components, metric.inverse, connection.symbols, curvature.riemann, curvature.ricci];
+                let more = [curvature.einstein, curvature.weyl];
+                let scalars = [metric.determinant, curvature.scalar, curvature.kretschmann].map(|x| vec![x]);
+                tensors.into_iter().chain(more).chain(scalars).collect::<Vec<_>>()
+            }
+            Err(error) => {
+                self.failures.push((self.signatures.len() / 2, error.to_string()));
+                self.signatures.extend([0, 0]);
+                FIELDS.iter().map(|(_, rank)| vec![f64::NAN; n.pow(*rank)]).collect()
+            }
+        };
+        self.numbers.iter_mut().zip(parts).for_each(|(all, part)| all.extend(part));
     }
 }
 
@@ -312,7 +383,7 @@ impl Subject {
         threads: usize,
     ) -> PyResult<(Vec<Numbers<'py>>, Vec<(usize, String)>)> {
         let (q, v) = self.states(&q, &v)?;
-        let mut parts = py.detach(|| self.computed(q, v, Request::ALL, threads));
+        let mut parts = self.attended(py, (q, v), Request::ALL, threads)?;
         let mut failures = Vec::new();
         let mut before = 0;
         for (terms, states) in &parts {
@@ -356,7 +427,7 @@ impl Subject {
             "energy" => (Request::ENERGY, 1, |t| &mut t.energy),
             _ => (Request::ACCELERATION, n, |t| &mut t.acceleration),
         };
-        let mut parts = py.detach(|| self.computed(q, v, request, threads));
+        let mut parts = self.attended(py, (q, v), request, threads)?;
         Ok(field(py, &mut parts, width, take))
     }
 
@@ -384,8 +455,9 @@ impl Subject {
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
         let starts: Vec<_> = q.chunks(n).zip(v.chunks(n)).map(|(q, v)| (q.to_vec(), v.to_vec())).collect();
         let model = self.moving();
-        let motions =
-            whole(py, |watch| rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads))?;
+        let motions = whole(py, None, |watch| {
+            rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
+        })?;
         let result = PyList::empty(py);
         for Rollout { trajectory, statistics, stop } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
@@ -398,46 +470,40 @@ impl Subject {
         Ok(result)
     }
 
-    /// Metric, connection and curvature at points `(b, n)`: a dictionary of flat arrays of each, or what is wrong.
+    /// Metric, connection and curvature at points `(b, n)`: flat arrays by name, signatures, and the points that fail with what is wrong.
+    #[allow(clippy::type_complexity)]
     fn geometry<'py>(
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
         velocity: Vec<f64>,
-    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyArray1<i64>>, Vec<(usize, String)>)> {
         self.require_free()?;
-        let points = slice(&points)?;
+        let (n, points) = (self.n(), slice(&points)?);
+        let most = MOST_GEOMETRY / n.pow(4).max(1);
+        if points.len() / n > most {
+            return Err(value(format_args!("q: expected at most {most} points, found {}", points.len() / n)));
+        }
         let model = self.moving();
-        let found = py.detach(|| geometries(model, points, &velocity)).map_err(value)?;
-        let result = found.into_iter().map(|geometry| match geometry {
-            Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
-            Ok(geometry) => {
-                let result = PyDict::new(py);
-                let (metric, curvature) = (geometry.metric, geometry.curvature);
-                result.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
-                result.set_item("determinant", metric.determinant)?;
-                result.set_item("scalar", curvature.scalar)?;
-                result.set_item("kretschmann", curvature.kretschmann)?;
-                for (name, numbers) in [
-                    ("metric", metric.components),
-                    ("inverse", metric.inverse),
-                    ("christoffel", geometry.connection.symbols),
-                    ("riemann", curvature.riemann),
-                    ("ricci", curvature.ricci),
-                    ("einstein", curvature.einstein),
-                    ("weyl", curvature.weyl),
-                ] {
-                    result.set_item(name, numbers.into_pyarray(py))?;
-                }
-                Ok(result.into_any())
+        let found = whole(py, None, |watch| {
+            let mut found = Geometries::default();
+            let chunks = points.chunks(GEOMETRY_CHUNK * n);
+            for points in chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed)) {
+                geometries(model, points, &velocity)?.into_iter().for_each(|one| found.push(n, one));
             }
-        });
-        result.collect()
+            Ok::<_, GeometryError>(found)
+        })?;
+        let Geometries { numbers, signatures, failures } = found.map_err(value)?;
+        let arrays = PyDict::new(py);
+        for ((name, _), numbers) in FIELDS.iter().zip(numbers) {
+            arrays.set_item(*name, numbers.into_pyarray(py))?;
+        }
+        Ok((arrays, signatures.into_pyarray(py), failures))
     }
 
     /// Point symmetries, as JSON.
     fn symmetries(
-        &self,
+        slf: &Bound<'_, Self>,
         py: Python<'_>,
         region: Vec<(String, f64, f64)>,
         degrees: Option<&str>,
@@ -445,21 +511,24 @@ impl Subject {
         seed: u64,
         tolerance: Option<f64>,
     ) -> PyResult<String> {
-        self.require_free()?;
-        let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
-        let periodic = self.periodic();
-        let region = self.region(self.interest(), region)?;
+        let this = slf.get();
+        this.require_free()?;
+        let (n, exact, units) = (this.n(), matches!(this.kind, Kind::System(..)), this.units());
+        let periodic = this.periodic();
+        let region = this.region(this.interest(), region)?;
         let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], region.position[i])).collect();
         let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
-        let names = &self.columns[..n];
+        let names = &this.columns[..n];
         let tried = bases(names, &charts, degrees, exact);
         let most = tried.iter().map(|(basis, _)| unknowns(n, basis.len())).max().unwrap_or(0);
         let points = points.unwrap_or(enough(most, exact)).min(most_states(n, most));
-        let model = self.moving();
-        let (found, degrees) = py.detach(|| {
-            let (q, v) = self.sampled(&region, points, seed)?;
-            most_symmetries(model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
-        })?;
+        let subject = slf.clone().unbind();
+        let (found, degrees) = left(py, move |watch| {
+            let this = subject.get();
+            let (q, v) = this.sampled(&region, points, seed)?;
+            let model = Interruptible::new(this.moving(), &watch.interrupt);
+            most_symmetries(&model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
+        })??;
         let closed = found.algebra.as_ref().filter(|algebra| algebra.closes);
         Ok(json!({
             "count": found.separation.count,
@@ -468,7 +537,7 @@ impl Subject {
             "fields": found.fields.iter().map(|field| field.text(&found.basis)).collect::<Vec<_>>(),
             "gauge_functions": found.fields.iter().map(|field| field.gauge_text(&found.basis)).collect::<Vec<_>>(),
             "structure_constants": closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
-            "time_translation": model.conserves_energy(),
+            "time_translation": this.moving().conserves_energy(),
             "singular_values": found.singular_values,
             "basis": degrees.to_string(),
             "points": found.states,
@@ -481,19 +550,21 @@ impl Subject {
         let system = self.system_instance().ok();
         let description = system.as_ref().and_then(|system| system.system.description());
         let formulas = description.map(|description| description.constraints.clone()).unwrap_or_default();
-        let found = py.detach(|| {
+        let found = whole(py, None, |watch| {
             let (q, v) = self.sampled(&self.interest(), EXAMINED_STATES, seed)?;
-            Ok::<_, PyErr>(examine(self.moving(), &formulas, (&q, &v)))
-        })?;
+            let model = Interruptible::new(self.moving(), &watch.interrupt);
+            Ok::<_, PyErr>(examine(&model, &formulas, (&q, &v)))
+        })??;
         serde_json::to_string(&found).map_err(runtime)
     }
 
     /// The Lagrangian as a formula, as JSON.
     fn formula(&self, py: Python<'_>, choices: &str) -> PyResult<String> {
         self.require_free()?;
-        let (options, name) = FormulaChoices::read(choices)?;
+        let (mut options, name) = FormulaChoices::read(choices)?;
         let (names, periodic) = (&self.columns[..self.n()], self.periodic());
-        whole(py, |_| {
+        whole(py, None, |watch| {
+            options.cancellation = watch.cancellation();
             let (q, v) = self.sampled(&self.interest(), MODEL_STATES, options.seed)?;
             let found = formula_of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
             Ok(described(&found, &name))
@@ -524,7 +595,7 @@ impl Subject {
         let region = Bounds { positions: pairs(position), velocities: pairs(velocity) };
         let usual = Signature::of(self.n(), self.time_like().is_some());
         let signature = signature.map_or(usual, |(positive, negative)| Signature { positive, negative });
-        let found: Certificate = attended(py, None, |watch| {
+        let found: Certificate = whole(py, None, |watch| {
             let stop = Some(watch.interrupt.as_ref());
             let options = certificate::Options {
                 condition,
@@ -574,7 +645,7 @@ impl Subject {
         // A system that is described in the model's file is the one whose constraints it was learned under.
         let constraints = header.description.is_none().then(|| header.constraints.clone());
         let options = EvaluationOptions { starts, constraints, threads, ..options };
-        let found = attended(py, progress.as_ref(), |watch| evaluate(&system, network, options, &watch))?;
+        let found = whole(py, progress.as_ref(), |watch| evaluate(&system, network, options, watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }
 }

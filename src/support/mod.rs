@@ -1,9 +1,11 @@
-//! What every floor above needs and none is about: names in messages, files, memory.
+//! What every floor above needs and none is about: cancellation, names in messages, files, memory.
 //!
 //! | module | contents |
 //! |---|---|
+//! | [`cancellation`] | the flag that ends a long search, and reports of how far it is |
 //! | [`names`] | nearest known name for error messages, numbers and counts in words |
 //! | [`storage`] | files: read within limits, written completely or not at all; locks of directories; the container of model files and checkpoints |
 
+pub mod cancellation;
 pub mod names;
 pub mod storage;

@@ -9,7 +9,7 @@ use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
 use lnn::network::{Architecture, Layout, NetworkLagrangian, file::ModelFile};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::recording::RecordedTrajectory;
-use lnn::rollout::{Options, rollout, rollout_many};
+use lnn::rollout::{Between, Options, rollout, rollout_many};
 use lnn::shooting::{Shooting, Task, fit};
 use lnn::training::{Hooks, Objective};
 use std::path::Path;
@@ -26,7 +26,7 @@ fn shot(architecture: &Architecture, weights: &[f64], threads: usize) -> Vec<f64
     let q: Vec<f64> = times.iter().flat_map(|t| [0.5 * (3.0 * t).sin(), 0.4 * (4.0 * t).cos()]).collect();
     let v: Vec<f64> = times.iter().flat_map(|t| [1.5 * (3.0 * t).cos(), -1.6 * (4.0 * t).sin()]).collect();
     let track = RecordedTrajectory { name: String::new(), times, q: q.clone(), v: vec![], a: vec![], force: vec![] };
-    let tracks = [StateEstimate { track: &track, q: &q, v: &v }];
+    let tracks = [StateEstimate { track: &track, q: &q, v: &v, between: Between::Linear }];
     let noise = Noise { q: vec![0.1; 2], v: vec![] };
     let task = Task {
         architecture,

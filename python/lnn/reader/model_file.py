@@ -6,10 +6,10 @@ import json
 import os
 import zlib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from . import files
 from .functions import Functions, numpy_functions
 from .header import check
 
@@ -43,7 +43,7 @@ class ModelFile:
         ValueError
             If the file is altered, is no model file, or has a key or a value that this reader does not know.
         """
-        return cls.from_bytes(Path(path).read_bytes())
+        return cls.from_bytes(files.read(path))
 
     @classmethod
     def from_bytes(cls, data: bytes) -> ModelFile:
@@ -83,9 +83,9 @@ class ModelFile:
         text += b" " * (-len(text) % 8)
         return len(text).to_bytes(8, "little") + text + payload
 
-    def save(self, path: str | os.PathLike) -> None:
-        """Writes the file; ``lnn`` loads it."""
-        Path(path).write_bytes(self.to_bytes())
+    def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Writes the file, which ``lnn`` loads; one that is there already is kept unless `overwrite` is set."""
+        files.write(path, self.to_bytes(), overwrite)
 
     def to_numpy(self) -> Functions:
         """The model as functions of NumPy arrays, in double precision, derivatives exact."""

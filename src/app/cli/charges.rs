@@ -14,7 +14,7 @@ const SEED: u64 = 0;
 /// A charge and its drift.
 #[derive(Debug, Serialize)]
 struct Row {
-    /// `energy`, or the field whose charge it is.
+    /// `energy`, or `g(v, v)/2` along geodesics of a metric with a time, or the field whose charge it is.
     symmetry: String,
     start: f64,
     end: f64,
@@ -46,7 +46,8 @@ impl Charges {
         let (found, _) = probe.symmetries(None, (&q, &v), None)?;
         let basis = &found.basis;
         let all = charges(model, basis, &found.fields, motion).map_err(CliError::data)?;
-        let names = std::iter::once("energy".to_string()).chain(found.fields.iter().map(|field| field.text(basis)));
+        let names = std::iter::once(found.invariant.charge().to_string())
+            .chain(found.fields.iter().map(|field| field.text(basis)));
         let rows = names.zip(&all).map(|(symmetry, charge)| {
             let ends = [charge.values.first(), charge.values.last()].map(|x| x.copied().unwrap_or(f64::NAN));
             Row {

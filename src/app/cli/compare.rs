@@ -104,6 +104,12 @@ impl Compared<'_> {
         let shell =
             "B is the same at all states: f is determined at this one value, mass matrices up to a part h p p^T\n";
         let mut text = text + if found.on_shell { shell } else { "" };
+        if !found.group_factors.is_empty() {
+            let factors = found.group_factors.iter().map(|factor| rounded(*factor, 6)).collect::<Vec<_>>().join(", ");
+            text += &format!(
+                "coordinates that do not act on each other have factors of their own, which no motion tells: {factors} were taken into B first\n"
+            );
+        }
         if found.motionless_states > 0 {
             text += &format!(
                 "one of the two is degenerate: at {} states its mass matrix is singular and determines no accelerations\n",

@@ -1,20 +1,20 @@
 //! `lnn constraints`: what the coordinates of recorded motion obey, and what a Lagrangian leaves open.
 
-use crate::cli::files::require_free;
+use crate::cli::files::OutputFile;
 use crate::cli::number::whole;
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
+use crate::cli::watch::search;
 use crate::cli::{CliError, config, output};
 use crate::constraints::{
-    ConstraintKind, ConstraintSearch, EXAMINED_STATES, ExaminedLagrangian, FoundConstraint, FoundConstraints,
-    MOST_DEGREE, MotionSamples, OwnConstraint, examine, find_constraints,
+    ConstraintKind, ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraint,
+    FoundConstraints, MOST_DEGREE, MotionSamples, OwnConstraint, examine, find_constraints,
 };
 use crate::lagrangian::{EulerLagrange, FormulaConstraints};
 use crate::names::{percent, pluralize, rounded};
 use crate::recording::smooth::SmoothOptions;
 use crate::report::text_table;
 use crate::scalar::Scalar;
-use crate::storage::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -87,32 +87,34 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.recording.coords.is_empty() {
         return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
     }
-    if let Some(out) = &args.out {
-        let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
-        require_free(out, &inputs, args.overwrite)?;
-    }
+    let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
+    let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.overwrite)).transpose()?;
     let recording = args.recording.read()?.recording;
-    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?;
-    let search = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
-    let found = find_constraints(&samples, search).map_err(CliError::data)?;
-    if let Some(out) = &args.out {
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
+    let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
+    let found = find_constraints(&samples, wanted).map_err(|error| match error {
+        ConstraintSearchError::Cancelled(_) => CliError::nothing_written(),
+        error => CliError::data(error),
+    })?;
+    drop(samples);
+    if let Some(out) = &out {
         write_table(out, &found)?;
     }
     if args.json {
         let text = serde_json::to_string(&found).map_err(CliError::data)?;
-        return output::print(&format!("{text}\n"));
+        return OutputFile::print(out, &format!("{text}\n"));
     }
-    output::print(&text(&found, &recording.coordinates))
+    OutputFile::print(out, &text(&found, &recording.coordinates))
 }
 
 /// Writes the constraints of the system as the table that a system file takes.
-fn write_table(out: &Path, found: &FoundConstraints) -> Result<(), CliError> {
+fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), CliError> {
     let constraints = found.formulas();
     if constraints.is_empty() {
-        return Err(CliError::file(out, "no constraints were found: there is nothing to write"));
+        return Err(CliError::data("--out: no constraint was found within the noise: there is nothing to write"));
     }
     let text = toml::to_string(&Table { constraints }).map_err(CliError::data)?;
-    write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))
+    out.write(text.as_bytes())
 }
 
 /// The findings as text.
@@ -122,11 +124,13 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         ConstraintKind::Holonomic => "holonomic",
         ConstraintKind::Nonholonomic => "nonholonomic",
         ConstraintKind::PerTrajectory => "per trajectory",
+        ConstraintKind::Nearly => "nearly",
+        ConstraintKind::Branching => "branching",
     };
     let on = pluralize(found.trajectories, "trajectory", "trajectories");
     let _ = match found.count {
         0 => writeln!(text, "no constraints found on {on}"),
-        count => writeln!(text, "{} found on {on}", pluralize(count, "constraint", "constraints")),
+        count => writeln!(text, "{} found within the noise on {on}", pluralize(count, "constraint", "constraints")),
     };
     let row = |found: &FoundConstraint| {
         let sign = if found.kind == ConstraintKind::PerTrajectory { "const" } else { "0" };
@@ -142,8 +146,27 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         .map(|(name, &noise)| format!("{name} {}", percent(noise.max(1e-6))))
         .collect();
     let _ = writeln!(text, "\nsmaller deviations are not seen than the noise: {}", noise.join(", "));
+    for (column, how) in &found.still {
+        let _ = writeln!(text, "{column} {how}: it takes no part");
+    }
+    let has = |kind| found.constraints.iter().any(|found| found.kind == kind);
+    if has(ConstraintKind::Nearly) {
+        let _ = writeln!(
+            text,
+            "nearly: vanishes, but by more than the noise explains; something stiff, or a curve that looks straight"
+        );
+    }
+    if has(ConstraintKind::Branching) {
+        let _ = writeln!(
+            text,
+            "branching: its gradient vanishes along the motion, where a second branch begins; no roll-out can be held by it"
+        );
+    }
     if let Some(gap) = found.gap {
         let _ = writeln!(text, "the next combination of coordinates varies by {} times as much", rounded(gap, 3));
+    }
+    for limit in &found.limits {
+        let _ = writeln!(text, "{limit}");
     }
     if found.refuted > 0 {
         let what = pluralize(found.refuted, "candidate does", "candidates do");
@@ -223,6 +246,12 @@ pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
     if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
 }
 
+/// Where the constraints of a file stand in it.
+fn lines(file: &Path) -> Result<impl Fn(&str) -> usize, CliError> {
+    let lines = config::lines(&config::read_text(file)?.1);
+    Ok(move |name: &str| lines.get(&format!("constraints.{name}")).copied().unwrap_or(usize::MAX))
+}
+
 /// The model under the constraints of a file's table, as far as these are independent at some states.
 ///
 /// # Errors
@@ -242,6 +271,7 @@ pub fn constrained<S: Scalar>(
     let plain = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
     let constraints =
         FormulaConstraints::new(&columns[..columns.len() / 2], formulas).map_err(|error| wrong(&error))?;
+    let constraints = constraints.in_order(lines(file)?);
     let (constraints, _) = constraints.independent(&plain(q), &plain(v)).map_err(|error| wrong(&error))?;
     constraints.constrain(model).map_err(|error| wrong(&error))
 }

@@ -54,12 +54,16 @@ impl CliError {
     pub fn interrupted(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Interrupted, message: one_line(&message.to_string()) }
     }
+    /// A signal during a search, of which a part is worth nothing.
+    pub fn nothing_written() -> Self {
+        Self::interrupted("interrupted: nothing was found and nothing was written")
+    }
     /// A write to standard output that failed.
     pub fn output(error: &io::Error) -> Self {
         if error.kind() == io::ErrorKind::BrokenPipe {
             return Self { kind: Kind::ClosedPipe, message: "standard output was closed".to_string() };
         }
-        Self::data(format_args!("standard output: {error}"))
+        Self::data(format_args!("standard output: cannot write: {error}"))
     }
     /// Signals that cannot be watched for.
     pub fn signals(error: io::Error) -> Self {
@@ -86,7 +90,7 @@ impl From<PipelineError> for CliError {
             PipelineError::Config(faults) if faults.len() > 1 => {
                 Self::all_usage(faults.iter().map(ToString::to_string)).err().unwrap_or_else(|| Self::usage(error))
             }
-            PipelineError::Interrupted => Self::interrupted(error),
+            PipelineError::Interrupted | PipelineError::Unjudged(_) => Self::interrupted(error),
             PipelineError::InterruptedRuns { .. } => {
                 Self::interrupted(format_args!("{error}; the same command continues from there"))
             }

@@ -1,8 +1,11 @@
-//! Which path leads to which file, and files that must not be overwritten.
+//! Which path leads to which file, and the one rule by which commands write files: none that is read is overwritten, none that holds
+//! something without `--overwrite`.
 
-use crate::cli::CliError;
-use std::fs;
+use crate::cli::input::is_standard;
+use crate::cli::{CliError, output};
+use crate::storage::{check_target, write_atomically, write_new};
 use std::path::Path;
+use std::{fs, io};
 
 /// `true` if two paths lead to the same file: by links, by other spellings, by hard links.
 pub fn same_file(a: &Path, b: &Path) -> bool {
@@ -42,9 +45,88 @@ pub fn require_free(path: &Path, inputs: &[&Path], overwrite: bool) -> Result<()
     Ok(())
 }
 
+/// A file that a command will write when its work is done, found free and writable before; `-` is standard output.
+#[derive(Clone, Copy, Debug)]
+pub struct OutputFile<'a> {
+    path: &'a Path,
+    overwrite: bool,
+}
+
+impl<'a> OutputFile<'a> {
+    /// The file, by the rule of [`require_free`].
+    ///
+    /// # Errors
+    /// A data error naming the file.
+    pub fn claim(path: &'a Path, inputs: &[&Path], overwrite: bool) -> Result<Self, CliError> {
+        if !is_standard(path) {
+            require_free(path, inputs, overwrite)?;
+            check_target(path).map_err(|e| cannot_write(path, e))?;
+        }
+        Ok(Self { path, overwrite })
+    }
+
+    /// As [`claim`](Self::claim), for a system file.
+    ///
+    /// # Errors
+    /// A usage error for another name than `*.toml` or `-`.
+    pub fn claim_system(path: &'a Path, inputs: &[&Path], overwrite: bool) -> Result<Self, CliError> {
+        if !is_standard(path) && path.extension().is_none_or(|end| end != "toml") {
+            return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", path.display())));
+        }
+        Self::claim(path, inputs, overwrite)
+    }
+
+    /// Writes it whole or not at all; what another program put there meanwhile stays.
+    ///
+    /// # Errors
+    /// A data error naming the file.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), CliError> {
+        if is_standard(self.path) {
+            return output::print_bytes(bytes);
+        }
+        let written = if self.overwrite { write_atomically(self.path, bytes) } else { write_new(self.path, bytes) };
+        written.map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => {
+                let problem = "another program wrote it meanwhile; --overwrite replaces it";
+                CliError::file(self.path, format_args!("cannot write: {problem}"))
+            }
+            _ => cannot_write(self.path, error),
+        })
+    }
+
+    /// Prints what the command has to say beside: on standard error if the file itself goes to standard output.
+    ///
+    /// # Errors
+    /// As of [`output::print`].
+    pub fn print(this: Option<Self>, text: &str) -> Result<(), CliError> {
+        if this.is_some_and(|out| is_standard(out.path)) {
+            text.lines().filter(|line| !line.trim().is_empty()).for_each(output::note);
+            return Ok(());
+        }
+        output::print(text)
+    }
+}
+
+/// A file that cannot be written.
+pub fn cannot_write(path: &Path, error: io::Error) -> CliError {
+    CliError::file(path, format_args!("cannot write: {error}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_two_writers_the_second_finds_the_file_of_the_first() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a");
+        let [first, second] = [(); 2].map(|()| OutputFile::claim(&path, &[], false).unwrap());
+        first.write(b"1").unwrap();
+        assert!(second.write(b"2").unwrap_err().to_string().contains("cannot write: another program"));
+        assert!(OutputFile::claim(&path, &[], false).is_err());
+        OutputFile::claim(&path, &[], true).unwrap().write(b"3").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), fs::read_dir(directory.path()).unwrap().count()), (b"3".to_vec(), 1));
+    }
 
     #[cfg(unix)]
     #[test]

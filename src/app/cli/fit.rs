@@ -58,6 +58,6 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let report = fit(&prepared, &config, &session.options, &session.folder, &session.watch());
     session.conclude(report.map(|report| {
         let (json, text, epochs) = (report.json().to_string(), format!("{}\n", report.text()), report.history.len());
-        Learned { json, text, stop: report.stop, epochs }
+        Learned { json, text, stop: report.stop, epochs, unfinished: report.unfinished }
     }))
 }

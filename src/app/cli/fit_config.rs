@@ -235,9 +235,43 @@ impl<'a> Plan<'a> {
         let data = suggested.data.clone();
         let FitConfig { mut training, horizon, formula, members, recording, shooting, .. } = self.over(suggested)?.0;
         self.finish(&mut training, &data)?;
+        self.refuse_overruled(&training, shooting.as_ref(), targets)?;
         // A printed configuration shows the keys of multiple shooting in any case.
         let shooting = shooting.filter(|_| targets == Targets::Motion || self.args.run.print_config.is_some());
         Ok(FitConfig { formula, members, ..prepared.config(training, horizon, recording, shooting) })
+    }
+
+    /// Refuses keys that would have no effect: those that the recording decides, and those of multiple shooting where there is none.
+    fn refuse_overruled(
+        &self,
+        training: &Config,
+        shooting: Option<&Shooting>,
+        targets: Targets,
+    ) -> Result<(), CliError> {
+        let decided = |key: &str| {
+            let Some(key) = key.strip_prefix(TRAINING) else { return false };
+            let bounds = [".position", ".velocity", ".log_uniform"];
+            (key.starts_with("data.") && key != "data.acceleration_weighting")
+                || (key.starts_with("phase[") && bounds.iter().any(|end| key.ends_with(end)))
+                || ["parameters", "description"].iter().any(|name| key.split('.').next() == Some(name))
+        };
+        // Recorded motion is of no system that has parameters.
+        let training = Config { parameters: Default::default(), description: None, ..training.clone() };
+        let finished = FitConfig { training, shooting: shooting.cloned(), ..FitConfig::default() };
+        let finished = toml::Value::try_from(&finished).map_err(CliError::data)?;
+        let why = "the recording decides this in a fit: leave the key out";
+        let mut mistakes = self.layers.overruled(&finished, decided, why);
+        if targets != Targets::Motion {
+            let usual = match self.layers.has("training.network.known") {
+                true => Shooting::grey_box(),
+                false => Shooting::default(),
+            };
+            let usual = FitConfig { shooting: Some(usual), ..FitConfig::default() };
+            let usual = toml::Value::try_from(&usual).map_err(CliError::data)?;
+            let why = "only a fit to the motion itself (targets motion) has multiple shooting";
+            mistakes.extend(self.layers.overruled(&usual, |key| key.starts_with("shooting."), why));
+        }
+        self.layers.check(mistakes)
     }
 
     /// The layers over this training and what they mean for it.

@@ -8,15 +8,16 @@ use crate::names::unknown;
 use crate::network::file::Header;
 use crate::pipeline::usual_force;
 use crate::recording::factor;
-use crate::rollout::SampledForce;
+use crate::rollout::{Between, SampledForce};
 use crate::storage::read_regular;
+use clap::builder::PossibleValue;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct ForceArgs {
     /// External generalized forces that drive the motion: a constant NAME=VALUE (N, N m), or a CSV with a column of time and
-    /// columns of forces, linear between its rows; may be repeated, one CSV at most. NAME is the column of the data that
+    /// columns of forces, joined as --between says; may be repeated, one CSV at most. NAME is the column of the data that
     /// the model was fitted to, or COORDINATE_force. Forces that are not named are 0.
     #[arg(long, value_name = "FILE.csv|NAME=VALUE", allow_hyphen_values = true)]
     force: Vec<String>,
@@ -26,6 +27,24 @@ pub struct ForceArgs {
     /// Units of columns of the forces' CSV that are not SI, or factors to SI, such as t=ms,tau1=mN.
     #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit, requires = "force")]
     force_units: Vec<(String, String)>,
+    /// Forces of the CSV between its rows; those of an identified system as `lnn identify` says that it took them [default: linear].
+    #[arg(long, value_enum, value_name = "WAY", requires = "force")]
+    between: Option<Between>,
+}
+
+impl clap::ValueEnum for Between {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            Self::Held => "As they were at the sample before",
+            Self::Linear => "On straight lines",
+            Self::Cubic => "On curves of the third degree through the four nearest samples",
+            Self::BandLimited => "Without frequencies above half the rate of the samples",
+        };
+        Some(PossibleValue::new(self.name()).help(help))
+    }
 }
 
 /// Names of a model's forces, one per coordinate: those of its data, or `COORDINATE_force`.
@@ -88,8 +107,8 @@ impl ForceArgs {
         }
         match file {
             Some(path) => self.with_columns(&path, (coordinates, known), &constants, (from, to)).map(Some),
-            None if self.force_time.is_some() || !self.force_units.is_empty() => {
-                Err(CliError::usage("--force-time and --force-units need a CSV of forces"))
+            None if self.force_time.is_some() || !self.force_units.is_empty() || self.between.is_some() => {
+                Err(CliError::usage("--force-time, --force-units and --between need a CSV of forces"))
             }
             None => {
                 let values = constants.iter().map(|force| force.unwrap_or(0.0)).collect();
@@ -165,6 +184,7 @@ impl ForceArgs {
             }
         }
         let force = SampledForce::new(known.len(), times, values).map_err(|e| CliError::file(path, e))?;
+        let force = force.between(self.between.unwrap_or_default());
         let ((first, last), slack) = (force.span(), 1e-9 * (to - from).abs());
         if from.min(to) < first - slack || from.max(to) > last + slack {
             let problem = format!(

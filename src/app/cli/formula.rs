@@ -1,15 +1,18 @@
 //! `lnn formula`: the Lagrangian of recorded motion, or of a model, as a formula.
 
+use crate::cli::files::OutputFile;
 use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
-use crate::cli::{CliError, output, parse_system};
+use crate::cli::watch::search;
+use crate::cli::{CliError, parse_system};
 use crate::formula::{
     Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, formula_of_model,
     formula_of_motion,
 };
+use crate::identification::Between;
+use crate::recording::LoadedRecording;
 use crate::report::formula_text;
-use crate::storage::{check_target, write_atomically};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -19,9 +22,10 @@ pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
     /// Functions that terms are made of, by family and total degree: polynomial, trigonometric (of sums and differences of
-    /// angles too), radial, reciprocal.
-    #[arg(long, value_name = "FAMILY:DEGREE,..", default_value = "polynomial:2,trigonometric:2", value_parser = families)]
-    basis: Families,
+    /// angles too), radial, reciprocal [default: of motion larger and larger ones until one explains it, of a model
+    /// polynomial:2,trigonometric:2].
+    #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = families)]
+    basis: Option<Families>,
     /// A function of the coordinates beside them, such as exp(-x); may be repeated.
     #[arg(long, value_name = "FORMULA", allow_hyphen_values = true)]
     function: Vec<String>,
@@ -34,6 +38,9 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
+    /// Known forces between the samples [default: what meets the motion best].
+    #[arg(long, value_enum, value_name = "WAY")]
+    between: Option<Between>,
     /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
     /// the forces where they are known].
     #[arg(long, value_name = "TERM=VALUE", value_parser = scale)]
@@ -56,6 +63,9 @@ pub struct Args {
     /// Write the formula as a system file that trains, rolls out and certifies, its constants as parameters.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
+    /// Replace the file.
+    #[arg(long, requires = "out")]
+    overwrite: bool,
     /// Name of the system in the file.
     #[arg(long, value_name = "NAME", default_value = "formula", value_parser = system_name)]
     name: String,
@@ -106,19 +116,21 @@ fn system_name(text: &str) -> Result<String, String> {
 }
 
 impl Args {
-    fn options(&self) -> FormulaOptions {
-        FormulaOptions {
+    fn options(&self) -> Result<FormulaOptions, CliError> {
+        Ok(FormulaOptions {
             families: self.basis,
             functions: self.function.clone(),
             gyroscopic: !self.no_gyroscopic,
             friction: self.friction,
             noise: self.noise.clone(),
+            between: self.between,
             scale: self.scale.clone(),
             bootstraps: self.bootstraps,
             seed: self.seed,
             threads: threads(self.threads),
+            cancellation: search()?,
             ..FormulaOptions::default()
-        }
+        })
     }
 }
 
@@ -127,27 +139,23 @@ impl Args {
 /// # Errors
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    if let Some(out) = &args.out {
-        if out.extension().is_none_or(|end| end != "toml") {
-            return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", out.display())));
-        }
-        check_target(out).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))?;
-    }
+    let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
+    let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
     let (found, of_model) = match args.recording.data.as_slice() {
         [path] if is_model(path) => (of_model(args, path)?, true),
         _ => (of_motion(args)?, false),
     };
-    if let Some(out) = &args.out {
+    if let Some(out) = &out {
         let text = found.system_file(&args.name);
         parse_system(&text)
             .map_err(|(_, problem)| CliError::usage(format_args!("--out: no system file: {problem}")))?;
-        write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))?;
+        out.write(text.as_bytes())?;
     }
     if args.json {
         let json = found.summary(args.friction, args.seed);
-        return output::print(&(serde_json::to_string(&json).map_err(CliError::data)? + "\n"));
+        return OutputFile::print(out, &(serde_json::to_string(&json).map_err(CliError::data)? + "\n"));
     }
-    output::print(&match args.format {
+    let text = match args.format {
         Format::Text => formula_text(&found, args.friction, of_model),
         Format::Toml => found.system_file(&args.name),
         Format::Latex => {
@@ -155,7 +163,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             format!("L = {}\n{friction}", found.latex(false))
         }
         Format::Rust => found.rust(),
-    })
+    };
+    OutputFile::print(out, &text)
 }
 
 /// `true` for a directory, and for a file of a model.
@@ -173,13 +182,15 @@ fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
     let units = args.recording.meaning().coordinate_units();
-    formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options() }).map_err(refused)
+    formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
+        .map_err(|error| in_file(error, &reading))
 }
 
 fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     let columns = [
         ("--coords", args.recording.coords.is_empty()),
         ("--noise", args.noise.is_none()),
+        ("--between", args.between.is_none()),
         ("--trajectory", args.recording.trajectory.is_none()),
     ];
     if let Some((option, _)) = columns.iter().find(|(_, unused)| !unused) {
@@ -189,8 +200,18 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     let (q, v) = probe.states(MODEL_STATES, args.seed)?;
     let chart = (probe.coordinates(), probe.periodic());
     let (units, time_unit) = probe.units();
-    let options = FormulaOptions { units, time_unit, ..args.options() };
+    let options = FormulaOptions { units, time_unit, ..args.options()? };
     formula_of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)
+}
+
+/// [`refused`], with the row of the file.
+fn in_file(error: FormulaError, reading: &LoadedRecording) -> CliError {
+    match &error {
+        FormulaError::Wild { track, sample, .. } => {
+            CliError::data(format_args!("row {}: {error}", reading.rows[*track].row(*sample)))
+        }
+        _ => refused(error),
+    }
 }
 
 /// What the user chose, or what the data are.
@@ -198,6 +219,7 @@ fn refused(error: FormulaError) -> CliError {
     match &error {
         FormulaError::Terms { .. } => CliError::usage(format_args!("--basis: {error}")),
         FormulaError::Function { .. } => CliError::usage(format_args!("--function: {error}")),
+        FormulaError::Cancelled(_) => CliError::nothing_written(),
         FormulaError::Scale { .. } => CliError::usage(format_args!("--{error}")),
         _ => CliError::data(error),
     }

@@ -1,15 +1,18 @@
 //! `lnn identify`: the constants of a system whose form is known, from recorded motion.
 
+use crate::cli::files::OutputFile;
 use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::source::parameter;
-use crate::cli::{CliError, output, parse_system, system_arg};
-use crate::identification::{Between, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
+use crate::cli::watch::search;
+use crate::cli::{CliError, parse_system, system_arg};
+use crate::identification::{
+    Between, Bodies, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify,
+};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{number, pluralize, rounded};
 use crate::recording::{Columns, LoadedRecording, Targets};
 use crate::report::text_table;
-use crate::storage::{check_target, write_atomically};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
@@ -51,7 +54,7 @@ pub struct Args {
     targets: Option<Met>,
     /// Known forces between the samples [default: what meets the motion best].
     #[arg(long, value_enum, value_name = "WAY")]
-    between: Option<Way>,
+    between: Option<Between>,
     /// Length of the segments that are followed, in s [default: what makes the constants best known].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = seconds)]
     segment: Option<f64>,
@@ -67,6 +70,9 @@ pub struct Args {
     /// Write the system with the constants that were found, as a file that rolls out, trains and is known to a grey box.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
+    /// Replace the file.
+    #[arg(long, requires = "out")]
+    overwrite: bool,
 }
 
 /// What is met.
@@ -83,30 +89,6 @@ impl From<Met> for Targets {
         match met {
             Met::Motion => Self::Motion,
             Met::Forces => Self::Forces,
-        }
-    }
-}
-
-/// Known forces between the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Way {
-    /// As they were at the sample before.
-    Held,
-    /// On straight lines.
-    Linear,
-    /// On curves of the third degree through the four nearest samples.
-    Cubic,
-    /// Without frequencies above half the rate of the samples.
-    BandLimited,
-}
-
-impl From<Way> for Between {
-    fn from(way: Way) -> Self {
-        match way {
-            Way::Held => Self::Held,
-            Way::Linear => Self::Linear,
-            Way::Cubic => Self::Cubic,
-            Way::BandLimited => Self::BandLimited,
         }
     }
 }
@@ -128,16 +110,13 @@ fn of_the_system(argument: clap::Arg) -> clap::Arg {
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let system = system_arg::system(&args.system)?;
-    if let Some(out) = &args.out {
-        if out.extension().is_none_or(|end| end != "toml") {
-            return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", out.display())));
-        }
-        if system.description().is_none() {
-            let problem = "the Lagrangian of a listed system is no formula; give its constants by --param";
-            return Err(CliError::usage(format_args!("--out: {problem}")));
-        }
-        check_target(out).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))?;
+    if args.out.is_some() && system.description().is_none() {
+        let problem = "the Lagrangian of a listed system is no formula; give its constants by --param";
+        return Err(CliError::usage(format_args!("--out: {problem}")));
     }
+    let inputs: Vec<&Path> =
+        args.recording.data.iter().map(PathBuf::as_path).chain([Path::new(&args.system)]).collect();
+    let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
     let reading = read(args, &instance)?;
@@ -149,17 +128,19 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         noise: args.noise.clone(),
         errors: reading.errors.clone(),
         targets: args.targets.map(Targets::from),
-        between: args.between.map(Between::from),
+        between: args.between,
         segment: args.segment,
         robust: args.robust,
         threads: threads(args.threads),
+        cancellation: search()?,
     };
     let found = identify(&instance, &reading.recording, &options).map_err(refused)?;
-    if let Some(out) = &args.out {
+    drop(options);
+    if let Some(out) = &out {
         write(out, &instance, &found)?;
     }
     let text = if args.json { json_text(&found, &reading)? } else { text(&found, &reading, args) };
-    output::print(&text)
+    OutputFile::print(out, &text)
 }
 
 /// The recording, its columns by the names of the system unless others are given.
@@ -199,6 +180,7 @@ fn refused(error: IdentifyError) -> CliError {
         IdentifyError::Smooth(problem) if problem.to_string().starts_with("noise") => {
             CliError::usage(format_args!("--{error}"))
         }
+        IdentifyError::Cancelled(_) => CliError::nothing_written(),
         IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
         IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
             CliError::usage(format_args!("--system: {error}"))
@@ -208,16 +190,16 @@ fn refused(error: IdentifyError) -> CliError {
 }
 
 /// Writes the description with the values that were found.
-fn write(out: &Path, instance: &SystemInstance<f64>, found: &Identified) -> Result<(), CliError> {
-    let Some(described) = &instance.system.described else { return Ok(()) };
+fn write(out: &OutputFile<'_>, instance: &SystemInstance<f64>, found: &Identified) -> Result<(), CliError> {
     let given = instance.system.parameters.iter().zip(&instance.parameters);
     let mut values: Vec<(&str, f64)> = given.map(|(parameter, value)| (parameter.symbol.as_ref(), *value)).collect();
     for constant in &found.constants {
         values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
     }
-    let text = toml::to_string(&described.with_defaults(&values)).map_err(CliError::data)?;
+    let Some(description) = instance.system.with_defaults(&values) else { return Ok(()) };
+    let text = toml::to_string(&description).map_err(CliError::data)?;
     parse_system(&text).map_err(|(_, problem)| CliError::data(format_args!("--out: no system file: {problem}")))?;
-    write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))
+    out.write(text.as_bytes())
 }
 
 /// Name of the file and the row of a sample.
@@ -247,38 +229,25 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
             json!({ "trajectory": trajectory, "row": row, "t": o.time, "coordinate": o.coordinate, "size": o.size })
         })
         .collect();
-    let undetermined: Vec<Value> = found
-        .undetermined
-        .iter()
-        .map(|u| {
-            let known: Map<String, Value> = u.known.iter().map(|(text, value)| (text.clone(), json!(value))).collect();
-            json!({ "constants": u.constants, "direction": u.direction, "known": known,
-                "relative_error": u.relative_error, "text": u.text, "cure": u.cure })
-        })
-        .collect();
-    let combinations: Vec<Value> = found
-        .combinations
-        .iter()
-        .map(|sum| {
-            let terms: Map<String, Value> = sum.terms.iter().map(|(name, x)| (name.clone(), json!(x))).collect();
-            json!({ "terms": terms, "value": sum.value, "standard_error": sum.standard_error, "unit": sum.unit })
-        })
-        .collect();
     let whole = json!({
         "constants": constants,
         "sensors": found.sensors,
         "obstacles": found.obstacles,
         "converged": found.converged,
         "decrement": found.decrement,
-        "undetermined": undetermined,
-        "combinations": combinations,
+        "undetermined": found.undetermined,
+        "combinations": found.combinations,
+        "bodies": found.bodies,
         "correlations": { "names": names, "matrix": matrix },
         "residual": {
             "coordinates": found.residuals,
             "over_noise": found.over_noise,
             "explained": found.explained,
+            "verdict": found.verdict,
+            "says": found.verdict.to_string(),
             "inflation": found.inflation,
         },
+        "force_noise": found.force_noise,
         "outliers": outliers,
         "outlier_count": found.outlier_count,
         "samples": found.samples,
@@ -304,6 +273,23 @@ fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
     [rounded(value, digits.clamp(1, 17) as usize), rounded(error, 2)]
 }
 
+/// What became of the inertias of links.
+fn bodies(bodies: &Bodies) -> String {
+    let Bodies { moved, largest_change, exist } = bodies;
+    let links = moved.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    let change = rounded(*largest_change, 2);
+    match (moved.is_empty(), exist) {
+        (_, false) if moved.is_empty() => "\nno bodies have the constants that are given\n".into(),
+        (_, false) => format!(
+            "\nno bodies have these sums within their errors: the nearest ones are {change} standard errors away; is the form complete?\n"
+        ),
+        (true, true) => String::new(),
+        (false, true) => format!(
+            "\nthe constants of links {links} are the nearest to the start that bodies have; known sums change by {change} standard errors at most\n"
+        ),
+    }
+}
+
 fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let row = |name: String, (value, error): (f64, Option<f64>), unit: &str, start: f64| {
         let [value, error] = with_error(value, error);
@@ -327,27 +313,19 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let said: String =
         found.obstacles.iter().map(|obstacle| format!("{obstacle}; nothing can be learned of it\n")).collect();
     let mut text = said + &text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
-    let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1).map(|sum| {
-        let term = |(at, (name, factor)): (usize, &(String, f64))| {
-            let (sign, size) = if *factor < 0.0 { ("-", -factor) } else { ("+", *factor) };
-            let sign = if at == 0 { String::new() } else { format!(" {sign} ") };
-            let size = rounded(size, 4);
-            if size == "1.000" { format!("{sign}{name}") } else { format!("{sign}{size}*{name}") }
-        };
-        let [value, error] = with_error(sum.value, Some(sum.standard_error));
-        vec![sum.terms.iter().enumerate().map(term).collect(), value, error, sum.unit.clone()]
+    let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1);
+    let known = sums.chain(found.undetermined.iter().flat_map(|open| &open.known)).map(|known| {
+        let [value, error] = with_error(known.value, Some(known.standard_error));
+        vec![known.name.clone(), value, error, known.unit.clone()]
     });
-    let sums: Vec<Vec<String>> = sums.collect();
-    if !sums.is_empty() {
-        text += &format!("\n{}", text_table(&["sum of constants", "value", "standard error", "unit"], &sums));
+    let known: Vec<Vec<String>> = known.collect();
+    if !known.is_empty() {
+        text += &format!("\n{}", text_table(&["combination", "value", "standard error", "unit"], &known));
     }
-    for Undetermined { text: open, cure, known, .. } in &found.undetermined {
-        text += &format!("\n{open}\n");
-        for (combination, value) in known {
-            text += &format!("  {combination} = {}\n", rounded(*value, 6));
-        }
-        text += &format!("  it takes {cure}\n");
+    for Undetermined { text: open, cure, .. } in &found.undetermined {
+        text += &format!("\n{open}\n  it takes {cure}\n");
     }
+    text += &found.bodies.as_ref().map(bodies).unwrap_or_default();
     let m = found.constants.len() + found.sensors.len();
     let names: Vec<String> =
         found.constants.iter().map(|c| c.symbol.clone()).chain(found.sensors.iter().map(sensor)).collect();
@@ -360,7 +338,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         text += &format!("\ncorrelations of errors beyond 0.9: {}\n", listed.collect::<Vec<_>>().join(", "));
     }
     let rows = found.residuals.iter().map(|r| {
-        let white = if r.white { "as noise" } else { "not noise" };
+        let white = if r.white { "independent" } else { "correlated" };
         vec![
             r.coordinate.clone(),
             number(r.rms),
@@ -373,19 +351,9 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let what = if found.segments == 0 { "force on" } else { "coordinate" };
     let headers = [what, "residual", "noise", "spread", "of neighbours", ""];
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
-    text += match found.explained {
-        _ if !found.converged => "",
-        true => "the form explains what was measured\n",
-        false => {
-            "the form does not explain what was measured: something is missing, and errors are those of a wrong form\n"
-        }
-    };
+    text += &format!("{}\n", found.verdict);
     if !found.converged {
-        text += &format!(
-            "the search did not converge: {} times the variance of the noise is left to gain, and constants and errors are those where it \
-             stopped\n",
-            number(found.decrement)
-        );
+        text += &format!("{} times the variance of the noise is left to gain\n", number(found.decrement));
     }
     text += &pluralize(found.samples, "sample", "samples");
     if found.segments > 0 {
@@ -393,13 +361,12 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         text += &format!(" in {segments} of {} s", number(found.segment_seconds));
     }
     if let Some(between) = found.between {
-        let way = match between {
-            Between::Held => "held",
-            Between::Linear => "linear",
-            Between::Cubic => "cubic",
-            Between::BandLimited => "band-limited",
-        };
+        let way = between.name();
         text += &format!(", forces {way} between the samples");
+    }
+    if !found.force_noise.is_empty() {
+        let sizes: Vec<String> = found.force_noise.iter().map(|size| rounded(*size, 2)).collect();
+        text += &format!(", noise of forces {}", sizes.join(", "));
     }
     text += "\n";
     if found.outlier_count > 0 {

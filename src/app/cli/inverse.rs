@@ -4,7 +4,7 @@ use crate::cli::format::{CHUNK, Field, Format, Shape, explain, report_failures, 
 use crate::cli::source::Source;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, input, json, output, states};
-use crate::lagrangian::{ForceParts, InverseDynamics, force_parts_by_rows, inverse_dynamics_by_rows};
+use crate::lagrangian::{ForceParts, InverseDynamics, MechanicsError, force_parts_by_rows, inverse_dynamics_by_rows};
 use crate::scalar::Scalar;
 use std::path::Path;
 
@@ -47,7 +47,14 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         let mut failed = failed.into_iter().peekable();
         let mut text = String::new();
         for (k, &row) in rows.iter().enumerate() {
-            let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
+            let problem = failed.next_if(|failure| failure.row() == Some(k)).map(|failure| match failure {
+                MechanicsError::OffConstraints { constraint, distance, .. } => {
+                    let names = source.model.manifold().map_or(&[][..], |manifold| manifold.names());
+                    let name = names.get(constraint).map_or("?", String::as_str);
+                    format!("the acceleration is {distance:.3e} away from what the constraints allow, most by `{name}`")
+                }
+                other => explain(other),
+            });
             text += &line(format, row, n, k, (&forces, parts.as_ref()), times.get(k), problem.as_deref());
             failures.extend(problem.map(|problem| (row, problem)));
         }
@@ -77,6 +84,11 @@ fn line<S: Scalar>(
     let mut fields = vec![vector("generalized_force", &all[..]), vector("external_force", &external)];
     if !friction.is_empty() {
         fields.insert(1, vector("friction", &friction));
+    }
+    let (held, m) = (part(&forces.constraint), forces.multipliers.len() * n / forces.external.len().max(1));
+    if m > 0 {
+        let multipliers = &forces.multipliers[k * m..(k + 1) * m];
+        fields.extend([vector("constraint_force", &held), vector("multipliers", multipliers)]);
     }
     let split = parts.map(|parts| [&parts.inertial, &parts.coriolis, &parts.gravity].map(|values| part(values)));
     if let Some([inertial, coriolis, gravity]) = &split {

@@ -29,6 +29,8 @@ pub struct Learned {
     pub stop: StopReason,
     /// Epochs that were run.
     pub epochs: usize,
+    /// What an interruption after the training left out, in words.
+    pub unfinished: Option<String>,
 }
 
 /// Opens the directory of a run that begins; `inputs` are the files that it reads beside the model it starts from.
@@ -80,7 +82,7 @@ impl<'a> Session<'a> {
     /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
     pub fn conclude(self, learned: Result<Learned, PipelineError>) -> Result<(), CliError> {
         let path = self.folder.path();
-        let Learned { json, text, stop, epochs } = match learned {
+        let Learned { json, text, stop, epochs, unfinished } = match learned {
             Ok(learned) => learned,
             Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
                 let on = how_to_go_on(path);
@@ -102,7 +104,8 @@ impl<'a> Session<'a> {
         match stop {
             StopReason::Finished => Ok(()),
             StopReason::Interrupted => {
-                Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path))))
+                let what = unfinished.map_or(String::new(), |what| format!("{what}; "));
+                Err(CliError::interrupted(format_args!("interrupted, {what}{kept}{}", how_to_go_on(path))))
             }
             StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
         }

@@ -1,5 +1,6 @@
 //! `lnn completions` and `lnn man`: what a shell and a reader of manual pages want to know of the program.
 
+use crate::cli::files::cannot_write;
 use crate::cli::{CliError, output};
 use crate::storage::write_atomically;
 use clap::Command;
@@ -64,9 +65,8 @@ fn page(command: &Command) -> Result<Vec<u8>, CliError> {
 }
 
 fn write(directory: &Path, command: &Command) -> Result<(), CliError> {
-    let cannot = |path: &Path, e: std::io::Error| CliError::file(path, format_args!("cannot write: {e}"));
-    std::fs::create_dir_all(directory).map_err(|e| cannot(directory, e))?;
+    std::fs::create_dir_all(directory).map_err(|e| cannot_write(directory, e))?;
     let name = command.get_display_name().unwrap_or(command.get_name());
     let path = directory.join(format!("{name}.1"));
-    write_atomically(&path, &page(command)?).map_err(|e| cannot(&path, e))
+    write_atomically(&path, &page(command)?).map_err(|e| cannot_write(&path, e))
 }

@@ -1,6 +1,7 @@
 //! Results of a roll-out beside its samples: where it left the training range, pictures, facts in JSON.
 
 use crate::cli::charges::Charges;
+use crate::cli::files::cannot_write;
 use crate::cli::tube::{MotionTube, TubeFacts};
 use crate::cli::{CliError, input, output};
 use crate::names::{pluralize, rounded};
@@ -118,7 +119,7 @@ impl Watch {
         } else {
             self.picture(title, &names, &positions, time_unit)?.to_svg().into_bytes()
         };
-        write_atomically(path, &bytes).map_err(|e| CliError::file(path, format_args!("cannot write: {e}")))
+        write_atomically(path, &bytes).map_err(|e| cannot_write(path, e))
     }
 
     /// Lower and upper ends of a tube around every coordinate, at the times that are kept.
@@ -246,10 +247,6 @@ impl<'a> Target<'a> {
             Self::File { path, growing } => growing.finish().map_err(|e| cannot_write(path, e)),
         }
     }
-}
-
-fn cannot_write(path: &Path, error: std::io::Error) -> CliError {
-    CliError::file(path, format_args!("cannot write: {error}"))
 }
 
 impl Facts<'_> {

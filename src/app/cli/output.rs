@@ -8,8 +8,21 @@ use std::io::Write;
 /// # Errors
 /// A closed pipe or any other failure to write.
 pub fn print(text: &str) -> Result<(), CliError> {
+    print_bytes(text.as_bytes())
+}
+
+/// Writes bytes to standard output.
+///
+/// # Errors
+/// As of [`print`].
+pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
+    out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
+}
+
+/// Writes how far long work is to standard error, one line; if that is closed, nothing more can be done.
+pub fn progress(text: &str) {
+    let _ = writeln!(std::io::stderr(), "progress: {}", crate::names::one_line(text));
 }
 
 /// Writes a remark to standard error, one line; if that is closed, nothing more can be done.

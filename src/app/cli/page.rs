@@ -1,10 +1,10 @@
 //! `lnn page`: a model as a page to play with.
 
-use crate::cli::files::require_free;
+use crate::cli::CliError;
+use crate::cli::files::OutputFile;
 use crate::cli::learned::{Learned, model_file};
-use crate::cli::{CliError, output};
+use crate::cli::motion::place;
 use crate::report::page;
-use crate::storage::{check_target, write_atomically};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// Model, a file or the directory of a run.
     model: PathBuf,
-    /// Page: one HTML file that needs no internet.
+    /// Page: one HTML file that needs no internet; - is standard output.
     #[arg(long, value_name = "FILE.html")]
     out: PathBuf,
     /// Replace the file.
@@ -26,12 +26,11 @@ pub struct Args {
 /// A data error for a bad model, one that is too large for a page, or a file that cannot be written.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let path = model_file(&args.model)?;
-    require_free(&args.out, &[&path], args.overwrite)?;
-    check_target(&args.out).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
+    let out = OutputFile::claim(&args.out, &[&path], args.overwrite)?;
     let learned = Learned::<f64>::load(&path)?;
     // Of motion that was only recorded there is nothing exact.
     let system = learned.system(&path).ok();
     let text = page(&learned.header, &learned.network, system.as_ref()).map_err(|e| CliError::file(&path, e))?;
-    write_atomically(&args.out, text.as_bytes()).map_err(|e| CliError::file(&args.out, e))?;
-    output::print(&format!("{}: {} kB\n", args.out.display(), text.len().div_ceil(1000)))
+    out.write(text.as_bytes())?;
+    OutputFile::print(Some(out), &format!("{}: {} kB\n", place(&args.out), text.len().div_ceil(1000)))
 }

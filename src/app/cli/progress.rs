@@ -1,12 +1,22 @@
 //! A progress bar on standard error: loss, learning rate, remaining time.
 
+use crate::cli::output;
 use crate::names::number;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
-/// Progress through a known number of steps; silent when standard error is not a terminal.
+/// Time after which a search says how far it is where standard error is no terminal, and time between two such lines: short searches
+/// stay silent, logs of long ones stay short.
+const FIRST_LINE: Duration = Duration::from_millis(1500);
+const NEXT_LINE: Duration = Duration::from_secs(10);
+
+/// Progress through a known number of steps; silent when standard error is not a terminal, but for a line now and then of a search.
 pub struct Progress {
     bar: ProgressBar,
+    /// When the next line is due.
+    line: Mutex<Instant>,
 }
 
 impl Progress {
@@ -22,7 +32,7 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template(&template) {
             bar.set_style(style.progress_chars("=> "));
         }
-        Self { bar }
+        Self { bar, line: Mutex::new(Instant::now() + FIRST_LINE) }
     }
 
     /// `done` steps are done.
@@ -33,6 +43,25 @@ impl Progress {
     /// A word about the work at hand.
     pub fn say(&self, text: &str) {
         self.bar.set_message(text.to_string());
+    }
+
+    /// How far a search is, which has no known number of steps.
+    pub fn search(&self, text: &str) {
+        if !self.bar.is_hidden() {
+            if self.bar.length() == Some(0) {
+                self.bar.unset_length();
+                if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed}  {msg}") {
+                    self.bar.set_style(style);
+                }
+                self.bar.enable_steady_tick(Duration::from_millis(200));
+            }
+            self.bar.set_message(text.to_string());
+        } else if let Ok(mut line) = self.line.lock()
+            && Instant::now() >= *line
+        {
+            *line = Instant::now() + NEXT_LINE;
+            output::progress(text);
+        }
     }
 
     /// The last validation loss and the learning rate.

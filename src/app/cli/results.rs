@@ -3,15 +3,13 @@
 use crate::cli::CliError;
 use crate::cli::files::{holds_something, same_file};
 use crate::cli::resume::{command, has_checkpoint};
-use crate::pipeline::{CAPTIONS, MODEL, PLAY, PipelineError};
+use crate::pipeline::{CAPTIONS, LEARNED, PLAY, PipelineError};
 use crate::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Files that only trainings and fits write.
-const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", "summary.json"];
 /// Files that evaluations write; trainings and fits have the last three as well.
 const EVALUATED: [&str; 4] = ["evaluation.json", "report.html", CAPTIONS, PLAY];
 /// Longest file that is read to say what is there, in bytes.
@@ -179,6 +177,7 @@ fn captioned(directory: &Path) -> Vec<PathBuf> {
 mod tests {
     use super::*;
     use crate::cli::folder::Folder;
+    use crate::pipeline::MODEL;
 
     #[test]
     fn captions_name_pictures_of_their_directory_alone() {

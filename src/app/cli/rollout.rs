@@ -2,7 +2,7 @@
 
 use crate::cli::charges::Charges;
 use crate::cli::constraints::constrained;
-use crate::cli::files::require_free;
+use crate::cli::files::{OutputFile, require_free};
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::motion_source::MotionSource;
@@ -13,8 +13,7 @@ use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
-use crate::rollout::{Balances, Driven, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
-use crate::storage::check_target;
+use crate::rollout::{Driven, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
 use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -160,8 +159,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         if *plot == args.out {
             return Err(CliError::usage("--plot: the trajectory goes into this file (--out)"));
         }
-        require_free(plot, &inputs, args.overwrite)?;
-        check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
+        OutputFile::claim(plot, &inputs, args.overwrite)?;
     }
     let force = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
     if args.charges && force.is_some() {
@@ -181,13 +179,6 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let moving = Interruptible::new(network, &stop);
     let driven = force.as_ref().map(|force| Driven::new(&moving, force));
-    let balanced = force.as_ref().map(|force| Driven::new(network, force));
-    let mut balances = (driven.is_some() || !network.conserves_energy()).then(|| {
-        Balances::new(q.len(), |t: &Trajectory<f64>| match &balanced {
-            Some(driven) => driven.energy_balance(t),
-            None => t.energy_balance(network),
-        })
-    });
     let mut watch = Watch::new(source.range(), columns);
     let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
     let mut take = |piece: &Trajectory<f64>| {
@@ -197,9 +188,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             sampled.q.extend(&piece.q);
             sampled.v.extend(&piece.v);
         }
-        let written = target.append(&tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece)));
-        let balanced = balances.as_mut().map_or(Ok(()), |sum| sum.add(piece)).map_err(CliError::data);
-        failed = written.and(balanced).err();
+        failed = target.append(&tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece))).err();
         if failed.is_some() || stop.load(Ordering::Relaxed) {
             ControlFlow::Break(())
         } else {
@@ -215,6 +204,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     if let Some(error @ (RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. })) = &result.stop {
         return Err(refused(error));
+    }
+    if !standard {
+        // Another program may have written it meanwhile.
+        require_free(&args.out, &inputs, args.overwrite)?;
     }
     target.finish()?;
     let time_unit = source.time_unit.as_deref();
@@ -233,8 +226,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             _ => CliError::data(problem),
         });
     }
-    let statistics = result.statistics;
-    let balance = balances.map(Balances::finish).transpose().map_err(CliError::data)?;
+    let (statistics, balance) = (result.statistics, result.balance);
     let charges = match &sampled {
         Some(motion) => {
             let probe = match &args.model {
@@ -319,6 +311,11 @@ fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), me
         ),
         RolloutError::DependentConstraint { t, constraint, .. } => format!(
             "the constraint `{}` depends on the others at t = {t}: nothing tells which of them carries the load",
+            constraints.get(*constraint).map_or("?", String::as_str)
+        ),
+        RolloutError::SecondBranch { t, constraint, at, .. } => format!(
+            "the constraint `{}` has a second branch at t = {at}, where its gradient vanishes or follows from those of the others: nothing \
+             tells which one the motion takes after t = {t}; expected a formula that is regular there",
             constraints.get(*constraint).map_or("?", String::as_str)
         ),
         RolloutError::Stopped { t } => format!("interrupted at t = {t}"),

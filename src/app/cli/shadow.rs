@@ -1,21 +1,20 @@
 //! `lnn shadow`: rays of light through a metric, as a picture of the shadow and the sky around it.
 
-use crate::cli::files::require_free;
+use crate::cli::files::OutputFile;
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::number::{number, thread_count, threads, weight, whole};
 use crate::cli::progress::Progress;
 use crate::cli::shadow_facts::{Facts, View};
 use crate::cli::source::{Source, parameter};
-use crate::cli::{CliError, interrupt, output, system_arg};
+use crate::cli::{CliError, interrupt, system_arg};
 use crate::lagrangian::{EulerLagrange, Interruptible, MechanicsError};
 use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
 use crate::relativity::{
     Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, difference_image, outline,
-    shadow,
+    shadow, time_moves_alone,
 };
 use crate::report::png;
-use crate::storage::{check_target, write_atomically};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -191,8 +190,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let model = args.model.as_deref().map(model_file).transpose()?;
     let file = args.system.as_ref().filter(|name| system_arg::is_file(name)).map(PathBuf::from);
     let inputs: Vec<_> = model.iter().chain(&file).map(PathBuf::as_path).collect();
-    require_free(&args.out, &inputs, args.overwrite)?;
-    check_target(&args.out).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
+    let out = OutputFile::claim(&args.out, &inputs, args.overwrite)?;
 
     let pixels = camera.width.saturating_mul(camera.height);
     if pixels > MOST_PIXELS {
@@ -233,10 +231,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         images.push(difference_image(&exact.shadow, &learned.shadow).map_err(refused)?);
     }
     let picture = png(&Image::beside(&images, GAP));
-    write_atomically(&args.out, &picture).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
-    let facts = Facts { system: &system, unit: unit.as_deref(), camera: &camera, tracing: &tracing, views: &views };
+    out.write(&picture)?;
+    let alone = |model: &dyn EulerLagrange<f64>| time_moves_alone(model, camera.chart, camera.distance);
+    let facts = Facts {
+        system: &system,
+        unit: unit.as_deref(),
+        camera: &camera,
+        tracing: &tracing,
+        views: &views,
+        free_factor: args.model.is_some() && models.iter().any(|(_, model)| alone(&**model)),
+    };
     let text = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
-    output::print(&text.map_err(refused)?)?;
+    OutputFile::print(Some(out), &text.map_err(refused)?)?;
     if interrupted {
         let done: usize = views.iter().map(|view| view.shadow.finished()).sum();
         let (rays, place) = (pluralize(pixels, "ray", "rays"), args.out.display());

@@ -44,6 +44,8 @@ pub struct Facts<'a> {
     pub tracing: &'a Tracing,
     /// The exact metric, the learned one, or both.
     pub views: &'a [View<'a>],
+    /// `true` if a metric was learned whose time and places do not act on each other: its impact parameters are known up to a factor.
+    pub free_factor: bool,
 }
 
 impl Facts<'_> {
@@ -59,7 +61,7 @@ impl Facts<'_> {
     /// # Errors
     /// Views of different sizes.
     pub fn json(&self, images: &[Image]) -> Result<String, RelativityError> {
-        let Self { system, unit, camera, tracing, views } = self;
+        let Self { system, unit, camera, tracing, views, free_factor } = self;
         let mut object = Map::new();
         let mut put = |key: &str, value: Value| _ = object.insert(key.to_string(), value);
         put("system", json!(system));
@@ -89,6 +91,9 @@ impl Facts<'_> {
                 "rays_per_second": view.rays_per_second(),
             });
             put(view.name, value);
+        }
+        if *free_factor {
+            put("free_factor", json!(true));
         }
         if let Some((difference, pixels)) = self.difference(images)? {
             let value = json!({
@@ -148,6 +153,13 @@ impl Facts<'_> {
                 rounded(difference.most.to_degrees(), 2)
             );
             text = crate::names::wrap_text(&text, crate::names::WIDTH);
+        }
+        if self.free_factor {
+            text += &crate::names::wrap_text(
+                "Time and places do not act on each other: motion does not tell the unit of the time beside that of the places. The learned \
+                 impact parameters are known up to one factor, and the area up to its square.\n",
+                crate::names::WIDTH,
+            );
         }
         let unfinished: usize = views.iter().map(|view| view.shadow.unfinished()).sum();
         if unfinished > 0 {

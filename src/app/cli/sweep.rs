@@ -5,9 +5,11 @@ use crate::cli::experiment::{Orders, Work, merge, perform, print_list, share};
 use crate::cli::number::{thread_count, whole};
 use crate::cli::shard::Shard;
 use crate::cli::{CliError, train_config};
-use crate::experiments::{SWEEP, Scale, Variation, combinations, sweep_runs};
+use crate::configuration::Config;
+use crate::experiments::{Choice, SWEEP, Scale, Variation, combinations, sweep_runs};
 use crate::names::pluralize;
 use clap::Parser;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Runs of a sweep at most.
@@ -65,6 +67,20 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     perform(work, &Orders { threads, shard, overwrite, beside: &[], json })
 }
 
+/// Refuses values that come to one configuration, as `0.1` and `0.10` do: it would be trained twice.
+fn require_different(configurations: &[(Choice, Config)]) -> Result<(), CliError> {
+    let text =
+        |choice: &Choice| choice.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ");
+    let mut known: BTreeMap<String, &Choice> = BTreeMap::new();
+    for (choice, config) in configurations {
+        if let Some(other) = known.insert(toml::to_string(config).map_err(CliError::data)?, choice) {
+            let (one, other) = (text(other), text(choice));
+            return Err(CliError::usage(format_args!("--vary: {one} and {other} are one configuration")));
+        }
+    }
+    Ok(())
+}
+
 /// The arguments of a training.
 #[derive(Parser)]
 struct Training {
@@ -97,6 +113,7 @@ impl Args {
         };
         let configurations =
             combinations(&self.vary).into_iter().map(configured).collect::<Result<Vec<_>, CliError>>()?;
+        require_different(&configurations)?;
         let runs = (0..).zip(sweep_runs(configurations, self.seeds)).collect();
         let words = self.words();
         let (merge, list) = (format!("{words} --merge"), format!("{words} --list"));

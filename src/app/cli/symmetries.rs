@@ -7,7 +7,8 @@ use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
 use crate::report::text_table;
 use crate::symmetry::{
-    Degrees, EXACT, MOST_FIELDS, MOST_UNKNOWNS, Quadratic, Symmetries, quadratic, quadratic_unknowns, unknowns,
+    Degrees, EXACT, Invariant, MOST_FIELDS, MOST_UNKNOWNS, Quadratic, Symmetries, quadratic, quadratic_unknowns,
+    unknowns,
 };
 use serde::Serialize;
 
@@ -75,8 +76,11 @@ struct Found {
     closes: Option<bool>,
     /// States at which the mass matrix is singular.
     singular_states: usize,
-    /// The symmetry of time, which is not counted: the energy is conserved.
+    /// The symmetry of the parameter of the motion, which is not counted, and what it conserves.
     time_translation: bool,
+    invariant: Invariant,
+    /// Of every field, whether its charge is conserved: friction may change it.
+    conserved: Vec<bool>,
     singular_values: Vec<f64>,
     basis: Families,
     /// Functions of the basis.
@@ -142,7 +146,17 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         }
         false => None,
     };
-    let Symmetries { basis, singular_values, separation, fields, algebra, states, singular_states } = found;
+    let Symmetries {
+        basis,
+        singular_values,
+        separation,
+        fields,
+        algebra,
+        states,
+        singular_states,
+        invariant,
+        conserved,
+    } = found;
     let closes = algebra.as_ref().map(|algebra| algebra.closes);
     let closed = algebra.as_ref().filter(|algebra| algebra.closes);
     let found = Found {
@@ -157,7 +171,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         closes,
         singular_states,
         structure_constants: closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
-        time_translation: model.conserves_energy(),
+        time_translation: invariant != Invariant::Nothing,
+        invariant,
+        conserved,
         singular_values,
         basis: Families {
             polynomial: families.polynomial,
@@ -205,10 +221,11 @@ impl Found {
     }
 
     fn text(&self) -> String {
-        let time = if self.time_translation {
-            "time translation (the energy is conserved)"
-        } else {
-            "no time translation (friction removes energy)"
+        let time = match self.invariant {
+            Invariant::Energy => "time translation (the energy is conserved)",
+            Invariant::Square => "translation of the parameter (g(v, v) is conserved along geodesics)",
+            Invariant::Legendre => "translation of the parameter (p.v - L is conserved)",
+            Invariant::Nothing => "no time translation (friction removes energy)",
         };
         let mut text = match self.count {
             None => format!(
@@ -248,12 +265,17 @@ impl Found {
         );
         if !self.fields.is_empty() {
             let gauged = self.gauge_functions.iter().any(|gauge| gauge != "0");
+            let dissipates = self.invariant == Invariant::Nothing;
             let rows = self.fields.iter().zip(&self.gauge_functions).enumerate().map(|(k, (field, gauge))| {
                 let gauge = gauged.then(|| gauge.clone());
-                [format!("X{}", k + 1), field.clone()].into_iter().chain(gauge).collect()
+                let kept = if self.conserved[k] { "yes" } else { "no, by friction" };
+                let kept = dissipates.then(|| kept.to_string());
+                [format!("X{}", k + 1), field.clone()].into_iter().chain(gauge).chain(kept).collect()
             });
-            let headers = &["field", "components", "gauge function"][..if gauged { 3 } else { 2 }];
-            text += &format!("\n{}", text_table(headers, &rows.collect::<Vec<Vec<String>>>()));
+            let more = [("gauge function", gauged), ("charge conserved", dissipates)];
+            let more = more.into_iter().filter(|(_, shown)| *shown).map(|(name, _)| name);
+            let headers: Vec<&str> = ["field", "components"].into_iter().chain(more).collect();
+            text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<Vec<String>>>()));
             text += &self.commutators();
             if let Some([negative, positive, zero]) = self.killing_form_signature {
                 text += &format!("Killing form: {negative} negative, {positive} positive, {zero} zero\n");

@@ -33,10 +33,12 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
 /// # Errors
 /// Line, from 1, and what is wrong there.
 pub fn parse_system(text: &str) -> Result<System, (usize, String)> {
-    let description: Description = config::parse(text)?;
-    description
-        .system()
-        .map_err(|error| (config::line_of(&config::lines(text), &error.key).unwrap_or(1), error.to_string()))
+    let mut description: Description = config::parse(text)?;
+    let lines = config::lines(text);
+    let names = description.constraints.keys();
+    let placed = names.filter_map(|name| Some((name.clone(), *lines.get(&format!("constraints.{name}"))?))).collect();
+    description.constraint_lines.0 = placed;
+    description.system().map_err(|error| (config::line_of(&lines, &error.key).unwrap_or(1), error.to_string()))
 }
 
 /// The system that a model learned, if it is known: of one that was only recorded there is nothing to know.

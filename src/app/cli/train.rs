@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let report = train(&config, &system, &session.options, &session.folder, &session.watch());
     session.conclude(report.and_then(|report| {
         let (json, text, epochs) = (report.json()?, report.text(), report.history.len());
-        Ok(Learned { json, text, stop: report.stop, epochs })
+        Ok(Learned { json, text, stop: report.stop, epochs, unfinished: None })
     }))
 }
 

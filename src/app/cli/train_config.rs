@@ -192,7 +192,7 @@ impl Args {
 
     /// The system: the argument's, the file's, the model's or the checkpoint's.
     fn named(&self, layers: &Layers, start: Option<&Start>, saved: Option<&Config>) -> Result<Named, CliError> {
-        let place = || self.run.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
+        let place = || self.run.config.as_deref().map_or("the configuration".to_string(), crate::cli::input::name);
         let requested = self.requested()?;
         let in_file = layers.text("system");
         // A description that is wrong is one of the mistakes of the file.

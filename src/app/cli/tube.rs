@@ -6,7 +6,7 @@ use crate::cli::learned::model_file;
 use crate::cli::number::{number, threads};
 use crate::cli::recording_args::read;
 use crate::cli::{CliError, input};
-use crate::data::Split;
+use crate::data::{Split, StateEstimate};
 use crate::lagrangian::EulerLagrange;
 use crate::pipeline::{FitConfig, FitOptions, PreparedFit};
 use crate::rollout::{Trajectory, quoted};
@@ -60,7 +60,7 @@ impl TubeArgs {
     /// The tube of a model for motions from one time to another; none if none was asked for.
     ///
     /// # Errors
-    /// A usage error for a motion that runs backwards, a data error for a model without the configuration of a fit beside it, for
+    /// A usage error for a system or a motion that runs backwards, a data error for a model without the configuration of a fit beside it, for
     /// recordings that cannot be read, and for too few whole motions.
     pub fn tube(
         &self,
@@ -68,7 +68,12 @@ impl TubeArgs {
         coordinates: &[String],
         (start, end): (f64, f64),
     ) -> Result<Option<MotionTube>, CliError> {
-        let (Some(share), Some(path)) = (self.tube, path) else { return Ok(None) };
+        let Some(share) = self.tube else { return Ok(None) };
+        let Some(path) = path else {
+            let problem =
+                "the motion of a system is exact; expected a model that lnn fit learned, whose errors are known";
+            return Err(CliError::usage(format_args!("--tube: {problem}")));
+        };
         if end <= start {
             return Err(CliError::usage("--tube: the motion runs backwards; expected a later --t-end"));
         }
@@ -118,12 +123,12 @@ impl TubeArgs {
 /// The beginning of every motion that lasts this long, from the first state that is known well.
 fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
     let n = part.recording.n();
-    let tracks = part.recording.tracks.iter().zip(&part.states);
-    let first = |(track, states): (_, &crate::recording::smooth::Smoothed)| {
+    let estimated = part.estimated();
+    let first = |(estimate, states): (&StateEstimate<'_>, &crate::recording::smooth::Smoothed)| {
         let samples = states.interior().start..states.times.len();
-        Window::cut(track, (&states.q, &states.v), samples, n, seconds).into_iter().next()
+        Window::cut(*estimate, samples, n, seconds).into_iter().next()
     };
-    tracks.filter_map(first).collect()
+    estimated.iter().zip(&part.states).filter_map(first).collect()
 }
 
 impl MotionTube {

@@ -1,7 +1,8 @@
 //! Watches of the program: progress bars and remarks on standard error, Ctrl-C.
 
-use crate::cli::output;
+use crate::cancellation::Cancellation;
 use crate::cli::progress::Progress as Bar;
+use crate::cli::{CliError, interrupt, output};
 use crate::pipeline::{Event, Watch};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,6 +13,7 @@ enum Stage {
     Training(usize),
     Judging,
     Experiment,
+    Search,
 }
 
 /// A watch that shows the stage under way and is ended by a flag.
@@ -38,6 +40,12 @@ pub fn watch(stop: &Arc<AtomicBool>) -> Watch {
                     bar.show(epoch.validation_loss, epoch.rate);
                 }
             }
+            Event::Search(progress) => {
+                advance(Stage::Search, 0, 0, "");
+                if let Some((_, bar)) = bar.as_ref() {
+                    bar.search(&progress.to_string());
+                }
+            }
             Event::Evaluations(count) => {
                 if let Some((_, bar)) = bar.as_ref() {
                     bar.say(&format!("{count} evaluations"));
@@ -47,4 +55,12 @@ pub fn watch(stop: &Arc<AtomicBool>) -> Watch {
         }
     };
     Watch { interrupt: Arc::clone(stop), ..Watch::new(events) }
+}
+
+/// Cancellation of a long search by a signal, with its progress on standard error.
+///
+/// # Errors
+/// Signals that cannot be watched for.
+pub fn search() -> Result<Cancellation, CliError> {
+    Ok(watch(&interrupt::flag().map_err(CliError::signals)?).cancellation())
 }

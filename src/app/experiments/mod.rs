@@ -11,7 +11,7 @@ mod record;
 mod sweep;
 
 pub use record::{Learned, Outcome, Quantity, Record, Reduction, Row, RunSpread};
-pub use sweep::{SWEEP, Variation, combinations, sweep_runs};
+pub use sweep::{Choice, SWEEP, Variation, combinations, sweep_runs};
 
 use crate::configuration::Config;
 use crate::lagrangian::SystemInstance;

@@ -54,6 +54,8 @@ pub enum Outcome {
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
+    /// Checksum of its configuration, so that a record in the place of another run is found out.
+    pub run: String,
     /// Its outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
@@ -273,7 +275,7 @@ mod tests {
             energy_errors,
             integrated,
         });
-        Some(Record { outcome, losses: vec![[Some(1.0), None]], times: vec![2.0], seconds: 2.0 })
+        Some(Record { run: String::new(), outcome, losses: vec![[Some(1.0), None]], times: vec![2.0], seconds: 2.0 })
     }
 
     #[test]
@@ -281,6 +283,7 @@ mod tests {
         let experiment = find("activations").unwrap();
         let runs = experiment.runs(Scale::Smoke, 1);
         let nothing = Some(Record {
+            run: String::new(),
             outcome: Outcome::Nothing { reason: "NaN".into() },
             losses: vec![],
             times: vec![],
@@ -335,7 +338,13 @@ mod tests {
                 stretching: vec![],
                 integrated: 0,
             };
-            Record { outcome: Outcome::Learned(learned), losses: vec![], times: vec![], seconds: 1.0 }
+            Record {
+                run: String::new(),
+                outcome: Outcome::Learned(learned),
+                losses: vec![],
+                times: vec![],
+                seconds: 1.0,
+            }
         };
         let mut results: Vec<(Run, Option<Record>)> = runs
             .into_iter()
@@ -346,7 +355,8 @@ mod tests {
             .collect();
         // One of the runs learned nothing, one has not run yet.
         let nothing = Outcome::Nothing { reason: String::new() };
-        results[0].1 = Some(Record { outcome: nothing, losses: vec![], times: vec![], seconds: 1.0 });
+        results[0].1 =
+            Some(Record { run: String::new(), outcome: nothing, losses: vec![], times: vec![], seconds: 1.0 });
         results[4].1 = None;
         let found = experiment.reductions(&results);
         let of = |quantity, group| {

@@ -60,6 +60,11 @@ impl Checkpoints {
         Self { identity: Some(text), ..self }
     }
 
+    /// The directory.
+    pub(crate) fn directory(&self) -> &Path {
+        &self.directory
+    }
+
     /// Removes them: the training is over.
     ///
     /// # Errors

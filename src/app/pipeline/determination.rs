@@ -19,11 +19,22 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, Serialize)]
 pub struct Quantity {
     name: String,
+    /// `true` for a mass, a diagonal element.
+    #[serde(skip)]
+    mass: bool,
     learned: f64,
     /// Ends of the range; not finite where the data leave the quantity open.
     low: f64,
     high: f64,
     determined: &'static str,
+}
+
+/// Coordinates that act on each other and on no others.
+#[derive(Clone, Debug, Serialize)]
+pub struct Group {
+    coordinates: Vec<String>,
+    /// `true` if the unit of its masses is known: that of the first coordinate, or by a force.
+    unit_known: bool,
 }
 
 /// Everything there is to say.
@@ -33,6 +44,9 @@ pub struct Determined {
     determination: Vec<Quantity>,
     /// The unit of mass matrix, friction and energy: `SI` with known forces, else over the mean mass of a coordinate.
     unit: String,
+    /// Groups of coordinates that do not act on each other, where there are several: each has a factor of its own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    groups: Vec<Group>,
     /// What the model misses of the accelerations of every coordinate beyond their expected error, over their size: of held-out
     /// motion, of the learned one if nothing was held out. Empty where the model is not finite.
     misfit: BTreeMap<String, f64>,
@@ -57,6 +71,12 @@ pub struct Determined {
 const MISFIT_OF_ENERGY: f64 = 0.5;
 /// Share of held-out states outside of the learned ones that is worth a word.
 const OUTSIDE: f64 = 0.1;
+/// The same, from which on held-out motion is another motion than the learned one and judges nothing.
+const MOSTLY: f64 = 0.5;
+/// Names of quantities and of what is said of them.
+const ENERGY: &str = "rms E about its mean";
+const UNIT: &str = "the unit";
+const NOT: &str = "not";
 
 /// Half of the range over the size: up to which a quantity is said to be determined.
 const WORDS: [(f64, &str); 3] = [(0.1, "well"), (0.5, "roughly"), (1.0, "poorly")];
@@ -66,9 +86,9 @@ impl Quantity {
     fn new(name: String, estimate: &Estimate, size: f64, positive: bool) -> Self {
         let Estimate { value: learned, low, high } = *estimate;
         let relative = 0.5 * (high - low) / size;
-        let determined = WORDS.iter().find(|(most, _)| relative <= *most).map_or("not", |(_, word)| word);
+        let determined = WORDS.iter().find(|(most, _)| relative <= *most).map_or(NOT, |(_, word)| word);
         let low = if positive && low.is_finite() { low.max(0.0) } else { low };
-        Self { name, learned, low, high, determined }
+        Self { name, mass: false, learned, low, high, determined }
     }
 }
 
@@ -92,6 +112,13 @@ impl Determined {
         let misfit: BTreeMap<_, _> = names.iter().cloned().zip(missed.into_iter().flatten()).collect();
         let withheld = withheld(&misfit, hold_out, held_out.is_some());
         let found = if withheld.is_none() { determination(model, periodic, &observed) } else { None };
+        let named = |(group, unit_known): &(Vec<usize>, bool)| Group {
+            coordinates: group.iter().map(|&i| names[i].clone()).collect(),
+            unit_known: *unit_known,
+        };
+        let groups =
+            found.iter().filter(|found| found.groups.len() > 1).flat_map(|found| found.groups.iter().map(named));
+        let groups = groups.collect();
         let unit = match observed.force.is_empty() {
             false => "SI".to_string(),
             true => format!("mean mass of {}", names[0]),
@@ -101,6 +128,7 @@ impl Determined {
         Ok(Self {
             determination: found.map(|found| quantities(&found, names)).unwrap_or_default(),
             unit,
+            groups,
             misfit,
             outside,
             withheld,
@@ -115,6 +143,7 @@ impl Determined {
         Self {
             determination: Vec::new(),
             unit: String::new(),
+            groups: Vec::new(),
             misfit: BTreeMap::new(),
             outside: None,
             withheld: Some("across the constraints no motion tells the mass matrix".to_string()),
@@ -122,6 +151,25 @@ impl Determined {
             energy_loss: None,
             decay: None,
         }
+    }
+
+    /// Why no mass is determined; none if one is. Of one coordinate without known forces the mass is the unit, and the energy stands for it.
+    pub(crate) fn no_mass(&self) -> Option<String> {
+        if let Some(reason) = &self.withheld {
+            return Some(format!("no mass is known to be determined: {reason}"));
+        }
+        let several = self.determination.iter().filter(|q| q.mass).count() > 1;
+        let judged = |q: &&Quantity| {
+            let looked_at = if several || self.unit == "SI" { q.mass } else { q.name == ENERGY };
+            looked_at && ![UNIT, NOT].contains(&q.determined)
+        };
+        let found = self.determination.iter().find(judged);
+        found.is_none().then(|| "the data determine no mass".to_string())
+    }
+
+    /// Share of the held-out states that the learned ones do not surround, if it is most of them.
+    pub(crate) fn mostly_outside(&self) -> Option<f64> {
+        self.outside.filter(|share| *share > MOSTLY)
     }
 
     /// A remark on standard error, if the data ask for friction.
@@ -184,6 +232,21 @@ impl Determined {
         }
     }
 
+    /// A remark on groups of coordinates whose masses have a factor that no motion tells.
+    fn apart(&self) -> Option<String> {
+        let free = self.groups.iter().filter(|group| !group.unit_known);
+        let free: Vec<String> = free.map(|group| group.coordinates.join(", ")).collect();
+        let move_by = |one: &str| if one.contains(", ") { "move by themselves" } else { "moves by itself" };
+        let parts: Vec<String> = free.iter().map(|one| format!("{one} {}", move_by(one))).collect();
+        (!parts.is_empty()).then(|| {
+            format!(
+                "{}: no motion tells the factor of that part of L, and its learned masses, friction and energy are arbitrary by one factor \
+                 beside those of the other coordinates.",
+                parts.join("; ")
+            )
+        })
+    }
+
     /// A remark on held-out states that the learned ones do not surround.
     fn beyond(&self) -> Option<String> {
         let share = self.outside.filter(|share| *share > OUTSIDE)?;
@@ -195,7 +258,7 @@ impl Determined {
 
     /// For a terminal.
     pub fn text(&self) -> String {
-        let beyond = self.beyond().map_or(String::new(), |text| text + "\n");
+        let beyond = self.apart().into_iter().chain(self.beyond()).map(|text| text + "\n").collect::<String>();
         if self.determination.is_empty() {
             return format!("\n{}\n{beyond}", self.nothing());
         }
@@ -210,7 +273,7 @@ impl Determined {
         } else {
             report.paragraph(&self.about()).table(&self.headers(), &self.rows())
         };
-        let remarks = self.beyond().into_iter().chain(self.suggestion());
+        let remarks = self.apart().into_iter().chain(self.beyond()).chain(self.suggestion());
         remarks.fold(report, |report, text| report.paragraph(&text))
     }
 }
@@ -244,7 +307,7 @@ fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
     let mass = pairs.iter().zip(&found.mass_matrix).map(|(&(i, j), estimate)| {
         let name = format!("mean M[{},{}]", names[i], names[j]);
         let size = (diagonal[i] * diagonal[j]).abs().sqrt();
-        Quantity::new(name, estimate, size, i == j && estimate.value > 0.0)
+        Quantity { mass: i == j, ..Quantity::new(name, estimate, size, i == j && estimate.value > 0.0) }
     });
     let friction = names
         .iter()
@@ -252,8 +315,8 @@ fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
         .map(|(name, estimate)| Quantity::new(format!("friction of {name}"), estimate, estimate.value.abs(), true));
     let mut mass: Vec<Quantity> = mass.collect();
     if let Some(unit) = mass.first_mut().filter(|_| !found.absolute) {
-        unit.determined = "the unit";
+        unit.determined = UNIT;
     }
-    let energy = Quantity::new("rms E about its mean".to_string(), &found.energy, found.energy.value, true);
+    let energy = Quantity::new(ENERGY.to_string(), &found.energy, found.energy.value, true);
     mass.into_iter().chain(friction).chain([energy]).collect()
 }

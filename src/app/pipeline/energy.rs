@@ -100,7 +100,7 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> 
         let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
         let (q, v) = (of(&states.q), of(&states.v));
         let trajectory = Trajectory { coordinates: n, t: states.times[rows.clone()].to_vec(), q, v, energy: None };
-        let force = track.sampled_force();
+        let force = track.sampled_force().map(|force| force.between(part.between));
         let balance = match &force {
             Some(force) => Driven::new(model, force).energy_balance(&trajectory),
             None => trajectory.energy_balance(model),
@@ -132,6 +132,11 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> 
 }
 
 impl Balance {
+    /// Energy that is not accounted for, root mean square over the trajectories, over the mean kinetic energy.
+    pub fn unaccounted(&self) -> f64 {
+        self.defect_rms / self.kinetic.abs()
+    }
+
     /// The balance in two lines, its parts over the mean kinetic energy.
     pub fn text(&self) -> String {
         let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();

@@ -8,11 +8,15 @@ use serde::Serialize;
 /// Best `learned = f(exact) + dF/dt + constant`, and the relative differences that remain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Equivalence {
-    /// Factor by which the learned Lagrangian, gauge taken out, becomes the exact one, of geodesics at rest; none where it is
+    /// Factor by which the learned Lagrangian, gauge taken out, becomes the exact one, of geodesics at rest, of the first group of coordinates;
+    /// none where it is
     /// undetermined, for all states are on a mass shell.
     pub factor: Option<f64>,
     /// Coefficients of `f`, from the first power: one, or of geodesics several.
     pub factors: Vec<f64>,
+    /// Factors of groups of coordinates that do not act on each other, taken out of the exact Lagrangian first; empty for one group.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub group_factors: Vec<f64>,
     /// Difference of momenta and values.
     pub lagrangian: f64,
     /// Difference of the accelerations.
@@ -49,7 +53,8 @@ impl Equivalence {
         let found = compare(learned, exact, basis, (q, v))?;
         let slope = found.factors.first().copied().filter(|slope| *slope != 0.0 && !found.on_shell);
         Ok(Self {
-            factor: slope.map(f64::recip),
+            factor: slope.map(|slope| 1.0 / (slope * found.group_factors.first().unwrap_or(&1.0))),
+            group_factors: found.group_factors,
             factors: found.factors,
             lagrangian: found.lagrangian,
             motion: found.motion,

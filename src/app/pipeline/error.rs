@@ -6,6 +6,7 @@ use crate::data::{RecordingSplitError, SamplingError};
 use crate::lagrangian::SystemError;
 use crate::network::NetworkError;
 use crate::network::file::ModelFileError;
+use crate::pipeline::Unjudged;
 use crate::recording::read::DataError;
 use crate::recording::smooth::SmoothError;
 use crate::shooting::ShootingError;
@@ -119,12 +120,23 @@ pub enum PipelineError {
         /// The other process.
         owner: String,
     },
+    /// A directory that holds a run already.
+    #[error("{}: there is {name} of another run, which is replaced on demand alone (overwrite)", path.display())]
+    Taken {
+        /// The directory.
+        path: PathBuf,
+        /// A file of the run.
+        name: String,
+    },
     /// A result that its format cannot hold.
     #[error("{0}")]
     Format(String),
     /// The flag of the watch was raised while a finished model was judged.
     #[error("interrupted while the model was judged: the model is written, tables and report are not")]
     Interrupted,
+    /// The same of a model that was just learned.
+    #[error("interrupted while the model was judged: the model is kept, tables and report are not written")]
+    Unjudged(Box<Unjudged>),
     /// Tables of an experiment none of whose runs is finished.
     #[error("none of {} is finished: there are no records to make tables of", crate::names::pluralize(*total, "run", "runs"))]
     NothingFinished {

@@ -10,8 +10,8 @@ use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{EulerLagrange, FormulaConstraints, SystemInstance};
 use crate::names::pluralize;
 use crate::network::NetworkLagrangian;
-use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::constraint_figures::constraint_figures;
+use crate::pipeline::judging::Judging;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::{PipelineError, Watch, memory};
 use crate::random::RngStream;
@@ -135,12 +135,12 @@ pub fn evaluate(
     options: EvaluationOptions,
     watch: &Watch,
 ) -> Result<Evaluation, PipelineError> {
-    let (plan, cancellation) = (options, &Cancellation::new(watch, PIECES));
+    let (plan, judging) = (options, &Judging::new(watch, PIECES));
     let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
     let n = system.coordinates;
     let exact = system.build()?;
     let learned = held(system, network, plan.constraints.as_ref())?;
-    let (exact, learned) = (cancellation.watched(exact.as_ref()), cancellation.watched(learned.as_ref()));
+    let (exact, learned) = (judging.watched(exact.as_ref()), judging.watched(learned.as_ref()));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
     let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
@@ -153,8 +153,8 @@ pub fn evaluate(
         None => mass_matrix_error(exact, learned, q),
         Some(manifold) => mass_matrix_error_within(manifold, (exact, learned), (q, v)),
     };
-    cancellation.check()?;
-    cancellation.advance(1);
+    judging.check()?;
+    judging.advance(1);
 
     let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
     // Steps grow with the time, and with the fifth root of the accuracy.
@@ -173,7 +173,7 @@ pub fn evaluate(
     };
     let mut runs = test.run_constrained(system, exact, learned)?;
     runs.retain(|run| !run.is_interrupted());
-    cancellation.advance(1);
+    judging.advance(1);
     let motion = |run: &TrajectoryRun<f64>| Motion {
         summary: run.summary(),
         conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
@@ -181,7 +181,7 @@ pub fn evaluate(
     };
 
     let (mut portraits, mut figures) = (Vec::new(), Vec::new());
-    if !cancellation.is_interrupted() {
+    if !judging.is_interrupted() {
         portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
         figures = evaluation_figures(&runs, &portraits, system);
         if learned.manifold().is_some() {
@@ -193,16 +193,16 @@ pub fn evaluate(
             figures.extend(motion.into_iter().flat_map(|at| constraint_figures(learned, at, t_end, (names, unit))));
         } else {
             match grids(system, exact, learned) {
-                Err(_) if cancellation.is_interrupted() => {}
+                Err(_) if judging.is_interrupted() => {}
                 drawn => figures.extend(drawn?),
             }
         }
     }
-    if cancellation.is_interrupted() {
+    if judging.is_interrupted() {
         // They would show where the models were ended.
         (portraits, figures) = (Vec::new(), Vec::new());
     }
-    cancellation.advance(1);
+    judging.advance(1);
     let subject = Subject {
         network,
         trained: &plan.trained,
@@ -215,7 +215,7 @@ pub fn evaluate(
     };
     let free = exact.manifold().or(learned.manifold()).is_none();
     let mut physics = if free { Physics::nothing(&subject) } else { Physics::under_constraints(&subject) };
-    let found = if free { physics.find(&subject, &|| cancellation.check()) } else { cancellation.check() };
+    let found = if free { physics.find(&subject, &|| judging.check()) } else { judging.check() };
     let interrupted = match found {
         Ok(()) => None,
         Err(PipelineError::Interrupted) => {
@@ -224,7 +224,7 @@ pub fn evaluate(
         }
         Err(error) => return Err(error),
     };
-    cancellation.advance(1);
+    judging.advance(1);
     Ok(Evaluation {
         accelerations,
         wrong_signature,

@@ -92,7 +92,7 @@ impl Evaluation {
             row
         });
         let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
-        let MassMatrixError { factor, error: m } = &self.mass_matrix;
+        let MassMatrixError { factor, error: m, .. } = &self.mass_matrix;
         let matrix = [m.mean, m.median, m.p99, m.max].map(percentage);
         let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();

@@ -10,6 +10,7 @@ use crate::pipeline::readings::{READINGS, read_hole};
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch, from_table};
 use crate::report::Curve;
+use crate::storage::container::text_checksum;
 use crate::storage::in_order;
 use crate::training::{StopReason, TrainingError};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -147,6 +148,7 @@ fn make(
         &trained,
         Ok(_)
             | Err(PipelineError::Interrupted
+                | PipelineError::Unjudged(_)
                 | PipelineError::Sampling(SamplingError::Interrupted)
                 | PipelineError::Training(TrainingError::NothingLearned(_)))
     );
@@ -159,9 +161,10 @@ fn make(
             if experiment.reads_holes() {
                 read_hole(run, &trained.network, (scale, threads), output, &watch)?;
             }
-            trained.record(system.system.trajectory(system.coordinates).t_end * span)
+            trained.record(text_checksum(&toml), system.system.trajectory(system.coordinates).t_end * span)
         }
         Err(PipelineError::Training(error @ TrainingError::NothingLearned(_))) => Record {
+            run: text_checksum(&toml),
             outcome: Outcome::Nothing { reason: error.to_string() },
             losses: Vec::new(),
             times: Vec::new(),
@@ -212,7 +215,7 @@ pub(crate) fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<Kept
         let unread = || KeptRecord::Damaged(RECORD, "cannot be read".to_string());
         return Ok(if is_there(RECORD) { unread() } else { KeptRecord::Nothing });
     };
-    let record = match serde_json::from_slice(&record) {
+    let record: Record = match serde_json::from_slice(&record) {
         Ok(record) => record,
         Err(error) => return Ok(KeptRecord::Damaged(RECORD, error.to_string())),
     };
@@ -224,7 +227,8 @@ pub(crate) fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<Kept
     let read = config.parse::<toml::Table>().map_err(|error| error.message().to_string());
     let read = read.and_then(|table| from_table::<Config>(table.into()).map_err(|(_, problem)| problem));
     Ok(match read {
-        _ if config == toml => KeptRecord::Finished(record),
+        _ if config == toml && record.run == text_checksum(&toml) => KeptRecord::Finished(record),
+        _ if config == toml => KeptRecord::Damaged(RECORD, "is the record of another run".to_string()),
         Ok(_) => KeptRecord::OtherConfiguration,
         Err(problem) => KeptRecord::Damaged(CONFIG, problem),
     })
@@ -243,8 +247,8 @@ mod tests {
         let folder = directory.path().join(&run.name);
         std::fs::create_dir(&folder).unwrap();
         let outcome = Outcome::Nothing { reason: String::new() };
-        let record = Record { outcome, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
         let now = toml::to_string(&run.config).unwrap();
+        let record = Record { run: text_checksum(&now), outcome, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
         let kept = |file: &str, content: &str| {
             std::fs::write(folder.join("config.toml"), &now).unwrap();
             std::fs::write(folder.join(RECORD), serde_json::to_string(&record).unwrap()).unwrap();
@@ -254,7 +258,9 @@ mod tests {
         assert!(matches!(kept("config.toml", &now), KeptRecord::Finished(_)));
         let other = kept("config.toml", &now.replace("seed = 0", "seed = 7"));
         assert!(matches!(other, KeptRecord::OtherConfiguration), "{other:?}");
-        for (file, content) in [(RECORD, "{\"outcome\""), (RECORD, ""), ("config.toml", &now[..40])] {
+        let foreign = serde_json::to_string(&Record { run: text_checksum("other"), ..record.clone() }).unwrap();
+        let damaged = [(RECORD, "{\"outcome\""), (RECORD, ""), (RECORD, &foreign), ("config.toml", &now[..40])];
+        for (file, content) in damaged {
             let found = kept(file, content);
             assert!(matches!(&found, KeptRecord::Damaged(name, _) if *name == file), "{content}: {found:?}");
         }

@@ -1,6 +1,6 @@
 //! Directory of an experiment: the files of its tables, and one directory per run, in which one process works at a time.
 
-use crate::pipeline::{Checkpoints, Directory, Output, PipelineError};
+use crate::pipeline::{Checkpoints, Directory, LEARNED, Output, PipelineError};
 use crate::storage::{Acquired, DirectoryLock, Disk, LockOwner, read_regular, remove_leftovers};
 use crate::training::CheckpointInterval;
 use std::io::ErrorKind;
@@ -58,12 +58,26 @@ impl ExperimentDirectory {
 
 /// A directory that no other process works in.
 #[derive(Debug)]
-pub(crate) struct LockedDirectory {
+pub struct LockedDirectory {
     directory: Directory,
     _lock: DirectoryLock,
 }
 
 impl LockedDirectory {
+    /// The directory of a training or a fit that begins.
+    ///
+    /// # Errors
+    /// [`PipelineError::Taken`] if it holds a run that is not to be replaced, [`PipelineError::Held`] if another process works in it,
+    /// [`PipelineError::Output`] if it cannot be written.
+    pub fn claim(path: &Path, overwrite: bool) -> Result<Self, PipelineError> {
+        let locked = Self::open(path)?;
+        let full = |name: &&&str| std::fs::metadata(path.join(name)).is_ok_and(|data| data.is_file() && data.len() > 0);
+        match LEARNED.iter().find(full) {
+            Some(name) if !overwrite => Err(PipelineError::Taken { path: path.to_path_buf(), name: name.to_string() }),
+            _ => Ok(locked),
+        }
+    }
+
     /// Creates the directory if need be, locks it, and removes what writers killed in the middle left.
     fn open(path: &Path) -> Result<Self, PipelineError> {
         let directory = Directory::create(path)?;
@@ -86,7 +100,9 @@ impl LockedDirectory {
     pub(crate) fn remove(&self, name: &str) -> Result<(), PipelineError> {
         let path = self.directory.path().join(name);
         match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(PipelineError::output(&path, error)),
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                Err(PipelineError::output(&path, format_args!("cannot remove: {error}")))
+            }
             _ => Ok(()),
         }
     }

@@ -10,3 +10,5 @@ pub const PLAY: &str = "play.html";
 pub const RECORD: &str = "record.json";
 /// Name of the file with the figures of a run.
 pub const SUMMARY: &str = "summary.json";
+/// Files that only trainings and fits write.
+pub const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", SUMMARY];

@@ -1,8 +1,9 @@
 //! A fit of recorded motion: learning, judgement by motion that was held out, files.
 
+use crate::cancellation::Cancellation;
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit, sizes};
-use crate::formula::{FormulaOptions, formula_of_motion};
+use crate::formula::{FormulaError, FormulaOptions, formula_of_motion};
 use crate::lagrangian::EulerLagrange;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Form, Layout, NetworkLagrangian};
@@ -12,14 +13,14 @@ use crate::pipeline::fit_summary::Found;
 use crate::pipeline::force_errors::force_errors;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 use crate::pipeline::losses::LossStates;
-use crate::pipeline::members::Members;
+use crate::pipeline::members::{Members, kept_members};
 use crate::pipeline::model::trained_on;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
-use crate::pipeline::{Event, MODEL, Output, PipelineError, Watch, memory};
+use crate::pipeline::{Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
 use crate::recording::{Recording, Targets};
 use crate::scalar::Scalar;
 use crate::shooting::{self, Task};
@@ -31,6 +32,9 @@ use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume as trai
 pub struct FitReport {
     /// Reason for which learning ended.
     pub stop: StopReason,
+    /// What an interruption after the training of the model left out, in words.
+    #[doc(hidden)]
+    pub unfinished: Option<String>,
     /// Header of the model's file.
     pub header: Header,
     /// The network with its best weights.
@@ -53,6 +57,12 @@ impl FitReport {
     pub fn motion(&self) -> Result<Box<dyn EulerLagrange<f64> + '_>, PipelineError> {
         let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
         self.header.constrain(Box::new(&self.network as &dyn EulerLagrange<f64>)).map_err(wrong)
+    }
+    /// A member that an earlier run trained; its history is not known any more.
+    pub(crate) fn restored(header: Header, network: NetworkLagrangian<f64>, hold_out: HoldOut) -> Self {
+        let (stop, unfinished, others) = (StopReason::Finished, None, Vec::new());
+        let (history, json, text) = (Vec::new(), String::new(), String::new());
+        Self { stop, unfinished, header, network, history, hold_out, others, json, text }
     }
     /// Text of `summary.json`.
     #[doc(hidden)]
@@ -175,6 +185,8 @@ fn fit_in<S: Scalar>(
     let constraints = prepared.constraints().map(|held| held.formulas().clone()).unwrap_or_default();
     let header = Header { forces: named_forces(&fit_config.recording.force), constraints, ..header };
     let model = ModelFile { header, weights: trained.weights.clone() };
+    // Before the new model takes the place of the old one and of what was said of it.
+    let kept = options.checkpoints.as_ref().map_or_else(Vec::new, |kept| kept_members(kept.directory(), fit_config));
     write_model(output, &model)?;
     output.write("config.toml", toml.as_bytes())?;
     output.write("history.csv", history(&trained.history).as_bytes())?;
@@ -182,22 +194,16 @@ fn fit_in<S: Scalar>(
         output.write("shooting.csv", history(&shot.history).as_bytes())?;
     }
 
-    let time = architecture.time_like;
     let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
-    let forces = match fit_config.recording.force.as_slice() {
-        [] => names.iter().map(|name| usual_force(name)).collect(),
-        known => known.to_vec(),
+    let unjudged = |error: PipelineError| match error {
+        PipelineError::Interrupted => {
+            let (network, header) = (network.cast::<f64>(), model.header.clone());
+            let (stop, history) = (trained.stop.clone(), trained.history.clone());
+            PipelineError::Unjudged(Box::new(Unjudged { header, network, history, stop }))
+        }
+        error => error,
     };
-    let (part, horizon) = (&measured.test, fit_config.horizon);
-    let held_out = HoldOutOptions { part, horizon, time, forces: &forces, threads };
-    let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
-    let motion = model.header.constrain(Box::new(&network as &dyn EulerLagrange<f64>)).map_err(wrong)?;
-    let mut hold_out = evaluate_hold_out(motion.as_ref(), &held_out, watch)?;
-    drop(motion);
-    if *targets == Targets::Forces && !part.states.is_empty() {
-        let test = measured.datasets::<f64>(*targets)?.test;
-        hold_out.force_errors = force_errors(&network, &test, names).unwrap_or_default();
-    }
+    let hold_out = judge(prepared, fit_config, (&model.header, &network), threads, watch).map_err(unjudged)?;
     let subject = Subject {
         network: &network,
         trained: &trained_on(&model.header),
@@ -213,12 +219,13 @@ fn fit_in<S: Scalar>(
     let check = || if watch.is_interrupted() && !before { Err(PipelineError::Interrupted) } else { Ok(()) };
     let (physics, determined) = match prepared.constraints() {
         None => {
-            let physics = Physics::new(&subject, &check)?;
+            let physics = Physics::new(&subject, &check).map_err(unjudged)?;
             (physics, Determined::new(&network, (measured, *targets), &hold_out, threads)?)
         }
         Some(_) => (Physics::under_constraints(&subject), Determined::under_constraints()),
     };
     determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
+    let mut unfinished = None;
     let formula = fit_config.formula.then(|| {
         let options = FormulaOptions {
             friction: network.architecture().has_friction(),
@@ -226,17 +233,36 @@ fn fit_in<S: Scalar>(
             units: fit_config.recording.meaning().coordinate_units(),
             seed: config.seed,
             threads,
+            cancellation: if before { Cancellation::default() } else { watch.cancellation() },
             ..FormulaOptions::default()
         };
         formula_of_motion(&measured.training.recording, &options)
-            .map_err(|error| watch.say(Event::Note(&format!("no formula was looked for: {error}"))))
     });
-    let formula = formula.and_then(Result::ok);
-    let members = match trained.stop {
-        StopReason::Finished => Members::train(prepared, fit_config, (&network, &hold_out), (options, output, watch))?,
+    let formula = formula.and_then(|found| match found {
+        Err(FormulaError::Cancelled(_)) => {
+            unfinished = Some("before a formula was found".to_string());
+            None
+        }
+        Err(error) => {
+            watch.say(Event::Note(&format!("no formula was looked for: {error}")));
+            None
+        }
+        Ok(found) => Some(found),
+    });
+    let members = match (&trained.stop, &unfinished) {
+        (StopReason::Finished, None) => {
+            Members::train(prepared, fit_config, (&network, &hold_out, kept), (options, output, watch))?
+        }
         _ => None,
     };
     let (members, others) = members.unzip();
+    let (done, wanted) = (1 + others.as_ref().map_or(0, Vec::len), fit_config.members);
+    if trained.stop == StopReason::Finished && watch.is_interrupted() && done < wanted && unfinished.is_none() {
+        unfinished = Some(format!("{done} of {wanted} members are trained"));
+    }
+    if unfinished.is_some() {
+        trained.stop = StopReason::Interrupted;
+    }
     let found = Found {
         members: members.as_ref(),
         formula: formula.as_ref(),
@@ -253,7 +279,38 @@ fn fit_in<S: Scalar>(
     };
     let (json, text) = found.write(output, &toml)?;
     let (stop, history, header) = (trained.stop, trained.history, model.header);
-    Ok(FitReport { stop, header, network, history, hold_out, others: others.unwrap_or_default(), json, text })
+    let others = others.unwrap_or_default();
+    Ok(FitReport { stop, unfinished, header, network, history, hold_out, others, json, text })
+}
+
+/// What held-out motion says of a model.
+///
+/// # Errors
+/// [`PipelineError::Interrupted`].
+pub(crate) fn judge(
+    prepared: &PreparedFit<'_>,
+    config: &FitConfig,
+    (header, network): (&Header, &NetworkLagrangian<f64>),
+    threads: usize,
+    watch: &Watch,
+) -> Result<HoldOut, PipelineError> {
+    let names = &prepared.reading.recording.coordinates;
+    let time = header.architecture.time_like;
+    let forces = match config.recording.force.as_slice() {
+        [] => names.iter().map(|name| usual_force(name)).collect(),
+        known => known.to_vec(),
+    };
+    let (part, horizon) = (&prepared.measured.test, config.horizon);
+    let held_out = HoldOutOptions { part, horizon, time, forces: &forces, threads };
+    let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
+    let motion = header.constrain(Box::new(network as &dyn EulerLagrange<f64>)).map_err(wrong)?;
+    let mut hold_out = evaluate_hold_out(motion.as_ref(), &held_out, watch)?;
+    drop(motion);
+    if prepared.targets() == Targets::Forces && !part.states.is_empty() {
+        let test = prepared.measured.datasets::<f64>(Targets::Forces)?.test;
+        hold_out.force_errors = force_errors(network, &test, names).unwrap_or_default();
+    }
+    Ok(hold_out)
 }
 
 /// Name and checksum of everything that is learned from.

@@ -1,12 +1,12 @@
 //! A fit of recorded motion in one expression: files and columns, the choices that matter, the result.
 
-use crate::configuration::{FRICTION_UNITS, Precision};
+use crate::configuration::{Config, ConfigError, Data, FRICTION_UNITS, Phase, Precision};
 use crate::network::Structure;
 use crate::pipeline::fit::{FitReport, fit};
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
-use crate::pipeline::{Directory, InMemory, Output, PipelineError, Watch};
+use crate::pipeline::{InMemory, LockedDirectory, Output, PipelineError, Watch};
 use crate::presets::restructure;
 use crate::recording::read::read_recording;
 use crate::recording::{Columns, LoadedRecording, Recording, Targets};
@@ -42,6 +42,7 @@ pub struct Fit {
     precision: Precision,
     threads: usize,
     out: Option<PathBuf>,
+    overwrite: bool,
     watch: Watch,
 }
 
@@ -78,6 +79,7 @@ impl Fit {
             precision: Precision::F32,
             threads: 1,
             out: None,
+            overwrite: false,
             watch: Watch::default(),
         }
     }
@@ -150,6 +152,11 @@ impl Fit {
         Self { out: Some(directory.into()), ..self }
     }
 
+    /// Replaces a run that is in the directory already, which is refused else.
+    pub fn overwrite(self, overwrite: bool) -> Self {
+        Self { overwrite, ..self }
+    }
+
     /// Receiver of progress and remarks, with a flag that ends the fit.
     pub fn watch(self, watch: Watch) -> Self {
         Self { watch, ..self }
@@ -165,7 +172,8 @@ impl Fit {
     /// # Errors
     /// [`PipelineError`]: [`PipelineError::Data`] for files that do not fit their description, [`PipelineError::Training`] if nothing was learned.
     pub fn run(self) -> Result<FitReport, PipelineError> {
-        let Self { source, columns, options, change, friction, structure, precision, threads, out, watch } = self;
+        let Self { source, columns, options, change, friction, structure, precision, threads, out, overwrite, watch } =
+            self;
         let (loaded, files) = match source {
             Source::Files(files) => (read_recording(&files, &columns)?, files),
             Source::Memory(loaded) => (*loaded, Vec::new()),
@@ -180,12 +188,33 @@ impl Fit {
         if let Some(structure) = structure {
             restructure(&mut config.training, structure);
         }
+        let decided = config.training.data.clone();
         change(&mut config);
+        require_decided(&config.training, decided)?;
         let options = RunOptions { threads, ..RunOptions::default() };
         let output: Box<dyn Output> = match &out {
-            Some(path) => Box::new(Directory::create(path)?),
+            Some(path) => Box::new(LockedDirectory::claim(path, overwrite)?),
             None => Box::new(InMemory::default()),
         };
         fit(&prepared, &config, &options, output.as_ref(), &watch)
+    }
+}
+
+/// Refuses values of what the recording decides: they would have no effect.
+fn require_decided(training: &Config, decided: Data) -> Result<(), PipelineError> {
+    let refused = |field: &str| {
+        let (expected, found) = ("what the recording decides".into(), "another value".to_string());
+        Err(ConfigError { field: format!("training.{field}"), expected, found }.into())
+    };
+    let Data { acceleration_weighting, .. } = training.data;
+    if training.data != (Data { acceleration_weighting, ..decided }) {
+        return refused("data");
+    }
+    let bounded =
+        |phase: &Phase| !(phase.position.is_empty() && phase.velocity.is_empty() && phase.log_uniform.is_empty());
+    match training.phases.iter().position(bounded) {
+        Some(k) => refused(&format!("phase[{k}]: position, velocity, log_uniform")),
+        None if !training.parameters.is_empty() => refused("parameters"),
+        None => Ok(()),
     }
 }

@@ -6,6 +6,7 @@ use crate::data::PrepareOptions;
 use crate::network::Initialization;
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::{Columns, Targets};
+use crate::rollout::Between;
 use crate::shooting::Shooting;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -46,6 +47,10 @@ table! {
         #[key("above 0, in s", example = "0.5", flag = "horizon", check = positive)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub horizon: Option<f64> = None,
+        /// Known forces between the samples, where motion is learned from or predicted.
+        #[key("held, linear, cubic, band-limited", example = "\"band-limited\"", flag = "between")]
+        #[serde(skip_serializing_if = "is_linear")]
+        pub between: Between = Between::Linear,
         /// Constraints between the coordinates: none, those that find reads off the motion, or formulas by name that vanish, from the
         /// table `constraints` of a file.
         #[key("none, find, or a file", example = "\"find\"", flag = "constraints")]
@@ -164,6 +169,11 @@ impl From<FitConstraints> for Written {
     }
 }
 
+/// Straight lines need no mention.
+fn is_linear(between: &Between) -> bool {
+    *between == Between::Linear
+}
+
 /// A single network needs no mention.
 fn is_one(count: &usize) -> bool {
     *count == 1
@@ -273,6 +283,8 @@ pub struct FitOptions {
     pub window: Option<usize>,
     /// Standard deviation of the noise of every coordinate, in SI units; none to estimate it.
     pub noise: Option<Vec<f64>>,
+    /// Known forces between the samples.
+    pub between: Between,
     /// Constraints between the coordinates.
     pub constraints: FitConstraints,
     /// Seed of held-out trajectories.
@@ -281,15 +293,15 @@ pub struct FitOptions {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        let constraints = FitConstraints::None;
-        Self { targets: None, held_out: HELD_OUT, window: None, noise: None, constraints, seed: 0 }
+        let (between, constraints) = (Between::default(), FitConstraints::None);
+        Self { targets: None, held_out: HELD_OUT, window: None, noise: None, between, constraints, seed: 0 }
     }
 }
 
 impl From<&FitConfig> for FitOptions {
     fn from(config: &FitConfig) -> Self {
-        let FitConfig { targets, held_out, window, noise, constraints, training, .. } = config.clone();
-        Self { targets, held_out, window, noise, constraints, seed: training.seed }
+        let FitConfig { targets, held_out, window, noise, between, constraints, training, .. } = config.clone();
+        Self { targets, held_out, window, noise, between, constraints, seed: training.seed }
     }
 }
 
@@ -297,6 +309,7 @@ impl FitOptions {
     /// The same for the division of a recording.
     pub(crate) fn preparation(&self) -> PrepareOptions {
         let smoothing = SmoothOptions { window: self.window, noise: self.noise.clone(), ..SmoothOptions::default() };
-        PrepareOptions { smoothing, held_out: self.held_out, seed: self.seed, ..PrepareOptions::default() }
+        let Self { held_out, seed, between, .. } = *self;
+        PrepareOptions { smoothing, held_out, seed, between, ..PrepareOptions::default() }
     }
 }

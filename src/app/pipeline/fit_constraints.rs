@@ -1,6 +1,6 @@
 //! Constraints of a fit: found in the motion that is learned from, or given.
 
-use crate::constraints::{ConstraintSearch, MotionSamples, find_constraints};
+use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
 use crate::data::{Dataset, RecordingSplit};
 use crate::lagrangian::FormulaConstraints;
 use crate::names::{pluralize, rounded};
@@ -46,6 +46,16 @@ impl FitHeld {
                         format!("{} found on {on}: {}", pluralize(count, "constraint", "constraints"), all.join("; "))
                     }
                 });
+                let left_out = found.constraints.iter().filter_map(|found| match found.kind {
+                    ConstraintKind::Nearly => {
+                        Some(format!("{} nearly vanishes, by more than the noise explains", found.formula))
+                    }
+                    ConstraintKind::Branching => {
+                        Some(format!("{} vanishes, and its gradient with it along the motion", found.formula))
+                    }
+                    _ => None,
+                });
+                remarks.extend(left_out.map(|why| format!("{why}: it is not taken for a constraint")));
                 if found.trajectories == 1 && !formulas.is_empty() {
                     remarks.push(
                         "one trajectory does not tell what is imposed from what its motion conserves".to_string(),

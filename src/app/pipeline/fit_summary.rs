@@ -140,7 +140,9 @@ impl<'a, S: Scalar> Found<'a, S> {
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
         output.write(SUMMARY, json.as_bytes())?;
-        let headline = headline::of_hold_out(name, self.hold_out);
+        let formula = self.formula.filter(|formula| formula.verdict == Verdict::Found);
+        let formula = formula.map(|formula| formula_text(formula, self.friction(), false));
+        let headline = headline::of_hold_out(name, self.hold_out, self.determined, self.formula);
         let opening = summary.opening(recording);
         let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
@@ -149,17 +151,14 @@ impl<'a, S: Scalar> Found<'a, S> {
             figures.extend(later);
         }
         let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
+        let report = match &formula {
+            Some(text) => report.heading("The Lagrangian as a formula").preformatted(text),
+            None => report,
+        };
         let report = write_page(output, report, self.model, None)?;
         let report = report.section("Predictions of motion that the model has not seen", &self.hold_out.figures);
         let report = report.section("The functions that were learned", &self.physics.figures);
         let report = self.determined.report(self.hold_out.report(report));
-        let report = match self.formula.filter(|formula| formula.verdict == Verdict::Found) {
-            Some(formula) => {
-                let text = formula_text(formula, self.friction(), false);
-                report.heading("The Lagrangian as a formula").preformatted(&text)
-            }
-            None => report,
-        };
         let report = match self.members {
             Some(members) => members.report(report),
             None => report,
@@ -174,7 +173,8 @@ impl<'a, S: Scalar> Found<'a, S> {
         )?;
         let members = self.members.map(Members::text).unwrap_or_default();
         let tables = self.hold_out.text() + &self.determined.text() + &members;
-        let text = wrap_text(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
+        let formula = formula.map_or(String::new(), |text| text + "\n");
+        let text = wrap_text(&format!("{}\n{formula}{opening}{tables}", headline.text()), WIDTH);
         Ok((json, text))
     }
 

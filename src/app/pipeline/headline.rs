@@ -3,10 +3,12 @@
 
 use crate::analysis::{PredictionError, ValidTimes};
 use crate::experiments::{Row, RunSpread};
+use crate::formula::{FoundFormula, Verdict};
 use crate::names::{number, percent, pluralize};
+use crate::pipeline::determination::Determined;
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::force_errors::{ForceError, judged as judged_by_forces};
-use crate::pipeline::hold_out::{HoldOut, factor};
+use crate::pipeline::hold_out::{HoldOut, factor, is_better};
 use crate::report::Report;
 
 /// Share of states of wrong signature from which on it is worth a word.
@@ -15,6 +17,9 @@ const MOST_WRONG: f64 = 0.01;
 const MANY_TIMES: f64 = 3.0;
 /// Share of the time that was tested below which predictions of motion that is not chaotic are bad.
 const FEW: f64 = 0.01;
+
+/// Energy that may be lost or gained without a force or friction, over the mean kinetic energy.
+const LOST: f64 = 0.1;
 
 /// A headline.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,9 +71,13 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
 pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mass = found.mass_matrix.error.median;
     let equivalence = found.physics.equivalence.as_ref();
+    let free = match found.mass_matrix.groups {
+        0 | 1 => "one factor".to_string(),
+        groups => format!("a factor of each of {groups} groups of coordinates that do not act on each other"),
+    };
     let matrix = match equivalence.map(|found| found.mass_matrix).filter(|x| x.is_finite()) {
-        Some(difference) => format!("it gives the mass matrix to {} up to one factor", percent(difference)),
-        None if mass.is_finite() => format!("it gives the mass matrix to {} up to one factor", percent(mass)),
+        Some(difference) => format!("it gives the mass matrix to {} up to {free}", percent(difference)),
+        None if mass.is_finite() => format!("it gives the mass matrix to {} up to {free}", percent(mass)),
         None => "it gives no mass matrix that can be compared".to_string(),
     };
     let predicts = found.valid_time.as_ref().map(|valid| predicted(valid, found.tested, &found.time_unit));
@@ -122,8 +131,74 @@ fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     }
 }
 
-/// A model of recorded motion called `name`.
-pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
+/// A model of recorded motion called `name`, beside a formula of the same motion if one was looked for.
+///
+/// A model is good if all hold: its predictions reach at least one period of the fastest motion, every coordinate is predicted better than at
+/// constant velocity, at most half of the held-out states lie outside of the learned ones, the energy is accounted for to 10 %, and the data
+/// determine a mass. If not, the sentence says which of them fails.
+pub(crate) fn of_hold_out(
+    name: &str,
+    found: &HoldOut,
+    determined: &Determined,
+    formula: Option<&FoundFormula>,
+) -> Headline {
+    let of_network = of_network(name, found, &failures(found, determined));
+    let Some(formula) = formula.filter(|formula| formula.verdict == Verdict::Found) else { return of_network };
+    let network = of_network.sentence.strip_prefix(&format!("{name}: ")).unwrap_or(&of_network.sentence);
+    let sentence =
+        format!("{name}: a formula explains the motion, L = {}. The network is {network}", formula.text(false));
+    Headline { sentence, ..of_network }
+}
+
+/// What a model is not good for, each a clause.
+fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
+    let mut all = Vec::new();
+    if let Some(error) = found.model.last() {
+        match found.fastest_period {
+            Some(period) if error.seconds >= period => {}
+            Some(period) => all.push(format!(
+                "predictions were tried for {} s, less than one period of the fastest motion ({} s)",
+                number(error.seconds),
+                number(period)
+            )),
+            None => all.push("the held-out motion is shorter than one period of it".to_string()),
+        }
+    }
+    let straight = found.by_coordinate.iter().filter(|c| {
+        let ends = c.model.last().zip(c.constant_velocity.last());
+        !ends.is_some_and(|(model, straight)| is_better(*model, *straight))
+    });
+    let straight: Vec<&str> = straight.map(|c| c.name.as_str()).collect();
+    if !straight.is_empty() {
+        all.push(format!("no better than constant velocity is the prediction of {}", straight.join(", ")));
+    }
+    if let Some(share) = determined.mostly_outside() {
+        all.push(format!("{} of the held-out states lie outside of the learned ones", percent(share)));
+    }
+    match found.energy.map(|balance| balance.unaccounted()) {
+        Some(share) if share <= LOST => {}
+        Some(share) if share.is_finite() => {
+            all.push(format!("energy of {} of the mean kinetic energy is not accounted for", percent(share)));
+        }
+        _ => all.push("its energy is not finite".to_string()),
+    }
+    all.extend(determined.no_mass());
+    all
+}
+
+/// A sentence that says good or limited, with what speaks against it.
+fn with_failures(sentence: String, failures: &[String]) -> String {
+    let all = failures.join("; ");
+    match (sentence.strip_prefix("good: "), sentence.strip_prefix("limited: ")) {
+        _ if failures.is_empty() => sentence,
+        (Some(rest), _) => format!("limited: {all}; otherwise {rest}"),
+        (_, Some(rest)) => format!("limited: {all}; {rest}"),
+        _ => sentence,
+    }
+}
+
+/// The network of a fit, with its `failures`.
+fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
     let signature = || {
         let what = "Held-out states whose mass matrix has the wrong signature".to_string();
         found.wrong_signature.is_finite().then(|| [what, percent(found.wrong_signature)])
@@ -133,7 +208,8 @@ pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
     };
     if !found.force_errors.is_empty() {
         let rows = found.force_errors.iter().map(forces).chain(signature()).collect();
-        return Headline { sentence: format!("{name}: {}", judged_by_forces(&found.force_errors)), rows };
+        let sentence = with_failures(judged_by_forces(&found.force_errors), failures);
+        return Headline { sentence: format!("{name}: {sentence}"), rows };
     }
     let Some((model, straight)) = found.model.last().zip(found.constant_velocity.last()) else {
         let sentence = format!("{name}: a Lagrangian was learned; no held-out motion judges its predictions.");
@@ -159,7 +235,8 @@ pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
     });
     rows.extend(apart);
     rows.extend(signature());
-    Headline { sentence: format!("{name}: {}", judged(found, model, straight)), rows }
+    let sentence = with_failures(judged(found, model, straight), failures);
+    Headline { sentence: format!("{name}: {sentence}"), rows }
 }
 
 /// Prediction of held-out motion beside going on at constant velocity, in a sentence that says good or bad.
@@ -237,7 +314,8 @@ mod tests {
     use super::*;
     use crate::analysis::VALID;
     use crate::experiments::Reported;
-    use crate::pipeline::hold_out::UsefulTime;
+    use crate::pipeline::energy::Balance;
+    use crate::pipeline::hold_out::{CoordinatePredictions, UsefulTime};
 
     #[test]
     fn headlines_of_predictions_say_good_or_bad() {
@@ -258,6 +336,7 @@ mod tests {
                 constant_velocity: vec![error(1.0)],
                 valid_time: Some(valid(until, open)),
                 useful_time: Some(UsefulTime { seconds, at_least }),
+                fastest_period: Some(0.5),
                 by_coordinate: Vec::new(),
                 given_up: String::new(),
                 wrong_signature: 0.0,
@@ -267,7 +346,7 @@ mod tests {
                 predicted: Default::default(),
                 error_scales: Default::default(),
             };
-            of_hold_out("swing", &found).sentence
+            of_network("swing", &found, &[]).sentence
         };
         let good = said(0.01, 0.5, true, (0.5, true));
         assert!(
@@ -289,6 +368,46 @@ mod tests {
         let chaotic = ValidTimes { lyapunov_times: Some(8.0), ..valid(7.0, false) };
         assert!(predicted(&chaotic, 100.0, "s").starts_with("good: "));
         assert!(predicted(&valid(0.0, false), 100.0, "s").starts_with("bad: "));
+    }
+
+    /// One failure is enough.
+    #[test]
+    fn a_model_is_good_only_if_everything_holds() {
+        let sentence = |verdict: &str, all: &[&str]| {
+            let all: Vec<String> = all.iter().map(|text| (*text).to_string()).collect();
+            with_failures(format!("{verdict}: it predicts; 3 s ahead."), &all)
+        };
+        assert_eq!(sentence("good", &[]), "good: it predicts; 3 s ahead.");
+        let limited = sentence("good", &["no mass", "no energy"]);
+        assert!(limited.starts_with("limited: no mass; no energy; ") && !limited.contains("good"), "{limited}");
+        assert!(sentence("limited", &["no mass"]).starts_with("limited: no mass; it predicts"));
+        assert!(sentence("bad", &["no mass"]).starts_with("bad: it predicts"));
+
+        let nothing = Determined::under_constraints();
+        let errors = |model: f64| CoordinatePredictions {
+            name: "x".to_string(),
+            unit: "SI",
+            model: vec![model],
+            constant_velocity: vec![1.0],
+        };
+        let balance = |defect_rms| Balance { trajectories: 1, kinetic: 2.0, defect_rms, ..Balance::default() };
+        let found = |seconds, x: f64, defect| {
+            let error = PredictionError { seconds, rms: 1.0, median: x, p90: 1.0, windows: 9, missing: 0 };
+            HoldOut {
+                model: vec![error],
+                fastest_period: Some(2.0),
+                by_coordinate: vec![errors(x)],
+                energy: Some(balance(defect)),
+                ..HoldOut::nothing()
+            }
+        };
+        let count = |seconds, x, defect| failures(&found(seconds, x, defect), &nothing).len();
+        // Under constraints no mass is determined.
+        assert_eq!(
+            [count(2.0, 0.1, 0.1), count(1.9, 0.1, 0.1), count(1.9, 0.99, 0.1), count(1.9, 0.99, 0.3)],
+            [1, 2, 3, 4]
+        );
+        assert_eq!([count(2.0, f64::NAN, 0.1), count(2.0, 0.1, f64::NAN)], [2, 2]);
     }
 
     #[test]

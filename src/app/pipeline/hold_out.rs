@@ -8,15 +8,17 @@ use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
-use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::constraint_figures::constraint_figures;
 use crate::pipeline::energy::{Balance, balance, energy_figure};
 use crate::pipeline::force_errors::ForceError;
+use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
+use crate::recording::Smoothed;
 use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot, text_table};
 use crate::rollout::SampledForce;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Windows that are predicted at most; of more, evenly spaced ones.
 const WINDOWS: usize = 500;
@@ -32,8 +34,8 @@ const TIMES: usize = 4;
 pub struct HoldOutOptions<'a> {
     /// Motion that the model has not seen.
     pub part: &'a Split,
-    /// Time over which it is predicted, in s; none for 200 samples, at most a quarter of the shortest trajectory, pieces much shorter
-    /// than the others left aside.
+    /// Time over which it is predicted, in s; none for 200 samples or one period of the fastest motion if that is longer, at most a quarter of the
+    /// shortest trajectory, pieces much shorter than the others left aside.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -78,6 +80,9 @@ pub struct HoldOut {
     pub(crate) valid_time: Option<ValidTimes>,
     /// Time for which its motion is of use. None without windows.
     pub useful_time: Option<UsefulTime>,
+    /// Period of the fastest coordinate in s, `2 pi` times the spread of its velocity over that of its acceleration; none of motion that takes
+    /// longer than the trajectories, or is noise.
+    pub fastest_period: Option<f64>,
     /// Errors of every coordinate at the same times ahead.
     pub by_coordinate: Vec<CoordinatePredictions>,
     /// Which predictions were given up and why, in words; empty if none was.
@@ -111,7 +116,7 @@ pub fn evaluate_hold_out(
     options: &HoldOutOptions<'_>,
     watch: &Watch,
 ) -> Result<HoldOut, PipelineError> {
-    let (cancellation, plan) = (&Cancellation::new(watch, WINDOWS), options);
+    let (judging, plan) = (&Judging::new(watch, WINDOWS), options);
     let (n, recording) = (model.coordinates(), &plan.part.recording);
     if recording.tracks.is_empty() {
         return Ok(HoldOut::nothing());
@@ -123,13 +128,17 @@ pub fn evaluate_hold_out(
     let unlike = units.iter().any(|unit| *unit != units[0]);
     let (unit, scales) =
         if unlike { ("of the spread of the motion", spread.clone()) } else { (units[0], vec![1.0; n]) };
-    let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part));
+    let period = fastest_period(plan.part);
+    let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part, period));
     let mut windows: Vec<Window> = plan
         .part
         .estimated()
         .iter()
         .zip(&plan.part.states)
-        .flat_map(|(e, states)| Window::cut(e.track, (e.q, e.v), states.interior(), n, horizon))
+        .flat_map(|(e, states)| {
+            let samples = states.interior().start..e.track.len();
+            Window::unseen(*e, &states.reach, (samples, n), horizon)
+        })
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();
@@ -139,9 +148,9 @@ pub fn evaluate_hold_out(
             let _ = project(manifold, q, v);
         }
     }
-    let watched = cancellation.watched(model);
+    let watched = judging.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
-    let predicted = HeldOutPredictions::new(model, windows, plan.threads, cancellation)?;
+    let predicted = HeldOutPredictions::new(model, windows, plan.threads, judging)?;
     let (windows, motion) = (&predicted.windows, &predicted.predictions);
     let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
@@ -163,7 +172,7 @@ pub fn evaluate_hold_out(
         let heading = "How the error of the prediction grows";
         figures.extend(figure("prediction_error.svg", heading, line_plot(&error_plot(&curves, unit)), ERROR_CAPTION));
         if let Some(force) = &windows[0].force {
-            let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).copied().collect();
+            let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).map(|t| windows[0].lead + t).collect();
             let drawn = line_plot(&force_plot(force, &times, plan.forces));
             figures.extend(figure(
                 "prediction_forces.svg",
@@ -179,7 +188,7 @@ pub fn evaluate_hold_out(
     }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, TIMES) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
-    cancellation.check()?;
+    judging.check()?;
     let (model, constant_velocity) = (tabled(motion), tabled(&straight));
     let apart = |predictions: &Predictions| -> Vec<Vec<f64>> {
         model.iter().map(|error| coordinate_errors(windows, predictions, periodic, error.seconds)).collect()
@@ -195,6 +204,7 @@ pub fn evaluate_hold_out(
         model,
         valid_time,
         useful_time,
+        fastest_period: period,
         by_coordinate: coordinates.collect(),
         constant_velocity,
         given_up: predicted.remarks(),
@@ -208,8 +218,8 @@ pub fn evaluate_hold_out(
 }
 
 const ERROR_CAPTION: &str = "Median over the held-out windows of the error of the predicted coordinates (root mean square over the coordinates), by \
-                             time since the state that the prediction starts from, beside going on at constant velocity.";
-const EXAMPLE_CAPTION: &str = "The first held-out window, which the model has not seen: measured (wide), and predicted from the state at its start.";
+                             time since the last sample that the start of the prediction has seen, beside going on at constant velocity.";
+const EXAMPLE_CAPTION: &str = "The first held-out window, which the model has not seen: measured (wide), and predicted from a state that has not seen it.";
 const FORCE_CAPTION: &str =
     "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
 
@@ -221,9 +231,27 @@ pub(crate) fn horizons(part: &Split) -> Option<(f64, f64)> {
     Some((steps.reduce(f64::min)?, spans.reduce(f64::max)?))
 }
 
-/// A quarter of the shortest of the long trajectories, at most [`AHEAD`] samples. Half the time belongs to trajectories of a length or
+/// Period of the fastest coordinate ([`HoldOut::fastest_period`]).
+fn fastest_period(part: &Split) -> Option<f64> {
+    let n = part.recording.n();
+    let longest = horizons(part)?.1;
+    let of = |i: usize| {
+        let column = |of: fn(&Smoothed) -> &[f64]| {
+            part.states.iter().flat_map(move |states| states.interior().map(move |row| of(states)[row * n + i]))
+        };
+        let count = column(|states| &states.v).count() as f64;
+        let square = |of: fn(&Smoothed) -> &[f64]| column(of).map(|x| x * x).sum::<f64>() / count;
+        let mean = column(|states| &states.v).sum::<f64>() / count;
+        let velocity = square(|states| &states.v) - mean * mean;
+        let acceleration = square(|states| &states.a) - square(|states| &states.a_error);
+        TAU * (velocity / acceleration).sqrt()
+    };
+    (0..n).map(of).filter(|period| *period <= longest).reduce(f64::min)
+}
+
+/// A quarter of the shortest of the long trajectories, at most [`AHEAD`] samples or one `period`. Half the time belongs to trajectories of a length or
 /// longer ones; long is half as much: pieces between gaps do not shorten the horizon of the others.
-fn horizon(part: &Split) -> f64 {
+fn horizon(part: &Split, period: Option<f64>) -> f64 {
     let times = part.states.iter().map(|states| &states.times[states.interior()]);
     let mut spans: Vec<(f64, usize)> =
         times.filter_map(|times| Some((times.last()? - times.first()?, times.len() - 1))).collect();
@@ -236,7 +264,8 @@ fn horizon(part: &Split) -> f64 {
     });
     let long = usual.map_or(0.0, |(span, _)| 0.5 * span);
     let horizons = spans.iter().filter(|(span, _)| *span >= long);
-    let horizons = horizons.map(|(span, steps)| (0.25 * span).min(AHEAD * span / (*steps).max(1) as f64));
+    let period = period.unwrap_or(0.0);
+    let horizons = horizons.map(|(span, steps)| (0.25 * span).min((AHEAD * span / (*steps).max(1) as f64).max(period)));
     horizons.fold(f64::INFINITY, f64::min)
 }
 
@@ -336,7 +365,12 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<us
 
 /// How many times a prediction is better than constant velocity; none if it is no better.
 pub(crate) fn factor(model: &PredictionError, straight: &PredictionError) -> Option<f64> {
-    Some(straight.median / model.median).filter(|factor| *factor >= 1.05)
+    is_better(model.median, straight.median).then(|| straight.median / model.median)
+}
+
+/// `true` if the error of a prediction is smaller than that of constant velocity, by a twentieth.
+pub(crate) fn is_better(model: f64, straight: f64) -> bool {
+    straight / model >= 1.05
 }
 
 impl UsefulTime {
@@ -398,13 +432,14 @@ impl HoldOut {
     }
 
     /// That of a model that no motion was held out to judge: its numbers are not there.
-    fn nothing() -> Self {
+    pub(crate) fn nothing() -> Self {
         Self {
             error_unit: "SI",
             model: Vec::new(),
             constant_velocity: Vec::new(),
             valid_time: None,
             useful_time: None,
+            fastest_period: None,
             by_coordinate: Vec::new(),
             given_up: String::new(),
             wrong_signature: f64::NAN,

@@ -6,17 +6,23 @@ use crate::configuration::{Config, MOST_SEED};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::names::{number, percent, percentage};
 use crate::network::NetworkLagrangian;
+use crate::network::file::ModelFile;
 use crate::pipeline::equivalence::{Equivalence, gauge_functions};
-use crate::pipeline::fit::FitReport;
+use crate::pipeline::fit::{FitReport, judge};
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
-use crate::pipeline::{Event, InMemory, MODEL, Output, PipelineError, Watch, fit};
+use crate::pipeline::{Event, InMemory, MODEL, Output, PipelineError, SUMMARY, Watch, fit};
 use crate::report::{Report, text_table};
+use crate::storage::read_regular;
 use crate::symmetry::{Chart, SymmetryError};
 use crate::training::StopReason;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Longest file that is read of an earlier run, in bytes.
+const MAX_BYTES: u64 = 1 << 26;
 
 /// One of the networks.
 #[derive(Clone, Debug, Serialize)]
@@ -53,18 +59,24 @@ pub struct Members {
 
 impl Members {
     /// Trains the other members of a fit, whose model is the first, and writes their models beside it; returns their fits and what all
-    /// say, nothing for a fit of one. Members that the flag of the watch interrupts are left out.
+    /// say, nothing for a fit of one. Members that the flag of the watch interrupts are left out;
+    /// those that are `kept` of an earlier run are not trained again.
     ///
     /// # Errors
     /// As of a fit.
     pub(crate) fn train(
         prepared: &PreparedFit<'_>,
         config: &FitConfig,
-        (network, hold_out): (&NetworkLagrangian<f64>, &HoldOut),
+        (network, hold_out, kept): (&NetworkLagrangian<f64>, &HoldOut, Vec<ModelFile<f64>>),
         (options, output, watch): (&RunOptions, &dyn Output, &Watch),
     ) -> Result<Option<(Self, Vec<FitReport>)>, PipelineError> {
         let mut others = Vec::new();
-        for k in 1..config.members {
+        for ModelFile { header, weights } in kept.into_iter().take(config.members - 1) {
+            let network = NetworkLagrangian::new(header.architecture.clone(), weights)?;
+            let hold_out = judge(prepared, config, (&header, &network), options.threads, watch)?;
+            others.push(FitReport::restored(header, network, hold_out));
+        }
+        for k in 1 + others.len()..config.members {
             if watch.is_interrupted() {
                 break;
             }
@@ -78,7 +90,10 @@ impl Members {
                 Err(_) if watch.is_interrupted() => break,
                 report => report?,
             };
-            if !matches!(report.stop, StopReason::Finished) {
+            if let StopReason::Failed(error) = &report.stop {
+                watch.say(Event::Note(&format!("member {} is left out, with those behind it: {error}", k + 1)));
+            }
+            if report.stop != StopReason::Finished {
                 break;
             }
             output.write(&file(k), &files.get(MODEL).unwrap_or_default())?;
@@ -192,6 +207,29 @@ impl Members {
     pub(crate) fn report(&self, report: Report) -> Report {
         let report = report.heading("Members, trained from different seeds");
         report.table(&self.headers(), &self.rows()).paragraph(self.remark().trim_end())
+    }
+}
+
+/// Models of the members that an interrupted fit of the same configuration trained in a directory, from the second on.
+pub(crate) fn kept_members(directory: &Path, config: &FitConfig) -> Vec<ModelFile<f64>> {
+    #[derive(Deserialize)]
+    struct Summary {
+        ended: String,
+        #[serde(default)]
+        members: Trained,
+    }
+    #[derive(Default, Deserialize)]
+    struct Trained {
+        each: Vec<serde::de::IgnoredAny>,
+    }
+    let text = |name: &str| String::from_utf8(read_regular(&directory.join(name), MAX_BYTES).ok()?).ok();
+    let same = || toml::from_str::<FitConfig>(&text("config.toml")?).ok().map(|old| old.without_files());
+    let found = text(SUMMARY).and_then(|text| serde_json::from_str::<Summary>(&text).ok());
+    match found {
+        Some(Summary { ended, members }) if ended == "interrupted" && same() == Some(config.without_files()) => {
+            (1..members.each.len()).map_while(|k| ModelFile::load(&directory.join(file(k))).ok()).collect()
+        }
+        _ => Vec::new(),
     }
 }
 

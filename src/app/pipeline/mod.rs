@@ -10,8 +10,8 @@
 //! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
 //!
 //! Files go into an [`Output`], of which a [`Directory`] and [`InMemory`] are two; what happens meanwhile comes as an [`Event`] to
-//! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked (those of experiments are), and files that
-//! stand where an [`Output`] writes are replaced.
+//! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked, and files that stand where it
+//! writes are replaced; [`Fit::out`] and experiments lock theirs, and replace a run that is there on demand alone.
 //!
 //! # A fit of recorded motion, judged
 //!
@@ -44,7 +44,6 @@
 //! # Ok::<(), lnn::pipeline::PipelineError>(())
 //! ```
 
-mod cancellation;
 mod checkpoints;
 mod constraint_figures;
 mod determination;
@@ -66,6 +65,7 @@ mod force_errors;
 mod headline;
 mod hold_out;
 mod hole_pictures;
+mod judging;
 mod learned_functions;
 mod losses;
 mod members;
@@ -102,12 +102,12 @@ pub(crate) use experiment::{KeptRecord, kept_record};
 #[doc(hidden)]
 pub use experiment::{finish_runs, merge_experiment, run_experiment};
 #[doc(hidden)]
-pub use experiment_directory::ExperimentDirectory;
+pub use experiment_directory::{ExperimentDirectory, LockedDirectory};
 #[doc(hidden)]
 pub use experiment_report::{ExperimentReport, Results};
 #[doc(hidden)]
 pub use file_names::MODEL;
-pub(crate) use file_names::{CAPTIONS, PLAY, RECORD, SUMMARY};
+pub(crate) use file_names::{CAPTIONS, LEARNED, PLAY, RECORD, SUMMARY};
 pub use fit::FitReport;
 #[doc(hidden)]
 pub use fit::fit;
@@ -121,6 +121,8 @@ pub use force_errors::ForceError;
 pub use hold_out::HoldOut;
 #[doc(hidden)]
 pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_hold_out};
+#[doc(hidden)]
+pub use judging::Unjudged;
 #[doc(hidden)]
 pub use members::{Member, Members};
 #[doc(hidden)]

@@ -79,7 +79,7 @@ impl FoundSymmetries {
 /// Drift of a charge that the exact system has, along the learned motion.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChargeDrift {
-    /// `energy`, or the field whose charge it is.
+    /// `energy`, or `g(v, v)/2` along geodesics of a metric with a time, or the field whose charge it is.
     pub symmetry: String,
     /// Charge at the start.
     pub start: f64,
@@ -363,7 +363,7 @@ impl Physics {
             Err(problem) => return self.left_out.push(format!("drift of charges: {problem}")),
         };
         let fields = found.fields.iter().map(|field| field.text(&found.basis));
-        let names = std::iter::once("energy".to_string()).chain(fields);
+        let names = std::iter::once(found.invariant.charge().to_string()).chain(fields);
         self.charges_until = motion.t.last().copied().unwrap_or(0.0);
         self.charges = names
             .zip(&all)

@@ -3,7 +3,7 @@
 use crate::analysis::{Predictions, Window, follow};
 use crate::lagrangian::EulerLagrange;
 use crate::pipeline::PipelineError;
-use crate::pipeline::cancellation::Cancellation;
+use crate::pipeline::judging::Judging;
 use crate::rollout::RolloutError;
 use std::collections::BTreeMap;
 
@@ -35,21 +35,21 @@ impl HeldOutPredictions {
         model: &dyn EulerLagrange<f64>,
         mut windows: Vec<Window>,
         threads: usize,
-        cancellation: &Cancellation<'_>,
+        judging: &Judging<'_>,
     ) -> Result<Self, PipelineError> {
         let all = windows.len();
         let stride = all.div_ceil(PILOT).max(1);
         let mut found = Self { windows: Vec::new(), predictions: Vec::new(), all, given_up: BTreeMap::new() };
         if stride > 1 {
             let pilot: Vec<Window> = windows.iter().step_by(stride).cloned().collect();
-            let (predictions, stops) = in_parts(model, &pilot, threads, cancellation)?;
+            let (predictions, stops) = in_parts(model, &pilot, threads, judging)?;
             if 2 * stops.iter().flatten().count() > pilot.len() {
                 found.count(&stops);
                 (found.windows, found.predictions) = (pilot, predictions);
                 return Ok(found);
             }
         }
-        let (predictions, stops) = in_parts(model, &windows, threads, cancellation)?;
+        let (predictions, stops) = in_parts(model, &windows, threads, judging)?;
         found.count(&stops);
         (found.windows, found.predictions) = (std::mem::take(&mut windows), predictions);
         Ok(found)
@@ -85,13 +85,13 @@ fn in_parts(
     model: &dyn EulerLagrange<f64>,
     windows: &[Window],
     threads: usize,
-    cancellation: &Cancellation<'_>,
+    judging: &Judging<'_>,
 ) -> Result<(Predictions, Vec<Option<RolloutError>>), PipelineError> {
     let (mut predictions, mut stops) = (Vec::with_capacity(windows.len()), Vec::with_capacity(windows.len()));
     for part in windows.chunks(PART) {
         let (foretold, ended) = follow(model, part, threads);
-        cancellation.advance(part.len());
-        cancellation.check()?;
+        judging.advance(part.len());
+        judging.check()?;
         predictions.extend(foretold);
         stops.extend(ended);
     }
@@ -120,37 +120,36 @@ mod tests {
 
     fn windows(count: usize) -> Vec<Window> {
         let times: Vec<f64> = (1..20).map(|k| 0.1 * f64::from(k)).collect();
-        let window = Window { q: vec![0.0], v: vec![-1.0], measured: vec![0.0; times.len()], times, force: None };
+        let window =
+            Window { q: vec![0.0], v: vec![-1.0], lead: 0.0, measured: vec![0.0; times.len()], times, force: None };
         vec![window; count]
     }
 
     #[test]
     fn a_model_that_fails_nearly_always_is_not_tried_everywhere() {
         let watch = Watch::default();
-        let cancellation = Cancellation::new(&watch, 1);
-        let found = HeldOutPredictions::new(&SINGULAR, windows(400), 2, &cancellation).unwrap();
+        let judging = Judging::new(&watch, 1);
+        let found = HeldOutPredictions::new(&SINGULAR, windows(400), 2, &judging).unwrap();
         assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT, PILOT, 400));
         let remarks = found.remarks();
         assert!(remarks.starts_with("40 of 40 predictions were given up: 40 by a singular mass matrix"), "{remarks}");
         assert!(remarks.contains("of 400 windows only 40 were tried"), "{remarks}");
-        let well = HeldOutPredictions::new(&OSCILLATOR, windows(100), 2, &cancellation).unwrap();
+        let well = HeldOutPredictions::new(&OSCILLATOR, windows(100), 2, &judging).unwrap();
         assert_eq!((well.windows.len(), well.remarks().as_str()), (100, ""));
     }
 
     #[test]
     fn a_raised_flag_ends_it() {
         let watch = Watch::default();
-        let cancellation = Cancellation::new(&watch, 1);
+        let judging = Judging::new(&watch, 1);
         watch.interrupt.store(true, Ordering::SeqCst);
-        let watched = cancellation.watched(&OSCILLATOR);
-        let Err(error) = HeldOutPredictions::new(&watched, windows(100), 2, &cancellation) else {
-            panic!("it goes on")
-        };
+        let watched = judging.watched(&OSCILLATOR);
+        let Err(error) = HeldOutPredictions::new(&watched, windows(100), 2, &judging) else { panic!("it goes on") };
         assert!(error.to_string().contains("interrupted while the model was judged"));
         let (predictions, stops) = follow(&watched, &windows(1), 1);
         assert!(predictions[0].iter().all(|x| x.is_nan()) && stops[0].is_some());
         // The flag that ended a training does not end the judgement of its model.
-        let later = Cancellation::new(&watch, 1);
+        let later = Judging::new(&watch, 1);
         assert!(HeldOutPredictions::new(&later.watched(&OSCILLATOR), windows(3), 2, &later).is_ok());
     }
 }

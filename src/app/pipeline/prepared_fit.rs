@@ -123,13 +123,14 @@ impl<'a> PreparedFit<'a> {
         recording: FitColumns,
         shooting: Option<crate::shooting::Shooting>,
     ) -> FitConfig {
-        let FitOptions { held_out, window, noise, constraints, .. } = self.options.clone();
+        let FitOptions { held_out, window, noise, between, constraints, .. } = self.options.clone();
         FitConfig {
             targets: Some(self.targets),
             held_out,
             window,
             noise,
             horizon,
+            between,
             constraints,
             formula: false,
             members: 1,

@@ -126,6 +126,7 @@ mod tests {
         )
         .unwrap();
         let record = Record {
+            run: String::new(),
             outcome: Outcome::Nothing { reason: String::new() },
             losses: Vec::new(),
             times: Vec::new(),

@@ -103,7 +103,8 @@ mod tests {
         let store = ExperimentDirectory::new(directory.path());
         let runs = find("old-tricks").unwrap().runs(Scale::Smoke, 2);
         let nothing = Outcome::Nothing { reason: String::new() };
-        let record = Record { outcome: nothing, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
+        let record =
+            Record { run: String::new(), outcome: nothing, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
         let count = runs.len();
         let mut results: Vec<(Run, Option<Record>)> = runs.into_iter().map(|run| (run, None)).collect();
         results[1].1 = Some(record);

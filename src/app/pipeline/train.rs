@@ -15,7 +15,7 @@ use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{
     ended, history, parameter_table, training_pictures, write_page, write_report_and_figures,
 };
-use crate::pipeline::{MODEL, Output, PipelineError, SUMMARY, Watch, memory, start};
+use crate::pipeline::{MODEL, Output, PipelineError, SUMMARY, Unjudged, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume, training_memory};
@@ -141,7 +141,7 @@ impl TrainReport {
     }
 
     /// The record that an experiment keeps of it, whose trajectory test went to `t_end`.
-    pub(crate) fn record(&self, t_end: f64) -> Record {
+    pub(crate) fn record(&self, run: String, t_end: f64) -> Record {
         let motions = || self.evaluation.trajectories.iter().map(|motion| &motion.summary);
         let scale = &self.network.architecture().scale;
         let learned = Learned {
@@ -154,6 +154,7 @@ impl TrainReport {
             integrated: motions().filter(|motion| motion.stopped.is_none()).count(),
         };
         Record {
+            run,
             outcome: Outcome::Learned(learned),
             losses: self.history.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect(),
             times: self.history.iter().map(|e| e.seconds).collect(),
@@ -244,10 +245,14 @@ fn train_in<S: Scalar>(
         seed: config.seed,
         threads: options.threads,
     };
-    let evaluation = evaluate(system, &network, judging, watch)?;
-    if evaluation.interrupted.is_some() {
-        return Err(PipelineError::Interrupted);
-    }
+    let evaluation = match evaluate(system, &network, judging, watch) {
+        Ok(evaluation) if evaluation.interrupted.is_none() => evaluation,
+        Ok(_) | Err(PipelineError::Interrupted) => {
+            let (stop, history, header) = (trained.stop, trained.history, model.header);
+            return Err(PipelineError::Unjudged(Box::new(Unjudged { header, network, history, stop })));
+        }
+        Err(error) => return Err(error),
+    };
     let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
     let instability = training_instability(&training_losses, &stretches(config));
     let figures = TrainFigures {

@@ -1,5 +1,6 @@
 //! Watches: what a pipeline says while it runs, and the flag that ends it.
 
+use crate::cancellation::{Cancellation, SearchProgress};
 use crate::training::{Epoch, Hooks, Progress};
 use std::fmt;
 use std::sync::Arc;
@@ -34,6 +35,8 @@ pub enum Event<'a> {
         /// Runs asked for.
         total: usize,
     },
+    /// A search for constants, a formula or constraints is under way.
+    Search(SearchProgress),
     /// Remark for the user, one line.
     Note(&'a str),
 }
@@ -94,6 +97,15 @@ impl Watch {
     pub(crate) fn say(&self, event: Event<'_>) {
         if let Some(events) = &self.events {
             events(event);
+        }
+    }
+
+    /// The same for a search.
+    pub fn cancellation(&self) -> Cancellation {
+        let cancellation = Cancellation::by(&self.interrupt);
+        match self.events.clone() {
+            Some(events) => cancellation.reporting(move |progress| events(Event::Search(progress))),
+            None => cancellation,
         }
     }
 

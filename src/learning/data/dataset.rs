@@ -4,6 +4,7 @@
 use crate::lagrangian::{Manifold, ManifoldRows, project, project_acceleration};
 use crate::network::file::StoredPrecision;
 use crate::recording::RecordedTrajectory;
+use crate::rollout::{Between, SampledForce};
 use crate::scalar::{Real, Scalar};
 use crate::storage::container::checksum;
 use thiserror::Error;
@@ -339,6 +340,15 @@ pub struct StateEstimate<'a> {
     pub q: &'a [f64],
     /// Estimated velocities, `(samples, n)`.
     pub v: &'a [f64],
+    /// Known forces between the samples.
+    pub between: Between,
+}
+
+impl StateEstimate<'_> {
+    /// The known forces as a function of time; none if there were none.
+    pub(crate) fn force(&self) -> Option<SampledForce<f64>> {
+        self.track.sampled_force().map(|force| force.between(self.between))
+    }
 }
 
 /// Standard deviations of the noise of what was measured, in physical units.

@@ -9,6 +9,7 @@ use crate::data::force_sizes::by_forces;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::survey::{Stillness, plan, stillness};
 use crate::recording::{HeldOut, HoldOutError, RecordedTrajectory, Recording, Targets};
+use crate::rollout::Between;
 use crate::scalar::Scalar;
 use thiserror::Error;
 
@@ -24,11 +25,19 @@ pub struct PrepareOptions {
     pub most_states: usize,
     /// Seed of the choice of trajectories.
     pub seed: u64,
+    /// Known forces between the samples.
+    pub between: Between,
 }
 
 impl Default for PrepareOptions {
     fn default() -> Self {
-        Self { smoothing: SmoothOptions::default(), held_out: 0.2, most_states: 60_000, seed: 0 }
+        Self {
+            smoothing: SmoothOptions::default(),
+            held_out: 0.2,
+            most_states: 60_000,
+            seed: 0,
+            between: Between::default(),
+        }
     }
 }
 
@@ -76,18 +85,21 @@ pub struct Split {
     pub recording: Recording,
     /// States of every trajectory.
     pub states: Vec<Smoothed>,
+    /// Known forces between the samples.
+    pub between: Between,
 }
 
 impl Split {
-    fn new(recording: Recording, smoothing: &Smoothing) -> Result<Self, SmoothError> {
+    fn new(recording: Recording, smoothing: &Smoothing, between: Between) -> Result<Self, SmoothError> {
         let states = recording.tracks.iter().map(|track| smoothing.apply(track)).collect::<Result<_, _>>()?;
-        Ok(Self { recording, states })
+        Ok(Self { recording, states, between })
     }
 
     /// Trajectories for [`shooting::fit`](crate::shooting::fit).
     pub fn estimated(&self) -> Vec<StateEstimate<'_>> {
         let pairs = self.recording.tracks.iter().zip(&self.states);
-        pairs.map(|(track, states)| StateEstimate { track, q: &states.q, v: &states.v }).collect()
+        let between = self.between;
+        pairs.map(|(track, states)| StateEstimate { track, q: &states.q, v: &states.v, between }).collect()
     }
 
     /// Samples that are learned from: away from the ends of trajectories, or all of them if nothing had to be derived; at most
@@ -186,7 +198,7 @@ impl RecordingSplit {
         takes: &[usize],
         preparation: &PrepareOptions,
     ) -> Result<Self, RecordingSplitError> {
-        let PrepareOptions { smoothing: options, held_out: share, most_states, seed } = preparation;
+        let PrepareOptions { smoothing: options, held_out: share, most_states, seed, between } = preparation;
         let (alone, smoothing) = plan(recording, options)?;
         if let Some((i, how)) = stillness(recording, &alone).into_iter().next() {
             return Err(RecordingSplitError::Motionless { coordinate: recording.coordinates[i].clone(), how });
@@ -204,7 +216,7 @@ impl RecordingSplit {
             Ok((_, training, validation)) => (training, validation),
             Err(_) => (rest, test.clone()),
         };
-        let part = |recording| Split::new(recording, &smoothing);
+        let part = |recording| Split::new(recording, &smoothing, *between);
         let (training, validation, test) = (part(training)?, part(validation)?, part(test)?);
         Ok(Self { training, validation, test, held_out, most_states: *most_states, smoothing })
     }

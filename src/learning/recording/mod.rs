@@ -47,6 +47,6 @@ pub use reading::Targets;
 pub use reading::{Bridged, Cut, Dropped, Rows};
 pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
-pub(crate) use statistics::{deviation, rms};
+pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub(crate) use units::factor;

@@ -139,7 +139,7 @@ impl<S: Scalar> Segments<S> {
         // Largest excursion within a segment and speed, physical.
         let mut largest = vec![0.0_f64; 2 * n];
         for trajectory in trajectories {
-            let force = trajectory.track.sampled_force();
+            let force = trajectory.force();
             let force = forced.then_some(force.as_ref());
             for piece in pieces(&trajectory.track.times, per_segment) {
                 all.push(architecture, trajectory, !noise.v.is_empty(), &piece, force, &mut largest);

@@ -12,7 +12,8 @@ use super::{
 use crate::linalg::Workspace;
 use crate::names::unknown;
 use crate::random::RngStream;
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
+use crate::tape;
 use rand::Rng;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -163,10 +164,18 @@ impl<S: Scalar> SystemInstance<S> {
     pub(crate) fn dissipation(&self) -> Option<&ExpressionLagrangian> {
         self.system.described.as_ref()?.dissipation.as_ref()
     }
-    /// The same with the values of the parameters.
+    /// The same with the values of the parameters; none if these take all friction away.
     fn friction(&self) -> Option<Friction<S>> {
-        let function = self.dissipation()?.clone();
-        Some(Friction { function, parameters: self.parameters.clone() })
+        let (function, n, mut vanishes) = (self.dissipation()?, self.coordinates, false);
+        // Products with a constant 0 are 0 for a tracer.
+        let _ = tape::Program::<S>::record(2 * n, 0, |x, _| {
+            let values: Vec<_> = self.parameters.iter().map(|value| tape::Tracer::constant(*value)).collect();
+            let lost = function.lagrangian(&values, &x[..n], &x[n..]);
+            vanishes = lost.is_exact_zero();
+            vec![lost]
+        });
+        let parameters = self.parameters.clone();
+        (!vanishes).then(|| Friction { function: function.clone(), parameters })
     }
     /// States within the bounds of the validation, at which constraints are examined.
     fn anywhere(&self) -> (Vec<S>, Vec<S>) {

@@ -34,6 +34,18 @@ pub enum MechanicsError {
         /// Which constraint, from 0.
         constraint: usize,
     },
+    /// An acceleration that the constraints do not allow.
+    #[error(
+        "the acceleration of state {row} is {distance:.3e} away from what the constraints allow, most by constraint {constraint}"
+    )]
+    OffConstraints {
+        /// Row of the batch.
+        row: usize,
+        /// The constraint that is missed most, from 0.
+        constraint: usize,
+        /// Distance to the nearest one that they allow.
+        distance: f64,
+    },
     /// A term is not finite.
     #[error("{what} of state {row} is not finite")]
     NotFinite {
@@ -66,6 +78,7 @@ impl MechanicsError {
         match *self {
             Self::Singular { row, .. }
             | Self::Dependent { row, .. }
+            | Self::OffConstraints { row, .. }
             | Self::NotFinite { row, .. }
             | Self::Uncertified { row } => Some(row),
             Self::Shape { .. } | Self::Interrupted | Self::Derivatives { .. } => None,
@@ -76,6 +89,7 @@ impl MechanicsError {
     pub(crate) fn at_row(mut self, to: usize) -> Self {
         if let Self::Singular { row, .. }
         | Self::Dependent { row, .. }
+        | Self::OffConstraints { row, .. }
         | Self::NotFinite { row, .. }
         | Self::Uncertified { row } = &mut self
         {

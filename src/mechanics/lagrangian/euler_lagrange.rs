@@ -1,6 +1,6 @@
 //! Solves for accelerations and energy, given the terms `L`, `p`, `g`, `M`, `c`, `Q`; solves for the forces that make a motion.
 
-use super::constraints::{Motion, accelerate};
+use super::constraints::{Motion, accelerate, along_rows, dot, length};
 use super::error::not_finite;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
@@ -197,13 +197,17 @@ impl<S: Scalar> Terms<S> {
 
 /// Generalized forces of known states and accelerations, `(batch, n)`, in the unit of `L` per unit of each coordinate.
 ///
-/// `generalized = friction + external`; the three say
+/// `generalized = friction + external + constraint`; they say
 ///
 /// ```text
 /// generalized = M a + c - g      everything that acts beside the forces of L, friction included
 /// friction    = -dD/dv           what the model's own friction gives, nothing for a model without
-/// external    = M a + c - g + dD/dv      what has to be applied from outside to move so
+/// external    = P (M a + c - g + dD/dv)     what has to be applied from outside to move so
+/// constraint  = A^T lambda       what the constraints carry of it, nothing for a model without
 /// ```
+///
+/// `P` takes out what lies along the rows `A` of constraints. A motion determines no more of a force from outside than its part within
+/// them, since any force along the rows is carried by the constraints: `external` is the shortest one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InverseDynamics<S> {
     /// All force beside that of `L`, friction included.
@@ -213,7 +217,15 @@ pub struct InverseDynamics<S> {
     pub friction: Vec<S>,
     /// Force from outside: the torque of a motor, say; what a model learned with known forces takes for those.
     pub external: Vec<S>,
+    /// Force of the constraints under it; empty for a model without.
+    pub constraint: Vec<S>,
+    /// Their multipliers `lambda`, `(batch, m)`.
+    pub multipliers: Vec<S>,
 }
+
+/// Accelerations that miss what constraints allow by less than this share of their size, or of the size that the forces give them, are
+/// taken: as many digits as a person writes.
+const NEAR: f64 = 1e-3;
 
 /// Forces that give the states `(q, v)` the accelerations `a`, all `(batch, n)` in physical units. No mass matrix is
 /// inverted: it may be singular.
@@ -242,7 +254,7 @@ pub fn inverse_dynamics<S: Scalar>(
 }
 
 /// Parts of the external force of known states and accelerations, `(batch, n)` each: what the motion asks for is
-/// `inertial + coriolis + gravity - friction`.
+/// `inertial + coriolis + gravity - friction`, of which constraints may carry a part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceParts<S> {
     /// `M a`.
@@ -281,8 +293,8 @@ pub(crate) fn force_parts_by_rows<S: Scalar>(
 ) -> Result<(ForceParts<S>, Vec<MechanicsError>), MechanicsError> {
     let still = vec![<S as Real>::zero(); v.len()];
     let (moving, failures) = inverse_dynamics_by_rows(model, q, v, a)?;
-    let coasting = inverse_dynamics_by_rows(model, q, v, &still)?.0.generalized;
-    let gravity = inverse_dynamics_by_rows(model, q, &still, &still)?.0.generalized;
+    let coasting = all_forces(model, q, v, &still)?.0;
+    let gravity = all_forces(model, q, &still, &still)?.0;
     let less = |from: &[S], what: &[S]| from.iter().zip(what).map(|(&from, &what)| from - what).collect::<Vec<S>>();
     let (inertial, coriolis) = (less(&moving.generalized, &coasting), less(&coasting, &gravity));
     Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
@@ -299,11 +311,33 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
     a: &[S],
 ) -> Result<(InverseDynamics<S>, Vec<MechanicsError>), MechanicsError> {
     let n = model.coordinates();
+    let (mut generalized, mut terms) = all_forces(model, q, v, a)?;
+    let held = Held::of(n, &terms, (&generalized, a));
+    terms.prepend_failures(held.refused);
+    let Held { mut external, mut constraint, mut multipliers, .. } = held;
+    let (mut friction, failures, m) = (terms.force, terms.failures, terms.constraints);
+    for row in failures.iter().filter_map(MechanicsError::row) {
+        for forces in [&mut generalized, &mut friction, &mut external, &mut constraint] {
+            forces.iter_mut().skip(row * n).take(n).for_each(|x| *x = S::nan());
+        }
+        multipliers.iter_mut().skip(row * m).take(m).for_each(|x| *x = S::nan());
+    }
+    Ok((InverseDynamics { generalized, friction, external, constraint, multipliers }, failures))
+}
+
+/// `M a + c - g` of every row, and the terms that it is made of; rows that fail stand in their failures.
+fn all_forces<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> Result<(Vec<S>, Terms<S>), MechanicsError> {
+    let n = model.coordinates();
     if a.len() != v.len() {
         return Err(MechanicsError::Shape { what: "accelerations", expected: v.len(), found: a.len() });
     }
     let mut terms = Terms::default();
-    let request = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ | Request::FORCE;
+    let request = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ | Request::FORCE | Request::CONSTRAINTS;
     let outcome = model.terms(q, v, request, &mut terms);
     let failed = terms.drain_failures(outcome)?;
     let mut generalized = Vec::with_capacity(a.len());
@@ -318,17 +352,52 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
     not_finite("generalized force", &generalized, n, &mut found);
     terms.prepend_failures(found);
     terms.prepend_failures(failed);
-    let (mut friction, failures) = (terms.force, terms.failures);
-    for row in failures.iter().filter_map(MechanicsError::row) {
-        for forces in [&mut generalized, &mut friction].into_iter().filter(|forces| !forces.is_empty()) {
-            forces[row * n..(row + 1) * n].fill(S::nan());
+    Ok((generalized, terms))
+}
+
+/// Forces divided between what acts from outside and constraints.
+struct Held<S> {
+    external: Vec<S>,
+    constraint: Vec<S>,
+    multipliers: Vec<S>,
+    /// Rows whose accelerations the constraints do not allow.
+    refused: Vec<MechanicsError>,
+}
+
+impl<S: Scalar> Held<S> {
+    /// Of all forces, `(batch, n)`, friction in the terms.
+    fn of(n: usize, terms: &Terms<S>, (generalized, a): (&[S], &[S])) -> Self {
+        let mut external = generalized.to_vec();
+        external.iter_mut().zip(&terms.force).for_each(|(all, &friction)| *all -= friction);
+        let (m, zero) = (terms.constraints, <S as Real>::zero());
+        let mut held = Self { external, constraint: Vec::new(), multipliers: Vec::new(), refused: Vec::new() };
+        if m == 0 {
+            return held;
         }
+        let rows = terms.constraint_matrix.chunks_exact(m * n).zip(terms.constraint_drift.chunks_exact(m));
+        for (row, ((external, a), (matrix, drift))) in
+            held.external.chunks_mut(n).zip(a.chunks(n)).zip(rows).enumerate()
+        {
+            let by = |x: &[S]| -> Vec<S> { matrix.chunks_exact(n).map(|row| dot(row, x)).collect() };
+            let (carried, multipliers) = along_rows(n, matrix, &by(external));
+            external.iter_mut().zip(&carried).for_each(|(x, &carried)| *x -= carried);
+            held.constraint.extend(carried);
+            held.multipliers.extend(multipliers);
+            let mut missed = by(a);
+            missed.iter_mut().zip(drift).for_each(|(missed, &drift)| *missed += drift);
+            let distance = length(&along_rows(n, matrix, &missed).0);
+            let size = |field: &[S]| length(&field[row * n..(row + 1) * n]);
+            let inertia = length(&terms.mass_matrix[row * n * n..(row + 1) * n * n]);
+            let forces = size(&terms.dl_dq) + size(&terms.coriolis);
+            let free = if inertia > zero { forces / inertia } else { zero };
+            if distance > S::of_f64(NEAR) * (length(a) + length(&along_rows(n, matrix, drift).0) + free) {
+                let over = |c: usize| (missed[c].abs() / length(&matrix[c * n..(c + 1) * n])).to_f64();
+                let constraint = (0..m).max_by(|&b, &c| over(b).total_cmp(&over(c))).unwrap_or(0);
+                held.refused.push(MechanicsError::OffConstraints { row, constraint, distance: distance.to_f64() });
+            }
+        }
+        held
     }
-    let external = match friction.as_slice() {
-        [] => generalized.clone(),
-        friction => generalized.iter().zip(friction).map(|(&all, &friction)| all - friction).collect(),
-    };
-    Ok((InverseDynamics { generalized, friction, external }, failures))
 }
 
 #[cfg(test)]

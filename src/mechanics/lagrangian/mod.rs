@@ -12,6 +12,8 @@ mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
+#[cfg(feature = "rollout")]
+mod groups;
 mod mechanics;
 #[doc(hidden)]
 pub mod system;
@@ -27,6 +29,7 @@ pub use configure::{SystemError, SystemInstance, build, configure, systems};
 pub use configure::{configure_system, configure_values, find};
 #[doc(hidden)]
 pub use constrained_systems::constrained_systems;
+pub(crate) use constraints::dot;
 #[cfg(feature = "data")]
 pub(crate) use constraints::take_out;
 #[cfg(feature = "training")]
@@ -40,8 +43,8 @@ pub use constraints::{
 #[doc(hidden)]
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
-pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
+pub(crate) use description::{inertia_symbols, loss_symbols, pair};
 #[cfg(feature = "training")]
 pub(crate) use equations::{EquationPart, Equations};
 pub use error::MechanicsError;
@@ -52,6 +55,10 @@ pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
 pub use expression::ExpressionLagrangian;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
+#[cfg(feature = "rollout")]
+pub(crate) use groups::{Regrouped, acting_groups};
+#[cfg(feature = "training")]
+pub(crate) use groups::{group_factors, groups};
 pub use mechanics::Mechanics;
 pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;

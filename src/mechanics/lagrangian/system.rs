@@ -261,6 +261,11 @@ impl System {
     pub fn description(&self) -> Option<&Description> {
         self.described.as_deref().map(|described| &described.description)
     }
+    /// The description as it was given, with other values of parameters, by name; none for a system of the catalogue.
+    #[doc(hidden)]
+    pub fn with_defaults(&self, values: &[(&str, f64)]) -> Option<Description> {
+        self.described.as_deref().map(|described| described.with_defaults(values))
+    }
     /// `true` for a chain of links.
     pub(crate) fn is_chain(&self) -> bool {
         self.described.as_ref().is_some_and(|described| described.is_chain())

@@ -1,8 +1,9 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
 use super::force::{Piece, pieces};
-use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran};
-use super::run::{Keep, into_error};
+use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran, StepNodes};
+use super::regular::Regularity;
+use super::run::{Keep, Nodes, into_error};
 use super::trajectory::{Part, Samples, Times};
 use super::{Domain, Force, Integrable, Options, RolloutError, StepCounts, StepFailure, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
@@ -65,7 +66,7 @@ pub(super) fn run<S: Integrable>(
     method: Adaptive,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    keep: &mut Keep<'_, S>,
+    (keep, mut nodes): (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
 ) -> (StepCounts, Option<RolloutError>) {
     let mut total = StepCounts::default();
     let (n, zero) = (model.coordinates(), <S as Real>::zero());
@@ -74,7 +75,9 @@ pub(super) fn run<S: Integrable>(
     let all = Samples::new(options);
     let (domain, manifold) = (options.domain.as_ref(), model.manifold());
     let mut state: Vec<S> = q.iter().chain(v).copied().collect();
+    let mut regular = manifold.map(|manifold| Regularity::new(manifold, (q, v), motion.backwards()));
     let (mut start, mut first, mut first_step) = (zero, 0, zero);
+    let nodes_are_asked_for = nodes.is_some();
     for piece in pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end) {
         // The samples of this piece; its end is integrated to even if it is none.
         let last = piece.end >= all.elapsed(all.len() - 1);
@@ -108,11 +111,21 @@ pub(super) fn run<S: Integrable>(
             // The samples behind an invalid one are not taken, the motion goes on to its end.
             !valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
         };
+        let (t0, backwards) = (options.t0, motion.backwards());
+        let mut node = |e: S, weight: S, y: &[S]| {
+            let (t, weight) = if backwards { (t0 - (start + e), -weight) } else { (t0 + (start + e), weight) };
+            nodes.iter_mut().for_each(|nodes| nodes(t, weight, &y[..n], &y[n..]));
+        };
+        let node = nodes_are_asked_for.then_some(&mut node as &mut StepNodes<'_, S>);
         let mut derivative = |e: S, y: &[S], dy: &mut [S]| motion.derivative(&piece, start + e, y, dy);
-        let mut back = |y: &mut [S]| returned(manifold, options, n, y);
+        let mut back = |h: S, y: &mut [S]| {
+            let drift = returned(manifold, options, n, y)?;
+            regular.as_mut().map_or(Ok(()), |regular| regular.step(h, &y[..n], &y[n..]))?;
+            Ok(drift)
+        };
         let back = manifold.is_some().then_some(&mut back as &mut Project<'_, S, StepFailure>);
         let Ran { statistics, elapsed: reached, state: reached_state, step, ended } =
-            S::integrate(&task, &mut derivative, back, &mut sample);
+            S::integrate(&task, &mut derivative, back, (&mut sample, node));
         total += statistics;
         let stop = stopped(&mut motion, &piece, ended, valid, (start + reached, &reached_state, step));
         if stop.is_some() {

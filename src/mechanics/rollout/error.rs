@@ -78,6 +78,21 @@ pub enum RolloutError {
         /// Which constraint, from 0.
         constraint: usize,
     },
+    /// A constraint vanishes with its gradient, or comes to depend on the others, on the way: a second branch begins there, and nothing
+    /// says which one the motion takes.
+    #[error(
+        "constraint {constraint} has a second branch at t = {at}, where its gradient vanishes or follows from those of the others"
+    )]
+    SecondBranch {
+        /// Last time before it.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Which constraint, from 0.
+        constraint: usize,
+        /// When the branch is reached.
+        at: f64,
+    },
     /// The trajectory leaves the states at which the mass matrix is certified.
     #[error("the mass matrix is not certified just after t = {t}")]
     Uncertified {
@@ -145,6 +160,7 @@ impl RolloutError {
             Self::LeftDomain { t, .. }
             | Self::SingularMass { t, .. }
             | Self::DependentConstraint { t, .. }
+            | Self::SecondBranch { at: t, .. }
             | Self::Uncertified { t, .. }
             | Self::NotFinite { t, .. }
             | Self::StepUnderflow { t, .. }

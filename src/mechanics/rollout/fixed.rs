@@ -1,9 +1,10 @@
 //! Fixed steps from sample to sample in phase space.
 
 use super::force::{Piece, pieces};
-use super::gauss::Gauss;
+use super::gauss::{Gauss, Tableau};
 use super::phase::{Compensated, PhasePoint, PhaseSpace};
-use super::run::{Keep, into_error};
+use super::regular::Regularity;
+use super::run::{Keep, Nodes, into_error};
 use super::spark::Spark;
 use super::trajectory::{Samples, Times};
 use super::variational::Variational;
@@ -68,7 +69,7 @@ impl<S: Scalar> Stepper<S> {
 }
 
 /// Where a roll-out stands.
-struct Position<S> {
+struct Position<'a, S> {
     state: PhasePoint<S>,
     /// A velocity near that of the state.
     near: Vec<S>,
@@ -76,6 +77,8 @@ struct Position<S> {
     since: S,
     steps: usize,
     h: S,
+    /// What is known of the rows of constraints.
+    regular: Option<Regularity<'a, S>>,
 }
 
 /// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
@@ -85,7 +88,7 @@ pub(super) fn run<S: Scalar>(
     stepper: &mut Stepper<S>,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    keep: &mut Keep<'_, S>,
+    (keep, nodes): (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
 ) -> (StepCounts, Option<RolloutError>) {
     let mut statistics = StepCounts::default();
     let mut phase = PhaseSpace::new(model, force);
@@ -98,9 +101,11 @@ pub(super) fn run<S: Scalar>(
         Err(failure) => Some(into_error(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
         Ok(p) => {
             let state = PhasePoint { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
-            let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };
+            let backwards = options.t_end < options.t0;
+            let regular = phase.manifold().map(|manifold| Regularity::new(manifold, (q, v), backwards));
+            let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero, regular };
             if keep(options.t0, q, v) {
-                advance(&mut phase, stepper, &mut position, options, &cuts, (&mut statistics, keep))
+                advance(&mut phase, stepper, &mut position, options, &cuts, (&mut statistics, keep, nodes))
             } else {
                 Some(RolloutError::Stopped { t: options.t0.to_f64() })
             }
@@ -114,10 +119,10 @@ pub(super) fn run<S: Scalar>(
 fn advance<S: Scalar>(
     phase: &mut PhaseSpace<'_, S>,
     stepper: &mut Stepper<S>,
-    position: &mut Position<S>,
+    position: &mut Position<'_, S>,
     options: &Options<S>,
     cuts: &[Piece<S>],
-    (statistics, keep): (&mut StepCounts, &mut Keep<'_, S>),
+    (statistics, keep, mut nodes): (&mut StepCounts, &mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
 ) -> Option<RolloutError> {
     let samples = Samples::new(options);
     let domain = options.domain.as_ref();
@@ -143,7 +148,8 @@ fn advance<S: Scalar>(
             }
         }
         for (from, distance, piece) in legs {
-            let stop = stretch(phase, stepper, position, options, (from, distance), &piece, statistics);
+            let counted = (&mut *statistics, nodes.as_deref_mut());
+            let stop = stretch(phase, stepper, position, options, (from, distance), &piece, counted);
             if stop.is_some() {
                 return stop;
             }
@@ -169,11 +175,11 @@ fn advance<S: Scalar>(
 fn stretch<S: Scalar>(
     phase: &mut PhaseSpace<'_, S>,
     stepper: &mut Stepper<S>,
-    position: &mut Position<S>,
+    position: &mut Position<'_, S>,
     options: &Options<S>,
     (from, distance): (S, S),
     piece: &Piece<S>,
-    statistics: &mut StepCounts,
+    (statistics, mut nodes): (&mut StepCounts, Option<&mut Nodes<'_, S>>),
 ) -> Option<RolloutError> {
     let backwards = options.t_end < options.t0;
     let longest = options.step.unwrap_or(distance);
@@ -188,19 +194,37 @@ fn stretch<S: Scalar>(
             let t = position.time(options, backwards).to_f64();
             return Some(RolloutError::TooManySteps { t, steps: options.max_steps });
         }
-        phase.begin(position.time(options, backwards), piece);
+        let t = position.time(options, backwards);
+        phase.begin(t, piece);
         let before = (position.state.clone(), position.near.clone());
         let stepped = stepper
             .step(phase, &mut position.state, &mut position.near, signed)
-            .and_then(|()| inside(stepper, phase.n, options));
+            .and_then(|()| inside(stepper, phase.n, options))
+            .and_then(|()| {
+                let (q, v) = (&position.state.q.high, &position.near);
+                position.regular.as_mut().map_or(Ok(()), |regular| regular.step(h, q, v))
+            });
         if let Err(failure) = stepped {
             (position.state, position.near) = before;
             return Some(position.failed(phase, failure, options, backwards));
+        }
+        if let Some(nodes) = &mut nodes {
+            visit_stages(stepper, phase.n, (t, signed), *nodes);
         }
         statistics.accepted += 1;
         position.steps += 1;
     }
     None
+}
+
+/// Hands over the stages of the last step, of length `h` from `t`, as the nodes of a quadrature.
+fn visit_stages<S: Scalar>(stepper: &Stepper<S>, n: usize, (t, h): (S, S), nodes: &mut Nodes<'_, S>) {
+    let (q, v) = stepper.stages();
+    let Tableau { nodes: places, weights, .. } = Tableau::<S>::new(q.len() / n);
+    let stages = q.chunks_exact(n).zip(v.chunks_exact(n));
+    for ((&place, &weight), (q, v)) in places.iter().zip(&weights).zip(stages) {
+        nodes(t + place * h, weight * h, q, v);
+    }
 }
 
 /// Checks the stages of the last step.
@@ -216,7 +240,7 @@ fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Re
     Ok(())
 }
 
-impl<S: Scalar> Position<S> {
+impl<S: Scalar> Position<'_, S> {
     fn velocity(&self, phase: &mut PhaseSpace<'_, S>) -> Result<Vec<S>, StepFailure> {
         let mut v = self.near.clone();
         let (q, p) = (&self.state.q.high, &self.state.p.high);

@@ -2,7 +2,7 @@
 
 use super::pieces::{Ending, hand_over};
 use super::run::{adaptive_or_fixed, fixed};
-use super::{EnergyBalance, Integrable, Options, Rollout, RolloutError, Trajectory};
+use super::{Between, EnergyBalance, Integrable, Options, Rollout, RolloutError, Trajectory};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
@@ -30,12 +30,14 @@ impl<S: Scalar, F: Fn(S, &[S], &[S], &mut [S]) + Send + Sync> Force<S> for F {
     }
 }
 
-/// A force known at some times: linear between them, constant before the first and after the last.
+/// A force known at some times: between them linear, unless [`SampledForce::between`] says otherwise, constant before the first and
+/// after the last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledForce<S> {
     n: usize,
     times: Vec<S>,
     values: Vec<S>,
+    between: Between,
 }
 
 impl<S: Scalar> SampledForce<S> {
@@ -58,7 +60,13 @@ impl<S: Scalar> SampledForce<S> {
         if let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
             return invalid(format!("time {} does not come after the one before", at + 1));
         }
-        Ok(Self { n, times, values })
+        Ok(Self { n, times, values, between: Between::default() })
+    }
+
+    /// The same values, joined in another way.
+    #[must_use]
+    pub fn between(self, between: Between) -> Self {
+        Self { between, ..self }
     }
 
     /// The same force at all times.
@@ -77,17 +85,18 @@ impl<S: Scalar> SampledForce<S> {
 
     /// `Q` at a time into `force`, `(n)`.
     pub(crate) fn at(&self, t: S, force: &mut [S]) {
-        let n = self.n;
-        if self.times.len() == 1 {
-            return force.copy_from_slice(&self.values);
+        let (n, last) = (self.n, self.times.len() - 1);
+        if t >= self.times[last] || last == 0 {
+            return force.copy_from_slice(&self.values[last * n..]);
         }
-        let after = self.times.partition_point(|&known| known <= t).clamp(1, self.times.len() - 1);
+        let after = self.times.partition_point(|&known| known <= t).max(1);
         let (t0, t1) = (self.times[after - 1], self.times[after]);
-        let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
-        let s = S::min(S::max((t - t0) / (t1 - t0), zero), one);
-        for (i, force) in force.iter_mut().enumerate() {
-            *force = (one - s) * self.values[(after - 1) * n + i] + s * self.values[after * n + i];
-        }
+        let zero = <S as Real>::zero();
+        force.fill(zero);
+        self.between.weigh(&self.times, (after, S::max((t - t0) / (t1 - t0), zero)), |sample, weight| {
+            let row = &self.values[sample * n..(sample + 1) * n];
+            force.iter_mut().zip(row).for_each(|(force, &value)| *force += weight * value);
+        });
     }
 }
 
@@ -184,13 +193,14 @@ impl<'a, S: Scalar> Driven<'a, S> {
     }
 
     /// [`rollout_in_pieces`](super::rollout_in_pieces) under the force.
-    pub(crate) fn rollout_in_pieces(
+    #[doc(hidden)]
+    pub fn rollout_in_pieces(
         &self,
         q: &[S],
         v: &[S],
         options: &Options<S>,
         take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
-    ) -> Ending
+    ) -> Ending<S>
     where
         S: Integrable,
     {

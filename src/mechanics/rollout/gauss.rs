@@ -18,7 +18,7 @@
 
 use super::StepFailure;
 use super::phase::{Defect, Derivatives, PhasePoint, PhaseSpace};
-use super::simplified_newton::{Equations, SimplifiedNewton};
+use super::simplified_newton::{Equations, SimplifiedNewton, rounding};
 use crate::scalar::{Real, Scalar};
 
 /// Nodes `c`, weights `b`, `m_ij = a_ij / b_j`, row-major.
@@ -162,6 +162,10 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
             }
         }
         Ok(())
+    }
+
+    fn rounding(&self, _: usize, x: &[S], i: usize) -> S {
+        rounding(&self.state.q.high, self.h, x, i)
     }
 }
 

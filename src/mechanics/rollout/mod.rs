@@ -17,6 +17,7 @@
 //! every precision by [`rollout_fixed`].
 
 mod adaptive;
+mod between;
 mod dense;
 mod ensemble;
 mod error;
@@ -27,12 +28,14 @@ mod ode;
 mod options;
 mod phase;
 mod pieces;
+mod regular;
 mod run;
 mod simplified_newton;
 mod spark;
 mod trajectory;
 mod variational;
 
+pub use between::Between;
 pub use ensemble::{Start, rollout_many};
 #[doc(hidden)]
 pub use ensemble::{rollout_each, rollout_together};
@@ -44,7 +47,7 @@ pub use force::{Driven, Force, SampledForce};
 pub use ode::Integrable;
 pub use options::{Domain, Integrator, Options};
 #[doc(hidden)]
-pub use pieces::{Balances, Ending, EnergyBalance, rollout_in_pieces};
+pub use pieces::{Ending, EnergyBalance, rollout_in_pieces};
 #[doc(hidden)]
 pub use run::rollout_fixed;
 pub use run::{Motion, Rollout, rollout};

@@ -11,7 +11,8 @@
 //! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
 
 use super::dense::{Interpolant, Rhs, Step};
-use super::run::{self, Keep};
+use super::gauss::Tableau;
+use super::run::{self, Keep, Nodes};
 use super::trajectory::Times;
 use super::{Force, Options, RolloutError, StepCounts};
 use crate::lagrangian::EulerLagrange;
@@ -25,8 +26,17 @@ use std::cell::RefCell;
 /// Receives sample `k` with its state, and says whether to go on.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 
-/// Brings a state to where it belongs and says how far that is, in units of the tolerance.
-pub(super) type Project<'a, S, E> = dyn FnMut(&mut [S]) -> Result<S, E> + 'a;
+/// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
+pub(super) type StepNodes<'a, S> = dyn FnMut(S, S, &[S]) + 'a;
+
+/// What an integration hands its results to.
+pub(super) type Receivers<'a, 'f, S> = (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>);
+
+/// Parts of a step that have three nodes of Gauss each.
+const PANELS: usize = 2;
+
+/// Brings the state at the end of a step of some length to where it belongs and says how far that is, in units of the tolerance.
+pub(super) type Project<'a, S, E> = dyn FnMut(S, &mut [S]) -> Result<S, E> + 'a;
 
 /// The methods offered here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +95,7 @@ pub trait Integrable: Scalar {
         force: Option<&dyn Force<Self>>,
         start: (&[Self], &[Self]),
         options: &Options<Self>,
-        keep: &mut Keep<'_, Self>,
+        receivers: (&mut Keep<'_, Self>, Option<&mut Nodes<'_, Self>>),
     ) -> (StepCounts, Option<RolloutError>);
 
     #[doc(hidden)]
@@ -93,7 +103,7 @@ pub trait Integrable: Scalar {
         task: &Integration<'_, Self>,
         f: &mut Rhs<'_, Self, E>,
         project: Option<&mut Project<'_, Self, E>>,
-        output: &mut Output<'_, Self>,
+        receivers: Receivers<'_, '_, Self>,
     ) -> Ran<Self, E>;
 }
 
@@ -106,23 +116,23 @@ macro_rules! integrable {
                     force: Option<&dyn Force<Self>>,
                     start: (&[Self], &[Self]),
                     options: &Options<Self>,
-                    keep: &mut Keep<'_, Self>,
+                    receivers: (&mut Keep<'_, Self>, Option<&mut Nodes<'_, Self>>),
                 ) -> (StepCounts, Option<RolloutError>) {
-                    run::integrate(model, force, start, options, keep)
+                    run::integrate(model, force, start, options, receivers)
                 }
 
                 fn integrate<E>(
                     task: &Integration<'_, Self>,
                     f: &mut Rhs<'_, Self, E>,
                     project: Option<&mut Project<'_, Self, E>>,
-                    output: &mut Output<'_, Self>,
+                    receivers: Receivers<'_, '_, Self>,
                 ) -> Ran<Self, E> {
                     // Small states live on the stack.
                     match task.start.len() {
-                        2 => integrate(task, |y| SVector::<Self, 2>::from_column_slice(y), f, project, output),
-                        4 => integrate(task, |y| SVector::<Self, 4>::from_column_slice(y), f, project, output),
-                        6 => integrate(task, |y| SVector::<Self, 6>::from_column_slice(y), f, project, output),
-                        _ => integrate(task, DVector::<Self>::from_column_slice, f, project, output),
+                        2 => integrate(task, |y| SVector::<Self, 2>::from_column_slice(y), f, project, receivers),
+                        4 => integrate(task, |y| SVector::<Self, 4>::from_column_slice(y), f, project, receivers),
+                        6 => integrate(task, |y| SVector::<Self, 6>::from_column_slice(y), f, project, receivers),
+                        _ => integrate(task, DVector::<Self>::from_column_slice, f, project, receivers),
                     }
                 }
             }
@@ -153,6 +163,8 @@ struct Observer<'a, 'f, S, E> {
     f: &'a mut Rhs<'f, S, E>,
     project: Option<&'a mut Project<'f, S, E>>,
     output: &'a mut Output<'f, S>,
+    nodes: Option<&'a mut StepNodes<'f, S>>,
+    rule: Tableau<S>,
     /// Stages of the last calls, the newest at `calls - 1`, in a ring of `ring` rows.
     recent: Vec<S>,
     calls: usize,
@@ -233,11 +245,24 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
             return true;
         }
         let rejected = self.failure.take();
-        if self.task.samples.get(self.next).is_some_and(|t| t < x) && !self.interpolate(h, y) {
+        let inside = self.nodes.is_some() || self.task.samples.get(self.next).is_some_and(|t| t < x);
+        if inside && !self.interpolate(h, y) {
             self.retry = Some(h);
             return true;
         }
         self.earlier = rejected;
+        let projected = self.project.as_mut().map(|project| {
+            let mut moved = y.to_vec();
+            project(h, &mut moved).map(|drift| (drift, moved))
+        });
+        let projected = match projected.transpose() {
+            Ok(projected) => projected,
+            Err(error) => {
+                (self.failure, self.stuck) = (Some(error), true);
+                return true;
+            }
+        };
+        self.visit_nodes(h);
         while let Some(t) = self.task.samples.get(self.next) {
             if t > x {
                 break;
@@ -258,21 +283,13 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         self.step = h;
         self.state.copy_from_slice(y);
         self.slope.copy_from_slice(slope);
-        self.stopped || self.leaves(x, h)
+        self.stopped || projected.is_some_and(|(drift, moved)| self.leaves(x, h, drift, moved))
     }
 
-    /// Projects a state that has drifted by more than the tolerance; `true` stops the solver, which does not know of it.
-    fn leaves(&mut self, x: S, h: S) -> bool {
-        let Some(project) = &mut self.project else { return false };
-        let mut moved = self.state.clone();
-        let drifted = match project(&mut moved) {
-            Ok(drift) => drift > <S as Real>::one() && self.next < self.task.samples.len(),
-            Err(error) => {
-                (self.failure, self.stuck) = (Some(error), true);
-                return true;
-            }
-        };
-        if !drifted {
+    /// Goes on from the projection of a state that has drifted by more than the tolerance; `true` stops the solver, which does not know of
+    /// it.
+    fn leaves(&mut self, x: S, h: S, drift: S, moved: Vec<S>) -> bool {
+        if drift <= <S as Real>::one() || self.next >= self.task.samples.len() {
             return false;
         }
         self.statistics.evaluations += 1;
@@ -283,6 +300,19 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         self.state = moved;
         self.restart = Some(h);
         true
+    }
+
+    /// Hands over the nodes of a quadrature within the step that the interpolant stands for.
+    fn visit_nodes(&mut self, h: S) {
+        let Some(nodes) = &mut self.nodes else { return };
+        let part = S::ratio(1, PANELS as i32);
+        for panel in 0..PANELS {
+            for (&node, &weight) in self.rule.nodes.iter().zip(&self.rule.weights) {
+                let share = (S::of_f64(panel as f64) + node) * part;
+                self.interpolant.evaluate(share, &mut self.sample);
+                nodes(self.elapsed + share * h, weight * part * h, &self.sample);
+            }
+        }
     }
 
     /// Prepares the interpolant of the step to `y`; `false` if an evaluation it needs fails.
@@ -337,7 +367,7 @@ fn integrate<S, D, E>(
     vector: impl Fn(&[S]) -> OVector<S, D>,
     f: &mut Rhs<'_, S, E>,
     project: Option<&mut Project<'_, S, E>>,
-    output: &mut Output<'_, S>,
+    (output, nodes): Receivers<'_, '_, S>,
 ) -> Ran<S, E>
 where
     S: Scalar + FloatNumber,
@@ -375,6 +405,8 @@ where
         f,
         project: project.map(|project| project as &mut Project<'_, S, E>),
         output,
+        nodes: nodes.map(|nodes| nodes as &mut StepNodes<'_, S>),
+        rule: Tableau::new(3),
         recent: vec![zero; ring * dim],
         calls: 0,
         opening: 0,
@@ -538,11 +570,14 @@ mod tests {
                 Ok(())
             },
             None,
-            &mut |k, y| {
-                assert_eq!(k, got.len());
-                got.push(y[0]);
-                true
-            },
+            (
+                &mut |k, y| {
+                    assert_eq!(k, got.len());
+                    got.push(y[0]);
+                    true
+                },
+                None,
+            ),
         );
         assert!(ran.ended.is_none());
         (got, ran.statistics)

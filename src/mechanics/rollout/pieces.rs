@@ -3,6 +3,7 @@
 
 use super::force::pieces;
 use super::gauss::{Tableau, lagrange};
+use super::run::Nodes;
 use super::trajectory::CHUNK;
 use super::{Force, Integrable, Options, RolloutError, StepCounts, Trajectory};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -11,13 +12,16 @@ use std::ops::ControlFlow;
 
 /// End of a roll-out in pieces.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ending {
+pub struct Ending<S> {
     /// Samples handed over, all valid, whatever `stop` says.
     pub samples: usize,
     /// Work done.
     pub statistics: StepCounts,
     /// Why it ended before `t_end`.
     pub stop: Option<RolloutError>,
+    /// Where the energy went, of a motion with friction or a force if options ask for energies. Work and friction are integrated beside the
+    /// motion, step by step, whatever the distance of the samples.
+    pub balance: Option<EnergyBalance<S>>,
 }
 
 /// [`rollout`](super::rollout) with the samples handed to `take` in pieces of at most 256, in order, with the energies if
@@ -32,7 +36,7 @@ pub fn rollout_in_pieces<S: Integrable>(
     v: &[S],
     options: &Options<S>,
     take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
-) -> Ending {
+) -> Ending<S> {
     hand_over(model, None, (q, v), options, take)
 }
 
@@ -43,11 +47,17 @@ pub(super) fn hand_over<S: Integrable>(
     start: (&[S], &[S]),
     options: &Options<S>,
     take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
-) -> Ending {
+) -> Ending<S> {
     let mut piece = Trajectory::empty(model.coordinates());
     let (mut samples, mut willing) = (0, true);
+    // The first, the last and the largest energy of a sample.
+    let mut energies: Option<[S; 3]> = None;
     let mut give = |piece: &mut Trajectory<S>| {
         piece.energy = options.energy.then(|| piece.energy_by(model));
+        for &energy in piece.energy.iter().flatten() {
+            let [first, _, largest] = energies.unwrap_or([energy; 3]);
+            energies = Some([first, energy, S::max(largest.abs(), energy.abs())]);
+        }
         samples += piece.len();
         let more = take(piece).is_continue();
         *piece = Trajectory { energy: None, ..std::mem::replace(piece, Trajectory::empty(0)) };
@@ -56,87 +66,57 @@ pub(super) fn hand_over<S: Integrable>(
         piece.v.clear();
         more
     };
-    let (statistics, stop) = S::roll_out(model, force, start, options, &mut |t, q, v| {
+    let mut exchange = Exchange::new(model, force);
+    let mut node = |t: S, weight: S, q: &[S], v: &[S]| exchange.add(t, weight, q, v);
+    let exchanged = options.energy && (force.is_some() || !model.conserves_energy());
+    let nodes = exchanged.then_some(&mut node as &mut Nodes<'_, S>);
+    let mut keep = |t: S, q: &[S], v: &[S]| {
         piece.push(t, q, v);
         if piece.len() == CHUNK {
             willing = give(&mut piece);
         }
         willing
-    });
+    };
+    let (statistics, stop) = S::roll_out(model, force, start, options, (&mut keep, nodes));
     if willing && !piece.is_empty() {
         give(&mut piece);
     }
-    Ending { samples, statistics, stop }
+    let balance = energies.filter(|_| exchanged).map(|[first, last, size]| {
+        let Exchange { work, dissipated, .. } = exchange;
+        EnergyBalance { change: last - first, dissipated, work, size }
+    });
+    Ending { samples, statistics, stop, balance }
 }
 
-/// Intervals between samples whose energy balance is taken at once.
-const BLOCK: usize = 4096;
-
-/// Energy balance of a motion that comes in pieces: the sum of those of its blocks, neighbours sharing a sample.
-///
-/// Each block is long enough for the quadrature's polynomials to have the samples that they need inside of it.
-pub struct Balances<F, S> {
-    balance: F,
-    kept: Trajectory<S>,
-    sum: Option<EnergyBalance<S>>,
+/// Work and loss along a motion, integrated at the nodes that its integrator hands over.
+struct Exchange<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    force: Option<&'a dyn Force<S>>,
+    terms: Terms<S>,
+    external: Vec<S>,
+    work: S,
+    dissipated: S,
 }
 
-impl<S: Scalar, F: FnMut(&Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError>> Balances<F, S> {
-    /// No samples of `coordinates` coordinates yet; `balance` gives the balance of a stretch, as
-    /// [`Trajectory::energy_balance`] does.
-    pub fn new(coordinates: usize, balance: F) -> Self {
-        Self { balance, kept: Trajectory::empty(coordinates), sum: None }
+impl<'a, S: Scalar> Exchange<'a, S> {
+    fn new(model: &'a dyn EulerLagrange<S>, force: Option<&'a dyn Force<S>>) -> Self {
+        let zero = <S as Real>::zero();
+        let external = vec![zero; model.coordinates()];
+        Self { model, force, terms: Terms::default(), external, work: zero, dissipated: zero }
     }
 
-    /// Adds the samples behind those so far.
-    ///
-    /// # Errors
-    /// Those of the balance of a stretch.
-    pub fn add(&mut self, piece: &Trajectory<S>) -> Result<(), RolloutError> {
-        for k in 0..piece.len() {
-            let (q, v) = piece.state(k);
-            self.kept.push(piece.t[k], q, v);
+    /// Adds the powers at a time, over `weight` in the unit of time.
+    fn add(&mut self, t: S, weight: S, q: &[S], v: &[S]) {
+        if !self.model.conserves_energy() {
+            let known = self.model.terms(q, v, Request::FORCE, &mut self.terms).is_ok();
+            let power = self.terms.dissipation.first().copied().filter(|_| known).unwrap_or_else(S::nan);
+            self.dissipated += weight * power;
         }
-        while self.kept.len() > 2 * BLOCK {
-            let n = self.kept.coordinates;
-            let rest = Trajectory {
-                coordinates: n,
-                t: self.kept.t.split_off(BLOCK),
-                q: self.kept.q.split_off(BLOCK * n),
-                v: self.kept.v.split_off(BLOCK * n),
-                energy: None,
-            };
-            // The blocks share the sample between them.
-            let (q, v) = rest.state(0);
-            self.kept.push(rest.t[0], q, v);
-            let block = std::mem::replace(&mut self.kept, rest);
-            self.take(&block)?;
+        if let Some(force) = self.force {
+            force.force(t, q, v, &mut self.external);
+            let power = self.external.iter().zip(v).fold(<S as Real>::zero(), |sum, (&force, &v)| sum + force * v);
+            self.work += weight * power;
         }
-        Ok(())
-    }
-
-    /// The balance from the first sample to the last.
-    ///
-    /// # Errors
-    /// Those of the balance of a stretch.
-    pub fn finish(mut self) -> Result<EnergyBalance<S>, RolloutError> {
-        let rest = std::mem::replace(&mut self.kept, Trajectory::empty(0));
-        self.take(&rest)
-    }
-
-    fn take(&mut self, block: &Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError> {
-        let EnergyBalance { change, dissipated, work, size } = (self.balance)(block)?;
-        let sum = match self.sum {
-            None => EnergyBalance { change, dissipated, work, size },
-            Some(sum) => EnergyBalance {
-                change: sum.change + change,
-                dissipated: sum.dissipated + dissipated,
-                work: sum.work + work,
-                size: S::max(sum.size, size),
-            },
-        };
-        self.sum = Some(sum);
-        Ok(sum)
     }
 }
 
@@ -202,7 +182,8 @@ impl<S: Scalar> Trajectory<S> {
     /// Energy balance of the motion by `model`; under a force from outside it is
     /// [`Driven::energy_balance`](super::Driven::energy_balance).
     ///
-    /// The power is integrated through the polynomials of degree 5 through neighbouring samples, at the distances they
+    /// Where a motion is integrated anew, [`rollout_in_pieces`] has the balance of its steps. Here, of any samples, the power is integrated
+    /// through the polynomials of degree 5 through neighbouring samples, at the distances they
     /// have: the error is of order 6 in the distance of samples, as far as the power is smooth. The work of a force is
     /// integrated from the force itself along states so interpolated, between its breaks.
     ///
@@ -292,7 +273,11 @@ mod tests {
     }
 
     /// All pieces as one trajectory, at most `most` of them, their number, and how it ended.
-    fn joined(model: &dyn EulerLagrange<f64>, options: &Options<f64>, most: usize) -> (Trajectory<f64>, usize, Ending) {
+    fn joined(
+        model: &dyn EulerLagrange<f64>,
+        options: &Options<f64>,
+        most: usize,
+    ) -> (Trajectory<f64>, usize, Ending<f64>) {
         let mut whole = Trajectory { energy: options.energy.then(Vec::new), ..Trajectory::empty(1) };
         let mut pieces = 0;
         let ending = rollout_in_pieces(model, &[1.0], &[0.2], options, &mut |piece| {
@@ -318,27 +303,6 @@ mod tests {
                 assert_eq!(pieces, trajectory.len().div_ceil(CHUNK));
             }
         }
-    }
-
-    #[test]
-    fn balances_of_blocks_add_up() {
-        let options = Options::new(20.0, 0.001);
-        let whole = rollout(&*oscillator(), &[1.0], &[0.2], &options).trajectory;
-        // A dissipated power of v^2, for the sake of its integral.
-        let balance = |stretch: &Trajectory<f64>| {
-            let (t, v) = (&stretch.t, &stretch.v);
-            let dissipated = t.windows(2).zip(v.windows(2)).map(|(t, v)| (t[1] - t[0]) * v[0] * v[1]).sum();
-            let size = v.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
-            Ok(EnergyBalance { change: v.last().unwrap() - v[0], dissipated, work: 0.0, size })
-        };
-        let mut blocks = Balances::new(1, balance);
-        let ending = rollout_in_pieces(&*oscillator(), &[1.0], &[0.2], &options, &mut |piece| {
-            blocks.add(piece).unwrap();
-            ControlFlow::Continue(())
-        });
-        let (sum, once) = (blocks.finish().unwrap(), balance(&whole).unwrap());
-        assert!(ending.samples > 4 * BLOCK && sum.size == once.size);
-        assert!((sum.change - once.change).abs() < 1e-12 && (sum.dissipated - once.dissipated).abs() < 1e-9);
     }
 
     #[test]

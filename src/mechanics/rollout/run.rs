@@ -87,7 +87,7 @@ pub(super) fn adaptive_or_fixed<S: Integrable>(
     v: &[S],
     options: &Options<S>,
 ) -> Rollout<S> {
-    collected(model, options, |keep| S::roll_out(model, force, (q, v), options, keep))
+    collected(model, options, |keep| S::roll_out(model, force, (q, v), options, (keep, None)))
 }
 
 /// By the structure-preserving methods, perhaps under a force from outside.
@@ -98,7 +98,7 @@ pub(super) fn fixed<S: Scalar>(
     v: &[S],
     options: &Options<S>,
 ) -> Rollout<S> {
-    collected(model, options, |keep| integrate_fixed(model, force, (q, v), options, keep))
+    collected(model, options, |keep| integrate_fixed(model, force, (q, v), options, (keep, None)))
 }
 
 /// The samples of a motion as a trajectory, with the energies if options ask for them.
@@ -118,25 +118,25 @@ fn collected<S: Scalar>(
     Rollout { trajectory, statistics, stop }
 }
 
-/// The motion by any method, every sample handed over and none kept.
+/// The motion by any method, every sample and, if asked for, every node handed over and none kept.
 pub(super) fn integrate<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    keep: &mut Keep<'_, S>,
+    receivers: (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
 ) -> (StepCounts, Option<RolloutError>) {
     let method = match options.method {
         Integrator::Dopri5 => Adaptive::Dopri5,
         Integrator::Dop853 => Adaptive::Dop853,
         Integrator::Midpoint | Integrator::Gauss4 | Integrator::Gauss6 | Integrator::Variational => {
-            return integrate_fixed(model, force, (q, v), options, keep);
+            return integrate_fixed(model, force, (q, v), options, receivers);
         }
     };
     let checked = check(model.coordinates(), q, v, options).and_then(|()| reachable(q, v, options));
     match checked.and_then(|()| allowed(model, q, v)) {
         Err(error) => (StepCounts::default(), Some(error)),
-        Ok((q, v)) => adaptive::run(model, force, method, (&q, &v), options, keep),
+        Ok((q, v)) => adaptive::run(model, force, method, (&q, &v), options, receivers),
     }
 }
 
@@ -146,7 +146,7 @@ fn integrate_fixed<S: Scalar>(
     force: Option<&dyn Force<S>>,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    keep: &mut Keep<'_, S>,
+    receivers: (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
 ) -> (StepCounts, Option<RolloutError>) {
     let n = model.coordinates();
     let refused = |error| (StepCounts::default(), Some(error));
@@ -166,7 +166,7 @@ fn integrate_fixed<S: Scalar>(
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
         return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });
     }
-    fixed::run(model, force, &mut stepper, (&q, &v), options, keep)
+    fixed::run(model, force, &mut stepper, (&q, &v), options, receivers)
 }
 
 /// A start nearer to the constraints than this share of its size is brought to them.
@@ -247,6 +247,11 @@ pub(super) enum StepFailure {
     },
     /// No state of the constraints is near.
     OffConstraints,
+    /// The rows of the constraints are not independent so long after the last state.
+    Branch {
+        constraint: usize,
+        ahead: f64,
+    },
 }
 
 impl StepFailure {
@@ -268,6 +273,9 @@ impl StepFailure {
 /// Receives the time, coordinates and velocities of every sample in order, and says whether to go on.
 pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
+/// Receives time, weight, coordinates and velocities at the nodes of a quadrature over time along a motion, beside the samples.
+pub(super) type Nodes<'a, S> = dyn FnMut(S, S, &[S], &[S]) + 'a;
+
 /// The error of a motion that a step ended.
 pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
     match failure {
@@ -281,6 +289,7 @@ pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f6
         StepFailure::Model(MechanicsError::Dependent { constraint, .. }) => {
             RolloutError::DependentConstraint { t, state, constraint }
         }
+        StepFailure::Branch { constraint, ahead } => RolloutError::SecondBranch { t, state, constraint, at: t + ahead },
         StepFailure::OffConstraints => RolloutError::NotFinite { t, state, what: "way back to the constraints" },
         StepFailure::Model(MechanicsError::Interrupted) => RolloutError::Stopped { t },
         StepFailure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },

@@ -16,6 +16,18 @@ pub(super) trait Equations<S: Scalar> {
     ) -> Result<Defect<S>, StepFailure>;
     /// An approximation of `dF/dx` at `x`, row-major.
     fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure>;
+    /// The change of unknown `i` that stands for roundings of what the equations are made of, the coordinates among them: of the force of a
+    /// stiff spring nothing else is known.
+    fn rounding(&self, n: usize, x: &[S], i: usize) -> S;
+}
+
+/// Corrections up to so many roundings of the unknowns are roundings. A stiff spring between two masses has corrections of up to three:
+/// its force is the rounding of either place times its constant.
+const ROUNDINGS: f64 = 16.0;
+
+/// The change of velocities that are unknown at `x` which the roundings of them and of coordinates `q`, over a step `h`, explain.
+pub(super) fn rounding<S: Scalar>(q: &[S], h: S, x: &[S], i: usize) -> S {
+    S::epsilon() * (x[i].abs() + q[i % q.len()].abs() / h.abs())
 }
 
 /// Evaluations of one step.
@@ -58,8 +70,8 @@ impl<S: Scalar> SimplifiedNewton<S> {
 
     /// Solves from the guess in `x`; on success the last call of [`Equations::residual`] was at the solution.
     ///
-    /// The iteration ends where it no longer halves the residual, not at a tolerance: a tolerance leaves errors of one
-    /// sign, which drift (Hairer, McLachlan and Razakarivony 2008).
+    /// The iteration ends where it no longer halves the residual and this is, or asks for, rounding, not at a tolerance: a tolerance leaves
+    /// errors of one sign, which drift (Hairer, McLachlan and Razakarivony 2008).
     ///
     /// # Errors
     /// Those of the equations; [`StepFailure::NotConverged`]; a singular matrix.
@@ -79,7 +91,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
             let defect = equations.residual(phase, x, &mut self.residual)?;
             phase.iterations += 1;
             let improves = defect.improves(best);
-            if defect.is_rounding() || (!improves && defect.is_small()) {
+            if defect.is_rounding() || (!improves && (defect.is_small() || self.is_settled(phase.n, equations, x))) {
                 self.least = self.least.min(iteration);
                 self.stale = matrices > 1 || iteration > self.least + PATIENCE;
                 return Ok(());
@@ -96,11 +108,20 @@ impl<S: Scalar> SimplifiedNewton<S> {
                 matrices += 1;
             }
             best = best.best(defect);
-            for (x, row) in x.iter_mut().zip(self.inverse.chunks_exact(size)) {
-                *x -= row.iter().zip(&self.residual).fold(<S as Real>::zero(), |sum, (&a, &r)| a.mul_add(r, sum));
-            }
+            (0..size).for_each(|i| x[i] -= self.correction(i));
         }
         Ok(())
+    }
+
+    /// The change of unknown `i` that the residual asks for.
+    fn correction(&self, i: usize) -> S {
+        let row = &self.inverse[i * self.residual.len()..][..self.residual.len()];
+        row.iter().zip(&self.residual).fold(<S as Real>::zero(), |sum, (&a, &r)| a.mul_add(r, sum))
+    }
+
+    /// `true` if the residual, however large beside terms that cancel, asks for no more than roundings of the unknowns.
+    fn is_settled(&self, n: usize, equations: &impl Equations<S>, x: &[S]) -> bool {
+        (0..x.len()).all(|i| self.correction(i).abs() <= S::of_f64(ROUNDINGS) * equations.rounding(n, x, i))
     }
 
     /// A new matrix at `x`, inverted.

@@ -18,7 +18,7 @@
 use super::StepFailure;
 use super::gauss::{Tableau, lagrange};
 use super::phase::{Defect, PhasePoint, PhaseSpace};
-use super::simplified_newton::{Equations, SimplifiedNewton};
+use super::simplified_newton::{Equations, SimplifiedNewton, rounding};
 use crate::lagrangian::{Manifold, ManifoldRows};
 use crate::scalar::{Real, Scalar};
 
@@ -219,6 +219,12 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
             }
         }
         Ok(())
+    }
+
+    /// Impulses are whatever the velocities ask for.
+    fn rounding(&self, n: usize, x: &[S], i: usize) -> S {
+        let velocities = self.tableau.nodes.len() * n;
+        if i < velocities { rounding(&self.state.q.high, self.h, x, i) } else { S::infinity() }
     }
 }
 

@@ -16,7 +16,7 @@
 
 use super::StepFailure;
 use super::phase::{Defect, Derivatives, PhasePoint, PhaseSpace};
-use super::simplified_newton::{Equations, SimplifiedNewton};
+use super::simplified_newton::{Equations, SimplifiedNewton, rounding};
 use crate::scalar::{Real, Scalar};
 
 /// `p0 + D1 L_d(q0, q0 + h u) = 0` for the mean velocity `u`.
@@ -71,6 +71,10 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
             }
         }
         Ok(())
+    }
+
+    fn rounding(&self, _: usize, x: &[S], i: usize) -> S {
+        rounding(&self.state.q.high, self.half_step.ldexp(1), x, i)
     }
 }
 

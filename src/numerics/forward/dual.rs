@@ -127,7 +127,9 @@ impl<T: Real> HyperDual<T> {
     /// Chain rule from `f, f', f''` at the value.
     #[inline(always)]
     fn compose(self, (value, first, second): (T, T, T)) -> Self {
-        Self { value, s: first * self.s, t: first * self.t, st: first * self.st + second * (self.s * self.t) }
+        let (s, t, product) = (first * self.s, first * self.t, self.s * self.t);
+        let bent = if second.may_be_finite() { second * product } else { second.along(product) };
+        Self { value, s, t, st: first * self.st + bent }
     }
     /// Chain rule.
     #[inline(always)]
@@ -141,11 +143,13 @@ impl<T: Real> HyperDual<T> {
         let value = f.value(a.value, b.value);
         let (da, db) = f.first(a.value, b.value, value);
         let (daa, dab, dbb) = f.second(a.value, b.value, value, (da, db));
+        let product = a.s * a.t;
+        let bent = if daa.may_be_finite() { daa * product } else { daa.along(product) };
         Self {
             value,
             s: da * a.s + db * b.s,
             t: da * a.t + db * b.t,
-            st: da * a.st + db * b.st + daa * (a.s * a.t) + dab * (a.s * b.t + b.s * a.t) + dbb * (b.s * b.t),
+            st: da * a.st + db * b.st + bent + dab * (a.s * b.t + b.s * a.t) + dbb * (b.s * b.t),
         }
     }
     /// The same operation on every component.

@@ -86,6 +86,11 @@ impl<T: Real, const N: usize, const F: usize> Jet<T, N, F> {
     /// Chain rule from `f, f', f''` at the value.
     #[inline(always)]
     fn compose(&self, (value, first, second): (T, T, T)) -> Self {
+        if !second.may_be_finite() {
+            let g = &self.gradient;
+            let rule = |i: usize, j: usize, _: &[T; N]| first * self.lower[i][j] + second.along(g[i] * g[j]);
+            return Self::build((self, self), value, |x, _| first * x, rule);
+        }
         let bent: [T; N] = array(|i| second * self.gradient[i]);
         let rule = |i: usize, j: usize, _: &[T; N]| first * self.lower[i][j] + bent[i] * self.gradient[j];
         Self::build((self, self), value, |x, _| first * x, rule)
@@ -103,14 +108,16 @@ impl<T: Real, const N: usize, const F: usize> Jet<T, N, F> {
         let (da, db) = f.first(a.value, b.value, value);
         let (daa, dab, dbb) = f.second(a.value, b.value, value, (da, db));
         let (p, q) = (&a.gradient, &b.gradient);
+        let known = daa.may_be_finite();
         Self::build(
             (a, b),
             value,
             |x, y| da * x + db * y,
             |i, j, _| {
+                let product = p[i] * p[j];
                 da * a.lower[i][j]
                     + db * b.lower[i][j]
-                    + daa * (p[i] * p[j])
+                    + if known { daa * product } else { daa.along(product) }
                     + dab * (p[i] * q[j] + q[i] * p[j])
                     + dbb * (q[i] * q[j])
             },

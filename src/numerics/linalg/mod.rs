@@ -20,6 +20,7 @@
 
 mod batch;
 mod compiled;
+mod components;
 mod condition;
 mod eigen;
 mod elimination;
@@ -34,6 +35,8 @@ mod solve;
 pub use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
+#[doc(hidden)]
+pub use components::components;
 #[doc(hidden)]
 pub use condition::condition_number;
 pub use eigen::{eigenvalues, eigh};

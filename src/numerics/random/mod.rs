@@ -55,6 +55,8 @@ pub enum RngStream {
     Segments,
     /// Trajectories of a recording, or given states, that are held out.
     HeldOut,
+    /// Copies of a recording with noise that is drawn anew.
+    Copies,
 }
 
 impl RngStream {
@@ -75,6 +77,7 @@ impl RngStream {
             Self::Region => 4,
             Self::Segments => 5,
             Self::HeldOut => 8,
+            Self::Copies => 9,
             Self::Order(phase) => 16 + 2 * phase as u64,
             Self::Training(phase) => 17 + 2 * phase as u64,
         }
@@ -97,6 +100,7 @@ mod tests {
             RngStream::Region,
             RngStream::Segments,
             RngStream::HeldOut,
+            RngStream::Copies,
         ];
         let streams: Vec<RngStream> = single.into_iter().chain(phased).collect();
         let first: BTreeSet<u64> = streams.iter().map(|stream| stream.generator(7).next_u64()).collect();

@@ -90,6 +90,20 @@ pub trait Real:
         self.primal() == Self::Scalar::of_f64(0.0)
     }
 
+    /// `false` for a number known to be infinite or `NaN`. Of a number whose value is not known yet, `true`: its products with exact
+    /// zeros are left out anyway.
+    #[inline(always)]
+    fn may_be_finite(self) -> bool {
+        self.primal().is_finite()
+    }
+
+    /// `self * weight`, where a weight that is exactly 0 answers for itself: an infinite derivative along a direction in which nothing
+    /// changes is none.
+    #[inline(always)]
+    fn along(self, weight: Self) -> Self {
+        if weight.is_exact_zero() { weight } else { self * weight }
+    }
+
     /// The constant nearest to `value`: exact unless the scalar is `f32`.
     #[inline(always)]
     fn of(value: f64) -> Self {

@@ -1,64 +1,75 @@
 //! Predictions of recorded motion that a model has not seen: how far off they are, how long they hold.
 //!
-//! A recording is cut into windows; every predictor gets the estimated state at the start of a window and says where the
-//! coordinates will be at the times of the samples that follow. What it says is compared with what was measured.
+//! A recording is cut into windows; every predictor gets an estimated state before a window and says where the coordinates will be at the times
+//! of its samples. What it says is compared with what was measured. An estimate by smoothing has seen samples after its own time: the window
+//! begins behind the last of them.
 
 use super::statistics::quantile;
 use super::{ValidTime, angle_difference, relative_error, valid_time};
+use crate::data::StateEstimate;
 use crate::lagrangian::EulerLagrange;
-use crate::recording::{RecordedTrajectory, hermite};
+use crate::recording::hermite;
 use crate::rollout::{Force, Options, RolloutError, SampledForce, Start, rollout_each};
 use serde::{Deserialize, Serialize};
 
-/// A stretch of recorded motion to be predicted from the state at its start.
+/// A stretch of recorded motion to be predicted from a state before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Window {
-    /// Estimated coordinates at the start, `(n)`.
+    /// Estimated coordinates of the state, `(n)`.
     pub q: Vec<f64>,
-    /// Estimated velocities at the start, `(n)`.
+    /// Estimated velocities of the state, `(n)`.
     pub v: Vec<f64>,
+    /// Time from the state to the start of the window, the last sample that the estimate has seen, in s.
+    pub lead: f64,
     /// Times of the samples that follow, from the start of the window, ascending, in s.
     pub times: Vec<f64>,
     /// Measured coordinates at these times, `(samples, n)`.
     pub measured: Vec<f64>,
-    /// Known forces from outside from the start of the window to its end, if there were any.
+    /// Known forces from outside from the state to the end of the window, if there were any.
     pub force: Option<SampledForce<f64>>,
 }
 
 impl Window {
-    /// Windows of `seconds` one after the other through the samples `interior` of a track of `n` coordinates, with the
-    /// estimated states `q` and `v`, `(samples, n)`, at its samples; a rest that is shorter is left out.
-    pub fn cut(
-        track: &RecordedTrajectory,
-        (q, v): (&[f64], &[f64]),
-        interior: std::ops::Range<usize>,
-        n: usize,
+    /// Windows of `seconds` one after the other through the samples `interior` of a track of `n` coordinates, each from the
+    /// estimated state, `(samples, n)`, at its first sample; a rest that is shorter is left out.
+    pub fn cut(states: StateEstimate<'_>, interior: std::ops::Range<usize>, n: usize, seconds: f64) -> Vec<Self> {
+        Self::unseen(states, &[], (interior, n), seconds)
+    }
+
+    /// As [`Window::cut`], but each window begins with the last sample, by `reach`, that the estimate of its state has seen.
+    pub fn unseen(
+        StateEstimate { track, q, v, between }: StateEstimate<'_>,
+        reach: &[usize],
+        (interior, n): (std::ops::Range<usize>, usize),
         seconds: f64,
     ) -> Vec<Self> {
         let state = |values: &[f64], sample: usize| values[sample * n..(sample + 1) * n].to_vec();
         let mut windows = Vec::new();
         let mut start = interior.start;
         while start < interior.end {
-            let origin = track.times[start];
+            let seen = reach.get(start).copied().unwrap_or(start).clamp(start, interior.end - 1);
+            let origin = track.times[seen];
             // The last sample may be early or late by a rounding error of the times.
-            let length = track.times[start..interior.end].partition_point(|t| t - origin <= seconds * (1.0 + 1e-9));
-            let end = start + length;
+            let length = track.times[seen..interior.end].partition_point(|t| t - origin <= seconds * (1.0 + 1e-9));
+            let end = seen + length;
             let whole = end < interior.end || track.times[end - 1] - origin >= seconds * (1.0 - 1e-9);
             if !whole || length < 2 {
                 break;
             }
             let force = track.force.get(start * n..end * n).and_then(|values| {
-                let times = track.times[start..end].iter().map(|t| t - origin).collect();
-                SampledForce::new(n, times, values.to_vec()).ok()
+                let times = track.times[start..end].iter().map(|t| t - track.times[start]).collect();
+                SampledForce::new(n, times, values.to_vec()).ok().map(|force| force.between(between))
             });
             windows.push(Self {
                 q: state(q, start),
                 v: state(v, start),
-                times: track.times[start + 1..end].iter().map(|t| t - origin).collect(),
-                measured: track.q[(start + 1) * n..end * n].to_vec(),
+                lead: origin - track.times[start],
+                times: track.times[seen + 1..end].iter().map(|t| t - origin).collect(),
+                measured: track.q[(seen + 1) * n..end * n].to_vec(),
                 force,
             });
-            start = end - 1;
+            // Windows follow each other; their states lie before them.
+            start = (start + 1).max(end - 1 - (seen - start));
         }
         windows
     }
@@ -87,7 +98,7 @@ pub fn follow(
     let forces = windows.iter().map(|window| window.force.as_ref().map(|force| force as &dyn Force<f64>));
     let starts: Vec<Start<'_, f64>> =
         windows.iter().zip(forces).map(|(window, force)| Start { q: &window.q, v: &window.v, force }).collect();
-    let end = windows.iter().filter_map(|window| window.times.last()).fold(0.0_f64, |end, t| end.max(*t));
+    let end = windows.iter().filter_map(|window| Some(window.lead + window.times.last()?)).fold(0.0, f64::max);
     let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
     let step = shortest.fold(end, f64::min);
     // One rounding more, so that the last sample of every window lies inside.
@@ -109,7 +120,7 @@ fn steps(times: &[f64]) -> impl Iterator<Item = f64> {
 /// Coordinates between the samples of a motion, by cubic Hermite interpolation, at the times of a window.
 fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64> {
     let mut positions = Vec::with_capacity(window.measured.len());
-    for &time in &window.times {
+    for time in window.times.iter().map(|time| window.lead + time) {
         let after = t.partition_point(|t| *t < time);
         if after == 0 || after >= t.len() {
             positions.extend(std::iter::repeat_n(f64::NAN, n));
@@ -125,10 +136,11 @@ fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64>
     positions
 }
 
-/// Everything goes on as it went at the start: the least that a model must beat.
+/// Everything goes on as it went in the state before the window: the least that a model must beat.
 pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
     let prediction = |window: &Window| {
-        let along = window.times.iter().flat_map(|t| window.q.iter().zip(&window.v).map(move |(q, v)| q + t * v));
+        let times = window.times.iter().map(|t| window.lead + t);
+        let along = times.flat_map(|t| window.q.iter().zip(&window.v).map(move |(q, v)| q + t * v));
         along.collect()
     };
     windows.iter().map(prediction).collect()
@@ -228,7 +240,14 @@ pub fn window_valid_times(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::RecordedTrajectory;
+    use crate::rollout::Between;
     use crate::rollout::models::{OSCILLATOR, SINGULAR};
+
+    /// The track with its own positions and these velocities as states.
+    fn estimate<'a>(track: &'a RecordedTrajectory, v: &'a [f64]) -> StateEstimate<'a> {
+        StateEstimate { track, q: &track.q, v, between: Between::Linear }
+    }
 
     /// A swing `cos t` every tenth of a second.
     fn swing(samples: usize) -> (RecordedTrajectory, Vec<f64>) {
@@ -241,19 +260,37 @@ mod tests {
     #[test]
     fn windows_follow_each_other() {
         let (track, v) = swing(40);
-        let windows = Window::cut(&track, (&track.q, &v), 2..38, 1, 0.5);
+        let windows = Window::cut(estimate(&track, &v), 2..38, 1, 0.5);
         assert_eq!(windows.len(), 7);
         assert_eq!((windows[1].q[0], windows[1].v[0]), (track.q[7], v[7]));
         assert_eq!((windows[1].times.len(), windows[1].measured[4]), (5, track.q[12]));
         assert!((windows[1].times[4] - 0.5).abs() < 1e-12);
-        assert!(Window::cut(&track, (&track.q, &v), 2..38, 1, 9.0).is_empty());
-        assert!(Window::cut(&track, (&track.q, &v), 2..38, 1, 0.01).is_empty());
+        assert!(Window::cut(estimate(&track, &v), 2..38, 1, 9.0).is_empty());
+        assert!(Window::cut(estimate(&track, &v), 2..38, 1, 0.01).is_empty());
+    }
+
+    /// Whatever the samples of a window are, its start does not know them.
+    #[test]
+    fn starts_have_not_seen_their_windows() {
+        let (track, v) = swing(60);
+        let reach: Vec<usize> = (0..60).map(|k| (k + 4).min(59)).collect();
+        let windows = Window::unseen(estimate(&track, &v), &reach, (4..60, 1), 1.0);
+        assert_eq!(windows.len(), 5);
+        for (k, window) in windows.iter().enumerate() {
+            assert!((window.lead - 0.4).abs() < 1e-12 && window.q[0] == track.q[4 + 10 * k], "{window:?}");
+            assert_eq!((window.times.len(), window.measured[0]), (10, track.q[4 + 10 * k + 5]));
+        }
+        // Predictions are of the times of the samples.
+        let motion = predict_by_motion(&OSCILLATOR, &windows, 1);
+        assert!(prediction_error(&windows, &motion, (&[false], &[1.0]), 1.0).rms < 1e-5);
+        let line = predict_by_constant_velocity(&windows[..1]);
+        assert!((line[0][0] - (track.q[4] + 0.5 * v[4])).abs() < 1e-12);
     }
 
     #[test]
     fn the_right_model_predicts_and_a_straight_line_does_not() {
         let (track, v) = swing(60);
-        let windows = Window::cut(&track, (&track.q, &v), 0..60, 1, 1.0);
+        let windows = Window::cut(estimate(&track, &v), 0..60, 1, 1.0);
         let error = |predictions: &Predictions| prediction_error(&windows, predictions, (&[false], &[1.0]), 1.0);
         let motion = error(&predict_by_motion(&OSCILLATOR, &windows, 2));
         // Tolerances of the roll-out, and interpolation over a tenth of a radian.
@@ -277,7 +314,7 @@ mod tests {
         let (mut track, mut v) = swing(30);
         track.q.fill(0.0);
         v.fill(-1.0);
-        let windows = Window::cut(&track, (&track.q, &v), 0..30, 1, 1.4);
+        let windows = Window::cut(estimate(&track, &v), 0..30, 1, 1.4);
         let error = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), (&[false], &[1.0]), 1.4);
         assert!(error.missing == error.windows && error.rms.is_nan() && error.median == f64::INFINITY, "{error:?}");
         let early = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), (&[false], &[1.0]), 0.1);
@@ -287,7 +324,8 @@ mod tests {
 
     #[test]
     fn angles_count_modulo_a_turn() {
-        let window = Window { q: vec![0.0], v: vec![0.0], times: vec![1.0], measured: vec![7.0], force: None };
+        let window =
+            Window { q: vec![0.0], v: vec![0.0], lead: 0.0, times: vec![1.0], measured: vec![7.0], force: None };
         let error = |periodic| {
             prediction_error(std::slice::from_ref(&window), &vec![vec![0.5]], (&[periodic], &[1.0]), 1.0).rms
         };
@@ -299,7 +337,7 @@ mod tests {
     fn unlike_units_are_pooled_over_their_scales_and_stated_apart() {
         let window = |error: f64| {
             let (measured, predicted) = (vec![1.0, 5.0, 0.0], vec![1.0 + error, 5.0 - 100.0 * error, 7.0]);
-            (Window { q: vec![0.0; 3], v: vec![0.0; 3], times: vec![1.0], measured, force: None }, predicted)
+            (Window { q: vec![0.0; 3], v: vec![0.0; 3], lead: 0.0, times: vec![1.0], measured, force: None }, predicted)
         };
         let (windows, predictions): (Vec<Window>, Predictions) = [0.1, 0.2, 0.3].map(window).into_iter().unzip();
         let pooled = prediction_error(&windows, &predictions, (&[false; 3], &[1.0, 100.0, 0.0]), 1.0);

@@ -2,7 +2,7 @@
 //! that motion leaves open.
 
 use super::statistics::ErrorDistribution;
-use crate::lagrangian::{EulerLagrange, Manifold, ManifoldRows, ReducedMass, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Manifold, ManifoldRows, ReducedMass, Request, Terms, group_factors, groups};
 use crate::linalg::{Inertia, dot, inertia};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
@@ -44,12 +44,15 @@ pub fn acceleration_errors<S: Scalar>(
 
 /// Distribution of `|s M_learned - M_exact| / |M_exact|` (Frobenius norms) at rest, with one factor `s` for all states.
 ///
-/// A Lagrangian is free up to a factor. That of a geodesic is free up to any function, `L -> f(L)`: `M` becomes
+/// A Lagrangian is free up to a factor. Where coordinates do not act on each other by the exact equations, each group of those that do has a
+/// factor of its own: the elements between the groups `a` and `b` are taken times `sqrt |s_a s_b|`. That of a geodesic is free up to any function, `L -> f(L)`: `M` becomes
 /// `f' g + f'' (g v)(g v)^T`, and only at rest the metric `g` is left, up to the one factor `f'(0)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MassMatrixError {
-    /// The factor `s` of the smallest mean square.
+    /// The factor `s` of the smallest mean square, that of the first group.
     pub factor: f64,
+    /// Number of groups of coordinates that do not act on each other.
+    pub groups: usize,
     /// The relative errors.
     #[serde(flatten)]
     pub error: ErrorDistribution,
@@ -86,8 +89,25 @@ pub fn mass_matrix_error<S: Scalar>(
     learned: &dyn EulerLagrange<S>,
     q: &[S],
 ) -> MassMatrixError {
-    let size = exact.coordinates() * exact.coordinates();
-    compare(size, &matrices_at_rest(exact, q), &matrices_at_rest(learned, q))
+    let n = exact.coordinates();
+    let (of_exact, mut of_learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
+    // Whatever velocities show what acts on what.
+    let v: Vec<S> = (0..q.len()).map(|k| S::of_f64(0.3 * (1.0 + 2.4 * k as f64).cos())).collect();
+    let groups = groups(exact, (q, &v));
+    if groups.len() < 2 {
+        return compare(n * n, &of_exact, &of_learned);
+    }
+    let factors = group_factors(n, &groups, &of_learned, &of_exact);
+    let mut of_coordinate = vec![1.0; n];
+    groups.iter().zip(&factors).for_each(|(group, s)| group.iter().for_each(|&i| of_coordinate[i] = *s));
+    for matrix in of_learned.chunks_exact_mut(n * n) {
+        for (at, m) in matrix.iter_mut().enumerate() {
+            let (row, column) = (of_coordinate[at / n], of_coordinate[at % n]);
+            *m *= row.signum() * (row * column).abs().sqrt();
+        }
+    }
+    let found = compare_scaled(n * n, &of_exact, &of_learned, 1.0);
+    MassMatrixError { factor: factors[0], groups: groups.len(), ..found }
 }
 
 /// Compares the matrices within the directions that the constraints leave, at states `q`, `v`, `(states, n)`.
@@ -123,15 +143,19 @@ pub fn mass_matrix_error_within(
 
 /// Compares matrices of `size` numbers.
 fn compare(size: usize, exact: &[f64], learned: &[f64]) -> MassMatrixError {
+    compare_scaled(size, exact, learned, nearest_factor(size, exact, learned))
+}
+
+/// The same with a given factor.
+fn compare_scaled(size: usize, exact: &[f64], learned: &[f64], factor: f64) -> MassMatrixError {
     let states = exact.len().max(learned.len()) / size;
-    let factor = nearest_factor(size, exact, learned);
     let error = |(a, b): (&[f64], &[f64])| {
         let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| factor * b - a).collect();
         (dot(&difference, &difference) / dot(a, a)).sqrt()
     };
     let errors: Vec<f64> = pairs(size, exact, learned).map(error).collect();
     let failed = states - errors.len();
-    MassMatrixError { factor, error: ErrorDistribution::of(errors, failed) }
+    MassMatrixError { factor, groups: 1, error: ErrorDistribution::of(errors, failed) }
 }
 
 /// Fraction of the states `q`, `v`, both `(states, n)`, whose learned mass matrix has not the inertia (numbers of
@@ -288,7 +312,8 @@ mod tests {
     fn one_factor_is_free_and_nothing_else() {
         let model = |a, b, c| Mechanics::<_, f64>::new(Masses([a, b, c]), vec![]);
         let q = [0.0, 0.0, 1.0, 0.0, 3.0, 0.0];
-        let exact = model(1.0, 0.5, 0.0);
+        // By `c` the coordinates act on each other.
+        let exact = model(1.0, 0.5, 0.1);
         // What vanishes at rest does not count.
         let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);
         assert_eq!((same.factor, same.error.max, same.error.count, same.error.failed), (-0.25, 0.0, 3, 0));
@@ -304,6 +329,29 @@ mod tests {
         assert!((other.error.max - relative.iter().fold(0.0f64, |m, &x| m.max(x))).abs() < 1e-14);
         let broken = mass_matrix_error(&exact, &model(f64::NAN, 0.0, 0.0), &q);
         assert_eq!((broken.error.count, broken.error.failed), (0, 3));
+    }
+
+    /// Two oscillators with a mass each, joined by a spring or not.
+    struct Two;
+
+    impl Lagrangian for Two {
+        fn coordinates(&self) -> usize {
+            2
+        }
+        fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+            let one = |m: R, q: R, v: R| m * (R::half() * (R::one() + q.sqr()) * v.sqr() - q.sqr());
+            one(p[0], q[0], v[0]) + one(p[1], q[1], v[1]) - p[2] * q[0] * q[1]
+        }
+    }
+
+    #[test]
+    fn every_group_has_a_factor_of_its_own() {
+        let model = |a, b, joined| Mechanics::<_, f64>::new(Two, vec![a, b, joined]);
+        let q = [1.0, 0.3, -0.4, 0.8, 0.2, -1.1, 0.7, 0.5];
+        let found = mass_matrix_error(&model(1.0, 1.0, 0.0), &model(2.0, -1e-7, 0.0), &q);
+        assert!((found.factor - 0.5).abs() < 1e-12 && found.groups == 2 && found.error.max < 1e-12, "{found:?}");
+        let joined = mass_matrix_error(&model(1.0, 1.0, 0.1), &model(2.0, 0.2, 0.1), &q);
+        assert!(joined.groups == 1 && joined.error.median > 0.3, "{joined:?}");
     }
 
     /// `L = sum_i m_i v_i^2 / 2`, the first mass of the sign of `q_0`.

@@ -178,7 +178,7 @@ mod tests {
             let rate = [normal(), 10.0 * normal()];
             let measured: Vec<f64> = times.iter().flat_map(|t| rate.map(|r| r * t * t)).collect();
             let predicted = vec![0.0; measured.len()];
-            (Window { q: vec![0.0; 2], v: vec![0.0; 2], times, measured, force: None }, predicted)
+            (Window { q: vec![0.0; 2], v: vec![0.0; 2], lead: 0.0, times, measured, force: None }, predicted)
         };
         (0..count).map(|_| one()).unzip()
     }

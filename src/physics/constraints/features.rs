@@ -35,7 +35,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// Monomials of the coordinates up to a degree, the constant last.
+    /// Monomials of the coordinates that move up to a degree, the constant last.
     pub fn of_positions(samples: &MotionSamples, degree: usize) -> Self {
         let mut features = Self::without_terms(samples);
         let monomials = features.monomials(degree);
@@ -43,18 +43,19 @@ impl Features {
         features.written(samples)
     }
 
-    /// Velocities times monomials of the coordinates up to a degree, then such monomials alone.
+    /// Velocities times monomials of the coordinates that move up to a degree, then such monomials alone.
     pub fn of_velocities(samples: &MotionSamples, degree: usize) -> Self {
         let mut features = Self::without_terms(samples);
         let monomials = features.monomials(degree);
-        for velocity in (0..samples.n()).map(Some).chain([None]) {
+        for velocity in (0..samples.n()).filter(|&i| samples.moves(i)).map(Some).chain([None]) {
             features.terms.extend(monomials.iter().map(|powers| Term { powers: powers.clone(), velocity }));
         }
         features.written(samples)
     }
 
     fn without_terms(samples: &MotionSamples) -> Self {
-        let variables = samples.periodic().iter().enumerate().flat_map(|(i, &periodic)| {
+        let moving = samples.periodic().iter().enumerate().filter(|(i, _)| samples.moves(*i));
+        let variables = moving.flat_map(|(i, &periodic)| {
             let functions: &[Function] =
                 if periodic { &[Function::Sine, Function::Cosine] } else { &[Function::Plain] };
             functions.iter().map(move |&function| (i, function))
@@ -145,6 +146,12 @@ impl Features {
     /// `true` for terms of velocities one of whose weights belongs to a term without.
     pub fn has_rate(&self, weights: &[f64]) -> bool {
         self.terms.iter().zip(weights).any(|(term, &weight)| term.velocity.is_none() && weight != 0.0)
+    }
+
+    /// Coordinates in the terms of a combination, some more than once.
+    pub fn coordinates(&self, weights: &[f64]) -> impl Iterator<Item = usize> + '_ {
+        let used: Vec<usize> = (0..self.terms.len()).filter(|&term| weights[term] != 0.0).collect();
+        used.into_iter().flat_map(|term| self.terms[term].powers.iter().map(|&(k, _)| self.variables[k].0))
     }
 
     /// Values of the variables and their derivatives by their coordinates.

@@ -3,6 +3,7 @@
 use super::features::Features;
 use super::pencil::{Moments, Pencil};
 use super::{ConstraintKind, FoundConstraint, MotionSamples};
+use crate::cancellation::Cancellation;
 use crate::linalg::{Workspace, dot, solve};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -31,6 +32,33 @@ const UNDETERMINED: f64 = 0.3;
 /// Quantile of Student's distribution for 95 %, 7 degrees of freedom, as of eight parts.
 const STUDENT: f64 = 2.365;
 
+/// Ratios of variances up to which a combination vanishes, and up to which it does so within the noise.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Up to this it vanishes.
+    pub taken: f64,
+    /// Up to this nothing but noise is left of it. The ratio of noise alone has the scatter `sqrt(2/N)`, `N` the samples whose noise is
+    /// independent; the noise itself is known from differences, to about `sqrt(6/N)`.
+    pub within: f64,
+}
+
+/// Standard deviations of a ratio of variances that noise alone reaches.
+const DEVIATIONS: f64 = 3.0;
+
+impl Limits {
+    /// Of functions of positions, or of rows whose velocities were measured.
+    pub fn of(samples: &MotionSamples) -> Self {
+        let (count, independent) = (samples.len().max(1) as f64, samples.independent().max(1.0));
+        let scatter = (2.0 / independent + 6.0 / count).sqrt();
+        Self { taken: TAKEN * samples.slack(), within: samples.slack() * (1.0 + DEVIATIONS * scatter) }
+    }
+
+    /// Of rows whose velocities come from smoothing: how large their errors are is not known as well.
+    pub fn of_smoothed() -> Self {
+        Self { taken: TAKEN, within: TAKEN }
+    }
+}
+
 /// A combination that vanishes.
 #[derive(Clone, Debug)]
 pub struct Generator {
@@ -43,6 +71,10 @@ pub struct Generator {
     ratio: f64,
     /// Whether it vanishes on every part of the data by what the others say.
     pub holds: bool,
+    /// Whether nothing but noise is left of it.
+    pub within: bool,
+    /// Root mean square length of its gradient by the coordinates.
+    size: f64,
 }
 
 /// Terms with their factors.
@@ -52,11 +84,13 @@ type Combination = Vec<(usize, f64)>;
 /// leading term divides are left out of higher degrees.
 pub struct Vanishing<'a> {
     features: &'a Features,
+    cancellation: &'a Cancellation,
     moments: Moments,
     whole: Pencil,
     centred: bool,
     /// Samples whose errors are independent.
     independent: f64,
+    limits: Limits,
     levels: Vec<Level>,
     /// Leading terms of what vanishes.
     leading: Vec<usize>,
@@ -77,21 +111,23 @@ impl<'a> Vanishing<'a> {
     /// Looks for combinations that vanish, beside those that are `known` to, or `centred`, that are constant along each trajectory; of
     /// `shared` samples the errors are as one.
     pub fn of(
-        samples: &MotionSamples,
+        samples: &'a MotionSamples,
         features: &'a Features,
         known: Option<&Vanishing<'_>>,
         centred: bool,
-        shared: f64,
+        (shared, limits): (f64, Limits),
     ) -> Self {
         let p = features.len();
         let moments = Moments::of(samples, features, if p > 300 { 4 } else { 8 });
         let whole = moments.pencil(centred, |_| true);
         let independent = samples.len() as f64 / shared;
         let (levels, leading) = (Vec::new(), Vec::new());
-        let mut found = Self { features, moments, whole, centred, independent, levels, leading };
+        let cancellation = &samples.cancellation;
+        let mut found = Self { features, cancellation, moments, whole, centred, independent, limits, levels, leading };
         let highest = (0..p).map(|term| features.degree(term)).max().unwrap_or(0);
         // The product of a constant and of another function is not constant: there is one level.
-        for degree in if centred { highest..=highest } else { 0..=highest } {
+        let degrees = if centred { highest..=highest } else { 0..=highest };
+        for degree in degrees.take_while(|_| cancellation.go_on()) {
             let left = |&term: &usize| {
                 let follows =
                     || known.is_some_and(|known| known.divides(features, term)) || found.divides(features, term);
@@ -113,7 +149,7 @@ impl<'a> Vanishing<'a> {
     /// What vanishes of some terms.
     fn level(&self, terms: Vec<usize>, degree: i32) -> Level {
         let (ratios, combinations) = self.whole.on(&terms).solve();
-        let count = ratios.iter().filter(|ratio| **ratio <= TAKEN).count();
+        let count = ratios.iter().filter(|ratio| **ratio <= self.limits.taken).count();
         let largest = if count > 0 { ratios[count - 1].max(1.0) } else { 1.0 };
         let gap = ratios.get(count).map(|next| (next / largest).sqrt());
         let count = if gap.is_some_and(|gap| gap < LEAST_GAP) { 0 } else { count };
@@ -133,21 +169,24 @@ impl<'a> Vanishing<'a> {
     }
 
     /// Combinations with the terms that they need, simple ones first: a basis, none of which follows from the others, and
-    /// combinations of few terms.
-    pub fn generators(&self) -> Vec<Generator> {
+    /// combinations of few terms. Also whether all of these were looked for.
+    pub fn generators(&self) -> (Vec<Generator>, bool) {
         let mut supports: Vec<Vec<usize>> = Vec::new();
         for level in &self.levels {
-            for support in level.basis().chain(level.sparse()) {
-                let support = needed(&self.whole, support, self.independent);
+            let combinations = level.basis().chain(level.sparse(self.cancellation));
+            for support in combinations.take_while(|_| self.cancellation.go_on()) {
+                let support = needed(&self.whole, support, self.independent, self.limits.taken);
                 if !supports.contains(&support) {
                     supports.push(support);
                 }
             }
         }
-        let fit = |support: &Vec<usize>| fitted(&self.moments, self.features, support, self.centred);
-        let mut found: Vec<Generator> = supports.iter().map(fit).filter(Generator::is_determined).collect();
+        let go_on = |_: &&Vec<usize>| self.cancellation.go_on();
+        let fit = |support: &Vec<usize>| fitted(&self.moments, self.features, support, self.centred, self.limits);
+        let mut found: Vec<Generator> =
+            supports.iter().take_while(go_on).map(fit).filter(Generator::is_determined).collect();
         found.sort_by_key(|generator| (generator.degree(self.features), generator.terms().count()));
-        found
+        (found, self.levels.iter().all(Level::is_searched))
     }
 }
 
@@ -160,14 +199,26 @@ impl Level {
         })
     }
 
-    /// For single terms at the factor 1 combinations of few terms, those with a small `sum log |c_k|`: by least squares whose weights
-    /// `1 / (c_k^2 + eps^2)` are of the factors before (Candès, Wakin and Boyd 2008), from random weights at first.
-    fn sparse(&self) -> Vec<Combination> {
+    /// Starts of the search for combinations of few terms, of as many as are wanted.
+    fn starts(&self) -> [usize; 2] {
         let (size, count) = (self.rows.len(), self.terms.len());
         let once = REWEIGHTED * size * size * (count + size);
+        [(WORK / once.max(1)).min(FORMS * count), FORMS * count]
+    }
+
+    /// `true` if the search takes all the starts that are wanted.
+    fn is_searched(&self) -> bool {
+        let [taken, wanted] = self.starts();
+        taken == wanted
+    }
+
+    /// For single terms at the factor 1 combinations of few terms, those with a small `sum log |c_k|`: by least squares whose weights
+    /// `1 / (c_k^2 + eps^2)` are of the factors before (Candès, Wakin and Boyd 2008), from random weights at first.
+    fn sparse(&self, cancellation: &Cancellation) -> Vec<Combination> {
+        let (size, count) = (self.rows.len(), self.terms.len());
         let (mut rng, mut workspace) = (ChaCha8Rng::seed_from_u64(0), Workspace::new());
         let (mut found, mut known) = (Vec::new(), BTreeSet::new());
-        for lead in (0..count).cycle().take((WORK / once.max(1)).min(FORMS * count)) {
+        for lead in (0..count).cycle().take(self.starts()[0]).take_while(|_| cancellation.go_on()) {
             let column: Vec<f64> = self.rows.iter().map(|row| row[lead]).collect();
             let mut weights: Vec<f64> = (0..count).map(|_| rng.random_range(-6.0..0.0f64).exp()).collect();
             let mut factors = vec![0.0; count];
@@ -199,7 +250,7 @@ impl Level {
 }
 
 /// Reduced row echelon form with the largest pivots, times the preference of their columns; returns the column of each row's pivot.
-fn reduce(rows: &mut [Vec<f64>], preference: &[f64]) -> Vec<usize> {
+pub fn reduce(rows: &mut [Vec<f64>], preference: &[f64]) -> Vec<usize> {
     let mut pivots = vec![usize::MAX; rows.len()];
     for _ in 0..rows.len() {
         let mut best = (0.0, 0, 0);
@@ -233,11 +284,11 @@ fn smallest(pencil: &Pencil, support: &[usize]) -> Option<(f64, Vec<f64>)> {
 }
 
 /// The terms that a combination needs.
-fn needed(pencil: &Pencil, mut support: Combination, independent: f64) -> Vec<usize> {
+fn needed(pencil: &Pencil, mut support: Combination, independent: f64, taken: f64) -> Vec<usize> {
     let terms = |support: &[(usize, f64)]| support.iter().map(|(term, _)| *term).collect::<Vec<_>>();
     let all: Vec<f64> = support.iter().map(|(_, weight)| *weight).collect();
     let start = pencil.on(&terms(&support)).ratio(&all);
-    let allowed = (start + RISE / independent * start.max(1.0)).min(TAKEN);
+    let allowed = (start + RISE / independent * start.max(1.0)).min(taken);
     let most = |support: &[(usize, f64)]| support.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
     let mut refit = |fewer: Combination| -> Option<Combination> {
         let (ratio, weights) = smallest(pencil, &terms(&fewer)).filter(|_| !fewer.is_empty())?;
@@ -267,7 +318,7 @@ fn needed(pencil: &Pencil, mut support: Combination, independent: f64) -> Vec<us
 }
 
 /// Factors of the needed terms with their ranges, by leaving parts of the data out (jackknife).
-fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bool) -> Generator {
+fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bool, limits: Limits) -> Generator {
     let folds = moments.folds();
     let fit = |pencil: &Pencil| {
         let (ratio, scaled) = smallest(pencil, support)?;
@@ -281,17 +332,19 @@ fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bo
         spread: vec![0.0; features.len()],
         ratio: f64::INFINITY,
         holds: true,
+        within: false,
+        size: 0.0,
     };
     let Some((ratio, _, raw)) = fit(&moments.pencil(centred, |_| true)) else { return generator };
     let lead = leading(features, support, &raw);
     let weights = over(raw, lead);
-    (generator.ratio, generator.lead) = (ratio, support[lead]);
+    (generator.ratio, generator.lead, generator.within) = (ratio, support[lead], ratio <= limits.within);
     let mut squares = vec![0.0; support.len()];
     for part in 0..folds {
         let Some((_, scaled, raw)) = fit(&moments.pencil(centred, |other| other != part)) else { continue };
         let left_out = moments.pencil(centred, |other| other == part).on(support);
         let others = over(raw, lead);
-        generator.holds &= left_out.ratio(&scaled) <= HOLDS;
+        generator.holds &= left_out.ratio(&scaled) <= HOLDS * limits.taken / TAKEN;
         squares.iter_mut().zip(others.iter().zip(&weights)).for_each(|(sum, (a, b))| *sum += (a - b) * (a - b));
     }
     for ((&term, weight), square) in support.iter().zip(weights).zip(squares) {
@@ -314,6 +367,21 @@ impl Generator {
     /// The terms that it has.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.weights.len()).filter(|&term| self.weights[term] != 0.0)
+    }
+
+    /// Root mean square length of its gradient by the coordinates, once it was measured.
+    pub fn size(&self) -> f64 {
+        self.size
+    }
+
+    /// The same with the length of its gradient at some samples.
+    pub fn sized(self, samples: &MotionSamples, features: &Features, places: &[usize]) -> Self {
+        let square = |&at: &usize| {
+            let row = features.gradient(samples, at, &self.weights);
+            dot(&row, &row)
+        };
+        let size = (places.iter().map(square).sum::<f64>() / places.len().max(1) as f64).sqrt();
+        Self { size, ..self }
     }
 
     /// `false` if several vanish that have these terms alone, so that parts of the data have others.
@@ -355,7 +423,7 @@ impl Generator {
 }
 
 /// A positive number with the digits that its spread leaves.
-fn digits(value: f64, spread: f64) -> String {
+pub fn digits(value: f64, spread: f64) -> String {
     // Beyond this the data say nothing, whatever their scatter.
     let spread = spread.max(1e-11 * value);
     if spread == 0.0 {

@@ -7,10 +7,12 @@
 //! simplest first, each reduced to the terms that it needs. The same with `monomials(q) v_i`, beside what follows from the former, gives the
 //! rows that are linear in the velocities; Frobenius' condition tells those that a function of the coordinates stands behind.
 
+mod colour;
 mod examine;
 mod features;
 mod generators;
 mod pencil;
+mod regular;
 mod samples;
 #[cfg(test)]
 mod tests;
@@ -19,10 +21,12 @@ mod tests;
 pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
 pub use samples::MotionSamples;
 
+use crate::cancellation::Cancelled;
 use crate::lagrangian::{ReducedMass, take_out};
 use crate::linalg::{Workspace, dot, eigh};
 use features::Features;
-use generators::{Generator, Vanishing};
+use generators::{Generator, Limits, Vanishing};
+use regular::{branching, phases};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -74,6 +78,18 @@ pub enum ConstraintKind {
     Nonholonomic,
     /// A function of the coordinates that is constant along each trajectory, with a constant of its own: conserved, not imposed.
     PerTrajectory,
+    /// A function or a row that nearly vanishes, by more than the noise explains: a stiff spring, an arc that looks straight. No constraint.
+    Nearly,
+    /// A function that vanishes with its gradient somewhere along the motion, or whose gradient follows from others there: a second branch
+    /// begins, and it does not say which of the two the motion takes. No constraint to compute with.
+    Branching,
+}
+
+impl ConstraintKind {
+    /// `true` for what holds the motion of the system.
+    pub fn is_imposed(self) -> bool {
+        matches!(self, Self::Holonomic | Self::Nonholonomic)
+    }
 }
 
 /// A constraint that was found.
@@ -107,13 +123,17 @@ pub struct FoundConstraints {
     pub refuted: usize,
     /// Noise of each coordinate over its size: smaller deviations are not seen.
     pub noise: Vec<f64>,
+    /// Columns that do not move, in words; they take no part.
+    pub still: BTreeMap<String, String>,
+    /// Where the search was cut short, in words.
+    pub limits: Vec<String>,
 }
 
 impl FoundConstraints {
     /// Formulas of the constraints of the system by name, as a table `[constraints]` has them; what each trajectory conserves by itself
     /// is none.
     pub fn formulas(&self) -> BTreeMap<String, String> {
-        let of_system = self.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
+        let of_system = self.constraints.iter().filter(|found| found.kind.is_imposed());
         of_system.enumerate().map(|(k, found)| (format!("found {}", k + 1), found.formula.clone())).collect()
     }
 }
@@ -122,6 +142,9 @@ impl FoundConstraints {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintSearchError {
+    /// The search was ended from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// More terms than are looked at.
     #[error("{what} makes {found} terms, at most {MOST_TERMS} are looked at together")]
     Terms {
@@ -152,9 +175,21 @@ pub fn find_constraints(
 ) -> Result<FoundConstraints, ConstraintSearchError> {
     let of_positions = Features::of_positions(samples, search.degree);
     // Of many coordinates as many as there is room for.
-    let of_velocities = (0..=search.velocity_degree).rev().map(|degree| Features::of_velocities(samples, degree));
-    let of_velocities = of_velocities.into_iter().find(|features| features.len() <= MOST_TERMS);
-    let of_velocities = of_velocities.unwrap_or_else(|| Features::of_velocities(samples, 0));
+    let (degree, of_velocities) = (0..=search.velocity_degree)
+        .rev()
+        .map(|degree| (degree, Features::of_velocities(samples, degree)))
+        .find(|(_, features)| features.len() <= MOST_TERMS)
+        .unwrap_or_else(|| (0, Features::of_velocities(samples, 0)));
+    let mut cut_short = Vec::new();
+    if degree < search.velocity_degree {
+        let asked = search.velocity_degree;
+        cut_short.push(format!(
+            "factors of velocities were looked for up to degree {degree} alone, not {asked}: more than {MOST_TERMS} terms"
+        ));
+    }
+    if samples.stride() > 1 {
+        cut_short.push(format!("one sample in {} was looked at", samples.stride()));
+    }
     for (what, features) in [("the degree", &of_positions), ("the degree of velocities", &of_velocities)] {
         let found = features.len();
         if found > MOST_TERMS {
@@ -166,37 +201,68 @@ pub fn find_constraints(
         }
     }
     let mut held = RowsTaken::at(samples, PLACES);
-    let vanishing = Vanishing::of(samples, &of_positions, None, false, 1.0);
-    let candidates = vanishing.generators();
+    let stop = &samples.cancellation;
+    stop.stage("functions that vanish");
+    let limits = Limits::of(samples);
+    let vanishing = Vanishing::of(samples, &of_positions, None, false, (1.0, limits));
+    let (candidates, all_forms) = vanishing.generators();
+    if !all_forms {
+        cut_short.push("the search for forms of few terms was cut short: simpler ones may exist".to_string());
+    }
+    stop.check()?;
     let functions = held.take(samples, &of_positions, candidates.clone(), false, IMPOSED);
+    let gap = vanishing.gap(&functions);
     let functions = independent_everywhere(samples, &of_positions, functions, candidates);
+    stop.check()?;
+    let places = samples.places(MANY_PLACES);
+    let functions: Vec<Generator> =
+        functions.into_iter().map(|found| found.sized(samples, &of_positions, &places)).collect();
+    let (of_angles, functions) = phases(samples, &of_positions, limits, &functions);
+    let second_branch = branching(samples, &of_positions, &functions);
+    stop.stage("functions that are constant");
     let conserved = if samples.trajectories() > 1 {
-        let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, 1.0);
-        held.take(samples, &of_positions, constant.generators(), false, BESIDE)
+        let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, (1.0, limits));
+        held.take(samples, &of_positions, constant.generators().0, false, BESIDE)
     } else {
         Vec::new()
     };
     let by_functions = held.bases.clone();
-    let moving = Vanishing::of(samples, &of_velocities, Some(&vanishing), false, samples.shared());
-    let moving = held.take(samples, &of_velocities, moving.generators(), true, BESIDE);
+    stop.check()?;
+    stop.stage("rows of velocities");
+    let of_rows = if samples.measured() { limits } else { Limits::of_smoothed() };
+    let moving = Vanishing::of(samples, &of_velocities, Some(&vanishing), false, (samples.shared(), of_rows));
+    let moving = held.take(samples, &of_velocities, moving.generators().0, true, BESIDE);
+    stop.check()?;
     let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
     let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
-    let mut constraints = Vec::new();
-    for (kind, found) in [(ConstraintKind::Holonomic, &functions), (ConstraintKind::PerTrajectory, &conserved)] {
-        constraints.extend(found.iter().map(|generator| generator.described(&of_positions, kind)));
+    let mut constraints = of_angles;
+    for (generator, second_branch) in functions.iter().zip(second_branch) {
+        let kind = match (generator.within, second_branch) {
+            (false, _) => ConstraintKind::Nearly,
+            (true, true) => ConstraintKind::Branching,
+            (true, false) => ConstraintKind::Holonomic,
+        };
+        constraints.push(generator.described(&of_positions, kind));
     }
+    constraints.extend(conserved.iter().map(|found| found.described(&of_positions, ConstraintKind::PerTrajectory)));
     for (generator, integrable) in moving.iter().zip(integrable) {
-        let kind = if integrable { ConstraintKind::PerTrajectory } else { ConstraintKind::Nonholonomic };
+        let kind = match (integrable, generator.within) {
+            (true, _) => ConstraintKind::PerTrajectory,
+            (false, true) => ConstraintKind::Nonholonomic,
+            (false, false) => ConstraintKind::Nearly,
+        };
         constraints.push(generator.described(&of_velocities, kind));
     }
-    let count = constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory).count();
+    let count = constraints.iter().filter(|found| found.kind.is_imposed()).count();
     Ok(FoundConstraints {
         count,
         constraints,
-        gap: vanishing.gap(&functions),
+        gap,
         trajectories: samples.trajectories(),
         refuted: held.refuted,
         noise: samples.relative_noise(),
+        still: samples.still(),
+        limits: cut_short,
     })
 }
 

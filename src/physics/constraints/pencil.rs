@@ -51,6 +51,10 @@ impl Moments {
             let (fold, length) = (&mut parts[part], piece.len().max(1));
             mean.fill(0.0);
             for at in piece {
+                // What is summed up by then is finite, but of no use.
+                if fold.samples > 0.0 && !samples.cancellation.go_on() {
+                    break;
+                }
                 features.evaluate(samples, at, &mut values, &mut slopes);
                 fold.samples += 1.0;
                 for i in 0..p {

@@ -1,10 +1,16 @@
 //! States of recorded motion with their noise.
 
+use super::colour::Colour;
+use crate::cancellation::Cancellation;
+use crate::names::number;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
+use std::collections::BTreeMap;
 
 /// Most samples that are looked at, evenly spaced.
 const MOST_SAMPLES: usize = 60_000;
+/// A column moves if it scatters along some trajectory by more than so many standard deviations of its noise.
+const MOVES: f64 = 1.2;
 
 /// Positions and velocities of trajectories, with standard deviations of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,6 +26,17 @@ pub struct MotionSamples {
     starts: Vec<usize>,
     /// Samples whose velocities have errors of their own, as one to so many.
     shared: f64,
+    /// Ends a search in them.
+    pub(super) cancellation: Cancellation,
+    /// Samples whose positions have errors of their own, as one to so many, and how much larger the variance of their noise may be.
+    alike: f64,
+    slack: f64,
+    /// Columns that do not move, with how they are.
+    still: Vec<(usize, String)>,
+    /// Samples of the recording to each that is looked at.
+    stride: usize,
+    /// `true` if velocities were measured, with noise that is known.
+    measured: bool,
 }
 
 impl MotionSamples {
@@ -31,7 +48,10 @@ impl MotionSamples {
         let n = recording.n();
         let smoothing = Smoothing::choose(recording, options)?;
         let measured = recording.tracks.iter().all(|track| !track.v.is_empty());
-        let position_noise = smoothing.coordinates.iter().map(|chosen| chosen.noise.sigma).collect();
+        let white = smoothing.coordinates.iter().map(|chosen| chosen.noise).enumerate();
+        let colours: Vec<Colour> = white.map(|(i, noise)| Colour::of(&recording.tracks, n, i, noise)).collect();
+        let position_noise: Vec<f64> = colours.iter().map(|colour| colour.sigma).collect();
+        let largest = |of: &dyn Fn(&Colour) -> f64| colours.iter().map(of).fold(1.0, f64::max);
         let of_velocities: Vec<f64> =
             smoothing.coordinates.iter().map(|chosen| chosen.velocity_noise.map_or(0.0, |noise| noise.sigma)).collect();
         let mut samples = Self {
@@ -39,9 +59,15 @@ impl MotionSamples {
             periodic: recording.periodic.clone(),
             position_noise,
             shared: if measured { 1.0 } else { smoothing.window() as f64 },
+            alike: largest(&|colour| colour.shared()),
+            slack: largest(&|colour| colour.slack),
+            measured,
             ..Self::default()
         };
+        let moves = |i: usize| standing(recording, i, smoothing.coordinates[i].noise.resolved, colours[i]);
+        samples.still = (0..n).filter_map(|i| Some((i, moves(i)?))).collect();
         let stride = recording.samples().div_ceil(MOST_SAMPLES).max(1);
+        samples.stride = stride;
         for track in &recording.tracks {
             let smoothed = if measured { None } else { smoothing.apply(track).ok() };
             samples.starts.push(samples.len());
@@ -78,8 +104,13 @@ impl MotionSamples {
             periodic: recording.periodic.clone(),
             position_noise: vec![0.0; n],
             shared: 1.0,
+            alike: 1.0,
+            slack: 1.0,
+            stride: 1,
+            measured: true,
             ..Self::default()
         };
+        samples.still = (0..n).filter_map(|i| Some((i, standing(recording, i, false, Colour::default())?))).collect();
         for track in recording.tracks.iter().filter(|track| !track.is_empty()) {
             if [track.q.len(), track.v.len()] != [track.len() * n; 2] {
                 return Err(SmoothError::Shape { track: track.name.clone(), n });
@@ -91,6 +122,12 @@ impl MotionSamples {
             }
         }
         Ok(samples)
+    }
+
+    /// The same, a search in which is ended by `cancellation` and reports to it.
+    #[must_use]
+    pub fn watched(self, cancellation: &Cancellation) -> Self {
+        Self { cancellation: cancellation.clone(), ..self }
     }
 
     /// Number of coordinates.
@@ -108,6 +145,30 @@ impl MotionSamples {
     /// Samples that count as one where errors are shared.
     pub(super) fn shared(&self) -> f64 {
         self.shared
+    }
+    /// Samples whose noise is independent, about.
+    pub(super) fn independent(&self) -> f64 {
+        self.len() as f64 / self.alike.max(1.0)
+    }
+    /// Largest variance of the noise that the recording allows, over that which is taken.
+    pub(super) fn slack(&self) -> f64 {
+        self.slack
+    }
+    /// `true` if the noise of velocities is known as well as that of positions.
+    pub(super) fn measured(&self) -> bool {
+        self.measured
+    }
+    /// `true` for a column that moves.
+    pub(super) fn moves(&self, i: usize) -> bool {
+        self.still.iter().all(|(still, _)| *still != i)
+    }
+    /// Columns that do not move, in words.
+    pub(super) fn still(&self) -> BTreeMap<String, String> {
+        self.still.iter().map(|(i, how)| (self.names[*i].clone(), how.clone())).collect()
+    }
+    /// Samples of the recording to each that is looked at.
+    pub(super) fn stride(&self) -> usize {
+        self.stride
     }
     pub(super) fn names(&self) -> &[String] {
         &self.names
@@ -145,4 +206,25 @@ impl MotionSamples {
             })
             .collect()
     }
+}
+
+/// How a column stands still; none for one that moves. One that keeps a value along every trajectory says nothing of a constraint, nor does one
+/// that is all noise: its sensor may be off.
+fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> Option<String> {
+    let (n, mut square, mut count, mut constant) = (recording.n(), 0.0, 0.0, true);
+    for track in &recording.tracks {
+        let values = || track.q.iter().skip(i).step_by(n);
+        let samples = values().count() as f64;
+        let mean = values().map(|x| x / samples).sum::<f64>();
+        square += values().map(|x| (x - mean).powi(2)).sum::<f64>();
+        count += samples;
+        constant &= values().all(|x| Some(x) == values().next());
+    }
+    let first = recording.tracks.iter().find_map(|track| track.q.get(i))?;
+    if constant {
+        return Some(format!("is constant, {} at first: it does not move, or its sensor is off", number(*first)));
+    }
+    // A mean takes part of the noise that neighbours share.
+    let still = resolved && square <= MOVES * MOVES * noise.sigma.powi(2) * noise.slack * count;
+    still.then(|| format!("does not move beyond its noise of {}", number(noise.sigma)))
 }

@@ -102,10 +102,10 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     let recording = recorded(&names, &[false; 9], 0.001, false, &mut |rng| rotation(rng));
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
     let features = Features::of_positions(&samples, 2);
-    let vanishing = Vanishing::of(&samples, &features, None, false, 1.0);
+    let vanishing = Vanishing::of(&samples, &features, None, false, (1.0, Limits::of(&samples)));
     let mut held = RowsTaken::at(&samples, PLACES);
-    let simplest = held.take(&samples, &features, vanishing.generators(), false, IMPOSED);
-    let taken = independent_everywhere(&samples, &features, simplest.clone(), vanishing.generators());
+    let simplest = held.take(&samples, &features, vanishing.generators().0, false, IMPOSED);
+    let taken = independent_everywhere(&samples, &features, simplest.clone(), vanishing.generators().0);
     assert_eq!((simplest.len(), taken.len()), (6, 6));
     // Orthonormal columns of unit gradients at a turn about the vertical.
     let least = |generators: &[Generator], angle: f64| {
@@ -261,4 +261,89 @@ fn too_few_samples_and_too_many_terms_are_refused() {
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
     let few = find_constraints(&samples, ConstraintSearch { degree: 4, velocity_degree: 1 });
     assert!(matches!(few, Err(ConstraintSearchError::Samples { terms: 70, .. })), "{few:?}");
+}
+
+/// A rod of 1 whose angle swings.
+fn rod(rng: &mut ChaCha8Rng) -> impl Fn(f64) -> (f64, f64) + 'static {
+    let [a, da, w]: [f64; 3] = [0; 3].map(|_| 2.0 * rng.random::<f64>() - 1.0);
+    move |t| (3.0 * a + 2.0 * da * t + (1.5 * t + w).sin()).sin_cos()
+}
+
+#[test]
+fn a_column_that_stands_still_says_nothing_of_a_constraint() {
+    for noise in [0.0, 0.01] {
+        let mut motion = |rng: &mut ChaCha8Rng| -> Path {
+            let rod = rod(rng);
+            Box::new(move |t| (vec![rod(t).0, -rod(t).1, 0.3], vec![]))
+        };
+        let found = found(&recorded(&["x", "y", "z"], &[false; 3], noise, false, &mut motion));
+        assert_eq!((found.count, found.constraints.len()), (1, 1), "{noise}: {found:?}");
+        assert_eq!(found.still.keys().collect::<Vec<_>>(), ["z"], "{noise}");
+        assert!(!found.constraints[0].formula.contains('z'));
+    }
+    // All of them are noise.
+    let mut still = |_: &mut ChaCha8Rng| -> Path { Box::new(|_| (vec![0.3, -1.0], vec![])) };
+    let found = found(&recorded(&["x", "y"], &[false; 2], 0.01, false, &mut still));
+    assert_eq!((found.count, found.constraints.len(), found.still.len()), (0, 0, 2), "{found:?}");
+}
+
+#[test]
+fn what_stretches_by_more_than_the_noise_is_nearly_a_constraint() {
+    let kinds = |stretch: f64| {
+        let mut motion = |rng: &mut ChaCha8Rng| -> Path {
+            let rod = rod(rng);
+            Box::new(move |t| {
+                let (length, (sin, cos)) = (1.0 + stretch * (2.3 * t).sin(), rod(t));
+                (vec![length * sin, -length * cos], vec![])
+            })
+        };
+        let found = found(&recorded(&["x", "y"], &[false; 2], 0.01, false, &mut motion));
+        assert_eq!(found.count, found.formulas().len());
+        found.constraints.iter().map(|c| c.kind).collect::<Vec<_>>()
+    };
+    // A root mean square stretch of 1.6 of the noise, and one of a tenth.
+    assert_eq!(kinds(0.01 * 1.6 * 2f64.sqrt()), [ConstraintKind::Nearly]);
+    assert_eq!(kinds(0.01 * 0.1), [ConstraintKind::Holonomic]);
+}
+
+#[test]
+fn wheels_that_are_geared_are_held_by_the_sine_of_their_difference() {
+    for noise in [0.0, 0.01] {
+        let mut motion = |rng: &mut ChaCha8Rng| -> Path {
+            let [start, rate]: [f64; 2] = [0; 2].map(|_| 6.0 * rng.random::<f64>() - 3.0);
+            Box::new(move |t| {
+                let a = start + rate * t;
+                (vec![a, 2.0 * a + 0.3], vec![])
+            })
+        };
+        let found = found(&recorded(&["a", "b"], &[true; 2], noise, false, &mut motion));
+        let gear = &found.constraints[0];
+        assert_eq!((found.count, found.constraints.len(), gear.kind), (1, 1, ConstraintKind::Holonomic), "{found:?}");
+        let of = |name: &str| gear.coefficients[name];
+        assert!(
+            gear.formula.starts_with("sin(2*a - b + 0.3") || gear.formula.starts_with("sin(2*a - b + 0.29"),
+            "{gear:?}"
+        );
+        assert!((of("a"), of("b")) == (2.0, -1.0) && (of("1") - 0.3).abs() < 2e-3, "{gear:?}");
+        let [low, high] = gear.range["1"];
+        assert!(low <= 0.3 + 1e-9 && 0.3 - 1e-9 <= high, "{gear:?}");
+    }
+}
+
+/// A bead on a figure eight passes through its crossing, where the gradient vanishes.
+#[test]
+fn a_curve_that_crosses_itself_on_the_way_is_no_constraint_to_compute_with() {
+    let mut motion = |rng: &mut ChaCha8Rng| -> Path {
+        let [start, rate]: [f64; 2] = [0; 2].map(|_| 1.0 + 2.0 * rng.random::<f64>());
+        Box::new(move |t| {
+            let (sin, cos) = (start + rate * t).sin_cos();
+            (vec![cos, sin * cos], vec![])
+        })
+    };
+    // x^4 = x^2 - y^2
+    let recording = recorded(&["x", "y"], &[false; 2], 1e-4, false, &mut motion);
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
+    let found = find_constraints(&samples, ConstraintSearch { degree: 4, velocity_degree: 0 }).unwrap();
+    assert_eq!((found.count, found.formulas().len()), (0, 0), "{found:?}");
+    assert!(found.constraints.iter().any(|c| c.kind == ConstraintKind::Branching), "{found:?}");
 }

@@ -1,5 +1,6 @@
 //! Why no formula was looked for.
 
+use crate::cancellation::Cancelled;
 use crate::recording::smooth::SmoothError;
 use thiserror::Error;
 
@@ -7,6 +8,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FormulaError {
+    /// The search was ended from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// Too many coordinates, or none.
     #[error("expected 1 to {most} coordinates, found {found}")]
     Coordinates {
@@ -39,6 +43,67 @@ pub enum FormulaError {
         /// Terms of the formula.
         known: String,
     },
+    /// A coordinate that does not move, or moves as others do.
+    #[error("no law can be read off this motion: {coordinate} {how}; leave it out")]
+    Still {
+        /// The coordinate.
+        coordinate: String,
+        /// In which way it stands still.
+        how: String,
+    },
+    /// A coordinate that keeps its value but for a few large steps.
+    #[error(
+        "no law can be read off this motion: {coordinate} moves by steps, it keeps its value over {still} of {steps} intervals and jumps in others"
+    )]
+    Steps {
+        /// The coordinate.
+        coordinate: String,
+        /// Intervals without any motion.
+        still: usize,
+        /// All intervals.
+        steps: usize,
+    },
+    /// Rows that belong to no motion.
+    #[error(
+        "{coordinate} is {value:e} at t = {time} (sample {} of trajectory {}{}), {} by {size:.3e} where its motion has a range of {range:.3e}; {}",
+        sample + 1, track + 1, if trajectory.is_empty() { String::new() } else { format!(", {trajectory}") }, if *jumps { "it jumps there" } else { "it is off" },
+        if *places == 1 { "leave the row out or mend it".to_string() } else { format!("leave such rows out or mend them, there are {places}") }
+    )]
+    Wild {
+        /// The coordinate.
+        coordinate: String,
+        /// The trajectory, from 0.
+        track: usize,
+        /// The sample, from 0.
+        sample: usize,
+        /// Name of the trajectory.
+        trajectory: String,
+        /// Time of the sample.
+        time: f64,
+        /// Value there.
+        value: f64,
+        /// `true` if all later values are shifted, `false` for a single one.
+        jumps: bool,
+        /// By how much it is off.
+        size: f64,
+        /// Range of all but one sample in fifty.
+        range: f64,
+        /// Such places in all.
+        places: usize,
+    },
+    /// Motion under a constraint.
+    #[error(
+        "the coordinates are not independent, the motion keeps to {}: a Lagrangian of them is not determined; leave coordinates out or \
+         choose others (lnn constraints names what holds, lnn fit --constraints find learns under it)",
+        formulas.iter().map(|formula| format!("{formula} = 0")).collect::<Vec<_>>().join(" and ")
+    )]
+    Constrained {
+        /// What vanishes.
+        formulas: Vec<String>,
+    },
+    /// No choice of terms has a regular mass matrix.
+    #[error("every formula that meets the motion has a nearly singular mass matrix: the library holds no law of it")]
+    Singular,
     /// The motion cannot be smoothed.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
@@ -49,6 +114,14 @@ pub enum FormulaError {
         found: usize,
         /// Least number.
         needed: usize,
+    },
+    /// Too few stretches in which the motion changes.
+    #[error(
+        "the motion has fewer than two stretches of {seconds:.3} s without a long gap: record longer, or at a higher rate"
+    )]
+    Stretches {
+        /// Their length.
+        seconds: f64,
     },
     /// A model's terms are not finite at any state.
     #[error("the terms of the model are not finite at {failed} of {states} states")]

@@ -3,9 +3,10 @@
 use super::error::FormulaError;
 use super::find::FormulaOptions;
 use super::function::Notation;
-use super::library::Library;
+use super::library::{Library, blocks};
 use super::motion::Model;
 use super::units::{Dimension, Units, of_coefficient};
+use crate::identification::Between;
 use crate::identification::linear::{inverse, part};
 use crate::linalg::dot;
 use serde::Serialize;
@@ -19,6 +20,18 @@ pub enum Verdict {
     /// It does not.
     #[serde(rename = "not in the library")]
     NotInLibrary,
+    /// Residuals are small, but there is doubt whether they say anything.
+    #[serde(rename = "undecided")]
+    Undecided,
+}
+
+/// Another formula that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rival {
+    /// Its terms.
+    pub terms: Vec<String>,
+    /// What it costs more: its sum of squares in units of noise, and 30 for every term.
+    pub cost: f64,
 }
 
 /// A simple fraction near a coefficient.
@@ -49,6 +62,12 @@ pub struct FoundTerm {
     pub dissipation: bool,
     /// A simple fraction within the error of the coefficient, if there is one.
     pub near: Option<Near>,
+    /// Place of the term of its block whose coefficient is given, if there is one.
+    #[serde(skip)]
+    reference: Option<usize>,
+    /// Coordinates that it joins.
+    #[serde(skip)]
+    joined: Vec<usize>,
     #[serde(skip)]
     dimension: Option<Dimension>,
     #[serde(skip)]
@@ -93,11 +112,27 @@ pub struct FoundFormula {
     pub left: Vec<Left>,
     /// Terms searched, and how many of them were removed as total derivatives and identities.
     pub searched: (usize, usize),
+    /// Families of functions that it was found among.
+    pub basis: String,
+    /// All that were searched.
+    pub tried: Vec<String>,
+    /// Coordinates in groups that do not act on each other: without known forces each has a common factor of its own that is not determined.
+    pub blocks: Vec<Vec<String>>,
+    /// The next best formula; `several` if it is as good.
+    pub rival: Option<Rival>,
+    /// `true` if other formulas explain the motion as well.
+    pub several: bool,
+    /// Why the verdict is in doubt.
+    pub doubts: Vec<String>,
+    /// What else is to be known of the search.
+    pub notes: Vec<String>,
+    /// Known forces between the samples.
+    pub between: Option<Between>,
+    /// Coordinates with known forces.
+    pub(super) forced: Vec<bool>,
     pub(super) bounds: Vec<[f64; 2]>,
     pub(super) speeds: Vec<f64>,
     covariance: Vec<f64>,
-    /// The term whose coefficient is given.
-    reference: Option<usize>,
     /// Units of the coordinates, empty if they are not known, and of time.
     units: (Vec<String>, String),
 }
@@ -115,6 +150,14 @@ pub struct FormulaSummary<'a> {
     noise_resolved: bool,
     searched: usize,
     removed: usize,
+    basis: &'a str,
+    tried: &'a [String],
+    blocks: &'a [Vec<String>],
+    rival: Option<&'a Rival>,
+    several: bool,
+    doubts: &'a [String],
+    notes: &'a [String],
+    forces_between_samples: Option<Between>,
     left: &'a [Left],
     seed: u64,
 }
@@ -142,6 +185,8 @@ impl FoundFormula {
                     constant: String::new(),
                     unit: None,
                     near: None,
+                    reference: None,
+                    joined: library.coordinates(k),
                     dimension: units.of_term(library, k),
                     latex: library.written(k, Notation::Latex),
                     rust: library.written(k, Notation::Rust),
@@ -166,77 +211,110 @@ impl FoundFormula {
             noise_resolved: true,
             left: Vec::new(),
             searched: (library.searched, 0),
+            basis: String::new(),
+            tried: Vec::new(),
+            blocks: Vec::new(),
+            rival: None,
+            several: false,
+            doubts: Vec::new(),
+            notes: Vec::new(),
+            between: None,
+            forced: vec![false; library.n()],
             bounds: Vec::new(),
             speeds: Vec::new(),
             covariance,
-            reference: None,
             units: (options.units.clone(), options.time_unit.clone()),
         }
     }
 
-    /// Fixes the common factor: a term gets the coefficient that is given, or the first square of a velocity 1/2 or -1/2, with the sign
-    /// that makes most of the squares positive, since a time runs against the places.
+    /// Fixes the common factor of every block of coordinates that no known force gives it: a term gets the coefficient that is given, or
+    /// the first square of a velocity 1/2.
     pub(super) fn rescale(&mut self, scale: Option<&(String, f64)>) -> Result<(), FormulaError> {
         let plain = |text: &str| text.chars().filter(|c| !c.is_whitespace()).collect::<String>();
-        let (at, value) = match scale {
+        let given = match scale {
             Some((term, value)) => {
                 let at = self.terms.iter().position(|known| plain(&known.term) == plain(term));
                 let known = || self.terms.iter().map(|t| t.term.as_str()).collect::<Vec<_>>().join(", ");
-                (at.ok_or_else(|| FormulaError::Scale { term: term.clone(), known: known() })?, *value)
+                Some((at.ok_or_else(|| FormulaError::Scale { term: term.clone(), known: known() })?, *value))
             }
-            None => {
-                let square =
-                    |name: &String| self.terms.iter().position(|t| !t.dissipation && t.term == format!("{name}_dot^2"));
-                let first = self.coordinates.iter().find_map(square);
-                let signs = self
-                    .coordinates
-                    .iter()
-                    .filter_map(square)
-                    .map(|at| self.terms[at].coefficient.signum())
-                    .sum::<f64>();
-                let sign = first.map_or(1.0, |at| if signs * self.terms[at].coefficient < 0.0 { -1.0 } else { 1.0 });
-                (first.or(self.terms.iter().position(|t| !t.dissipation)).unwrap_or(0), 0.5 * sign)
-            }
+            None => None,
         };
-        let m = self.terms.len();
-        let Some(reference) = self.terms.get(at).map(|t| t.coefficient) else { return Ok(()) };
-        let factor = value / reference;
-        // Coefficients as ratios to the reference: the derivatives of x_k value / x_at.
-        let x: Vec<f64> = self.terms.iter().map(|t| t.coefficient).collect();
-        let slope = |k: usize, i: usize| {
-            f64::from(u8::from(i == k)) * factor - if i == at { x[k] * factor / reference } else { 0.0 }
-        };
-        let old = std::mem::take(&mut self.covariance);
-        let element = |k: usize, l: usize| -> f64 {
-            let pairs = [k, at].into_iter().flat_map(|i| [l, at].map(|j| (i, j)));
-            let mut seen: Vec<(usize, usize)> = Vec::new();
-            pairs
-                .filter(|pair| {
-                    let new = !seen.contains(pair);
-                    seen.push(*pair);
-                    new
-                })
-                .map(|(i, j)| slope(k, i) * old[i * m + j] * slope(l, j))
-                .sum()
-        };
-        self.covariance = (0..m * m).map(|e| element(e / m, e % m)).collect();
-        for (k, term) in self.terms.iter_mut().enumerate() {
-            term.coefficient *= factor;
-            let variance: f64 = self.covariance[k * m + k];
-            term.standard_error = if k == at { 0.0 } else { variance.max(0.0).sqrt() };
+        let blocks = blocks(self.coordinates.len(), self.terms.iter().map(|t| t.joined.as_slice()));
+        let named = |block: &Vec<usize>| block.iter().map(|&i| self.coordinates[i].clone()).collect();
+        self.blocks = blocks.iter().map(named).collect();
+        let mut references: Vec<(usize, f64)> = Vec::new();
+        for block in &blocks {
+            let own = |at: usize| self.terms[at].joined.iter().any(|i| block.contains(i));
+            let forced = block.iter().any(|&i| self.forced[i]);
+            let reference = match given.filter(|(at, _)| own(*at)) {
+                None if forced => continue,
+                None => self.first_square(block).or_else(|| {
+                    let first = (0..self.terms.len()).find(|&at| !self.terms[at].dissipation && own(at));
+                    first.map(|at| (at, 0.5))
+                }),
+                given => given,
+            };
+            let Some((reference, value)) = reference else { continue };
+            references.push((reference, value));
+            (0..self.terms.len()).filter(|&at| own(at)).collect::<Vec<_>>().into_iter().for_each(|at| {
+                self.terms[at].reference = Some(reference);
+            });
         }
-        self.terms[at].coefficient = value;
-        self.reference = Some(at);
+        self.relate(&references);
         Ok(())
+    }
+
+    /// The first square of a velocity of a block, and 1/2 or -1/2: the sign that makes most of its squares positive, since a time runs
+    /// against the places.
+    fn first_square(&self, block: &[usize]) -> Option<(usize, f64)> {
+        let square = |&i: &usize| {
+            let text = format!("{}_dot^2", self.coordinates[i]);
+            self.terms.iter().position(|t| !t.dissipation && t.term == text)
+        };
+        let first = block.iter().find_map(square)?;
+        let signs: f64 = block.iter().filter_map(square).map(|at| self.terms[at].coefficient.signum()).sum();
+        Some((first, if signs * self.terms[first].coefficient < 0.0 { -0.5 } else { 0.5 }))
+    }
+
+    /// Writes coefficients as ratios to the references of their blocks, with their covariance.
+    fn relate(&mut self, references: &[(usize, f64)]) {
+        let m = self.terms.len();
+        let x: Vec<f64> = self.terms.iter().map(|t| t.coefficient).collect();
+        let of = |k: usize| {
+            let at = self.terms[k].reference?;
+            let value = references.iter().find(|(reference, _)| *reference == at)?.1;
+            Some((at, value / x[at]))
+        };
+        // The derivatives of x_k value / x_at.
+        let slopes = |k: usize| match of(k) {
+            None => vec![(k, 1.0)],
+            Some((at, _)) if at == k => vec![],
+            Some((at, factor)) => vec![(k, factor), (at, -x[k] * factor / x[at])],
+        };
+        let slopes: Vec<Vec<(usize, f64)>> = (0..m).map(slopes).collect();
+        let old = &self.covariance;
+        let element = |k: usize, l: usize| -> f64 {
+            slopes[k].iter().flat_map(|(i, a)| slopes[l].iter().map(move |(j, b)| a * old[i * m + j] * b)).sum()
+        };
+        let covariance: Vec<f64> = (0..m * m).map(|e| element(e / m, e % m)).collect();
+        let factors: Vec<f64> = (0..m).map(|k| of(k).map_or(1.0, |(_, factor)| factor)).collect();
+        self.covariance = covariance;
+        for (k, term) in self.terms.iter_mut().enumerate() {
+            term.coefficient *= factors[k];
+            term.standard_error = self.covariance[k * m + k].max(0.0).sqrt();
+        }
+        for &(at, value) in references {
+            self.terms[at].coefficient = value;
+        }
     }
 
     /// Gives the coefficients their units, one name to those that are equal, and names the fractions near them.
     pub(super) fn name_constants(&mut self) {
-        let reference = self.reference.map(|at| self.terms[at].dimension.clone());
+        let dimensions: Vec<Option<Dimension>> = self.terms.iter().map(|t| t.dimension.clone()).collect();
         for term in &mut self.terms {
-            term.unit = match &reference {
+            term.unit = match term.reference.map(|at| &dimensions[at]) {
                 Some(None) => None,
-                known => of_coefficient(term.dimension.as_ref(), known.as_ref().and_then(Option::as_ref)),
+                known => of_coefficient(term.dimension.as_ref(), known.and_then(Option::as_ref)),
             };
         }
         let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -260,7 +338,7 @@ impl FoundFormula {
         }
     }
 
-    /// `true` if two coefficients are the same constant or its negative: of the same unit, and equal within their errors where that is
+    /// `true` if two coefficients are the same constant or its negative: of one block and the same unit, and equal within their errors where that is
     /// no accident.
     fn equal(&self, a: usize, b: usize) -> bool {
         const ACCIDENT: f64 = 5e-3;
@@ -269,7 +347,7 @@ impl FoundFormula {
         let covariance = |i: usize, j: usize| self.covariance[i * m + j];
         let variance = covariance(a, a) + covariance(b, b) - 2.0 * sign * covariance(a, b);
         let (size, error) = (x.coefficient.abs(), variance.max(0.0).sqrt() + 1e-9 * x.coefficient.abs());
-        let same = x.unit.is_some() && x.unit == y.unit && x.dissipation == y.dissipation;
+        let same = x.unit.is_some() && x.unit == y.unit && x.dissipation == y.dissipation && x.reference == y.reference;
         same && error < ACCIDENT * size && (size - y.coefficient.abs()).abs() <= 2.0 * error
     }
 
@@ -301,6 +379,14 @@ impl FoundFormula {
             noise_resolved: self.noise_resolved,
             searched: self.searched.0,
             removed: self.searched.1,
+            basis: &self.basis,
+            tried: &self.tried,
+            blocks: &self.blocks,
+            rival: self.rival.as_ref(),
+            several: self.several,
+            doubts: &self.doubts,
+            notes: &self.notes,
+            forces_between_samples: self.between,
             left: &self.left,
             seed,
         }

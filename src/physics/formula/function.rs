@@ -204,6 +204,14 @@ impl Function {
         at(0.3) != at(0.7) && !at(0.3).is_nan()
     }
 
+    /// Coordinates that it depends on, of `n`.
+    pub fn coordinates(&self, n: usize) -> Vec<usize> {
+        let q: Vec<f64> = (0..n).map(|i| 0.37 + 0.11 * i as f64).collect();
+        let slopes = self.taylor(&q).gradient;
+        // Outside of its domain a formula may depend on anything.
+        (0..n).filter(|&i| slopes[i] != 0.0).collect()
+    }
+
     /// `true` for the function 1.
     pub fn is_one(&self) -> bool {
         matches!(self, Self::Product(factors) if factors.is_empty())

@@ -3,7 +3,7 @@
 use super::error::FormulaError;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
 use crate::lagrangian::{EquationPart, Equations, Lagrangian};
-use crate::linalg::dot;
+use crate::linalg::{self, dot};
 use crate::random::RngStream;
 use crate::scalar::Real;
 use crate::tape::TapeError;
@@ -30,6 +30,20 @@ pub struct Families {
 impl Default for Families {
     fn default() -> Self {
         Self { polynomial: 2, trigonometric: 2, radial: 0, reciprocal: 0 }
+    }
+}
+
+impl std::fmt::Display for Families {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { polynomial, trigonometric, radial, reciprocal } = *self;
+        let all = [
+            ("polynomial", polynomial),
+            ("trigonometric", trigonometric),
+            ("radial", radial),
+            ("reciprocal", reciprocal),
+        ];
+        let parts = all.iter().filter(|(_, degree)| *degree > 0).map(|(family, degree)| format!("{family}:{degree}"));
+        f.write_str(&parts.collect::<Vec<_>>().join(","))
     }
 }
 
@@ -223,6 +237,24 @@ impl Library {
         functions
     }
 
+    /// Coordinates that a term joins: those of its velocities and of its function.
+    pub fn coordinates(&self, k: usize) -> Vec<usize> {
+        let Term { kind, function } = self.terms[k];
+        let mut joined = self.functions[function].coordinates(self.n());
+        match kind {
+            Kind::Kinetic(i, j) | Kind::Dissipation(i, j) => joined.extend([i, j]),
+            Kind::Gyroscopic(i) => joined.push(i),
+            Kind::Potential => {}
+        }
+        joined
+    }
+
+    /// Groups of coordinates that do not act on each other by some terms.
+    pub fn blocks(&self, terms: &[usize]) -> Vec<Vec<usize>> {
+        let joined: Vec<Vec<usize>> = terms.iter().map(|&k| self.coordinates(k)).collect();
+        blocks(self.n(), joined.iter().map(Vec::as_slice))
+    }
+
     /// A term as a function of positions and velocities.
     fn value<R: Real>(&self, k: usize, q: &[R], v: &[R]) -> R {
         let Term { kind, function } = self.terms[k];
@@ -367,6 +399,12 @@ impl Library {
             _ => None,
         }
     }
+}
+
+/// Groups of `n` coordinates, by lists of those that act on each other.
+pub(super) fn blocks<'a>(n: usize, joined: impl IntoIterator<Item = &'a [usize]>) -> Vec<Vec<usize>> {
+    let pairs = joined.into_iter().flat_map(|list| list.windows(2).map(|pair| (pair[0], pair[1])));
+    linalg::components(n, pairs)
 }
 
 /// A sum of terms, each times the parameter at a place if it has one.

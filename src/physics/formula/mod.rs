@@ -29,12 +29,16 @@
 //! ```
 
 mod error;
+mod exchange;
 mod find;
 mod found;
 mod function;
 mod library;
 mod motion;
+mod obstacles;
+mod prepared;
 mod regress;
+mod search;
 mod select;
 mod units;
 mod wald;
@@ -45,7 +49,7 @@ pub use error::FormulaError;
 pub use find::MOST_BOOTSTRAPS;
 pub use find::{FormulaOptions, formula_of_motion};
 pub(crate) use found::FormulaSummary;
-pub use found::{FoundFormula, FoundTerm, Left, Near, Verdict};
+pub use found::{FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
 pub use library::Families;
 #[doc(hidden)]
 pub use regress::MODEL_STATES;

@@ -1,10 +1,11 @@
 //! The coefficients of terms through the motion: the multiple shooting of [`identification`](crate::identification), by all terms of a
 //! library.
 
-use super::find::Prepared;
 use super::library::{Library, Values};
+use super::prepared::Prepared;
+use super::search::PASSES;
 use crate::identification::linear::times;
-use crate::identification::{Between, Course, Problem, Segment, choose_steps};
+use crate::identification::{Between, Course, Disturbances, Problem, Segment, choose_steps};
 use crate::lagrangian::system::Range;
 use crate::linalg::{self, Workspace, dot};
 use std::collections::BTreeMap;
@@ -23,6 +24,8 @@ pub(super) struct Motion<'a> {
     pub data: &'a Prepared<'a>,
     /// Integration steps from sample to sample.
     pub substeps: usize,
+    /// Known forces between the samples.
+    pub between: Between,
     pub threads: usize,
 }
 
@@ -120,7 +123,7 @@ impl Motion<'_> {
             recording: data.recording,
             equations: &equations,
             chosen: wanted.len(),
-            between: Between::Linear,
+            between: self.between,
             step: data.step,
             substeps: self.substeps,
         };
@@ -136,7 +139,9 @@ impl Motion<'_> {
             gaps: Vec::new(),
             spread: data.spread.clone(),
             robust: true,
+            disturbances: Disturbances::default(),
             threads: self.threads,
+            cancellation: data.cancellation.clone(),
         };
         Some(work(&mut problem, x))
     }
@@ -184,14 +189,17 @@ impl Motion<'_> {
         model.coefficients = fitted.unwrap_or_else(|| model.coefficients.clone());
     }
 
-    /// Mean size of the mass matrix of wanted terms relative to the model's, over the starts of segments: 1 for the model itself.
-    pub fn sizes(&self, model: &Model, wanted: &[usize], segments: &[Segment]) -> Vec<f64> {
+    /// Mean size of the mass matrix of wanted terms relative to the model's, over the starts of segments, for every block of coordinates whose
+    /// factor no forces give: 1 for the model itself.
+    fn sizes(&self, model: &Model, wanted: &[usize], segments: &[Segment]) -> Vec<Vec<f64>> {
         let n = self.library.n();
-        let mut sizes = vec![0.0; wanted.len()];
+        let mut blocks = self.library.blocks(&model.terms);
+        blocks.retain(|block| !block.iter().any(|&i| self.data.forced[i]));
+        let mut sizes = vec![vec![0.0; wanted.len()]; blocks.len()];
         let functions = self.library.functions_of(&[&model.terms, wanted].concat());
         let (mut values, mut workspace) = (Values::new(), Workspace::new());
         let (mut mass, mut inverse) = (vec![0.0; n * n], vec![0.0; n * n]);
-        let mut count = 0.0;
+        let mut count: f64 = 0.0;
         let stride = segments.len().div_ceil(200).max(1);
         for segment in segments.iter().step_by(stride) {
             self.library.evaluate(&functions, &segment.start[..n], &mut values);
@@ -199,30 +207,56 @@ impl Motion<'_> {
             if linalg::inverse(n, &mass, &mut inverse, &mut workspace).is_err() {
                 continue;
             }
-            count += n as f64;
-            for (size, &k) in sizes.iter_mut().zip(wanted) {
-                if let Some((i, j)) = self.library.kinetic(k) {
-                    let value = values[self.library.terms[k].function].value;
-                    *size += value * (inverse[i * n + j] + inverse[j * n + i]);
+            count += 1.0;
+            for (at, &k) in wanted.iter().enumerate() {
+                let Some((i, j)) = self.library.kinetic(k) else { continue };
+                let value = values[self.library.terms[k].function].value;
+                // Of coordinates in different blocks the inverse is 0.
+                if let Some(block) = blocks.iter().position(|block| block.contains(&i)) {
+                    sizes[block][at] += value * (inverse[i * n + j] + inverse[j * n + i]);
                 }
             }
         }
-        sizes.iter_mut().for_each(|size| *size /= f64::max(count, 1.0));
+        for (sizes, block) in sizes.iter_mut().zip(&blocks) {
+            sizes.iter_mut().for_each(|size| *size /= count.max(1.0) * block.len() as f64);
+        }
         sizes
     }
 
-    /// Fixes the common factor of normal equations, of which the motion says nothing, at the model's.
+    /// Fixes the common factor of every block, of which the motion says nothing without forces, at the model's.
     pub fn pin(&self, model: &Model, wanted: &[usize], segments: &[Segment], sum: &mut BlockSum) {
         let m = wanted.len();
         let sizes = self.sizes(model, wanted, segments);
         let own = model.terms.iter().zip(&model.coefficients);
         let own = own.filter_map(|(k, c)| wanted.iter().position(|w| w == k).map(|at| sum.matrix[at * m + at] * c * c));
         let weight = own.fold(1.0, f64::max);
-        for i in 0..m {
-            for j in 0..m {
-                sum.matrix[i * m + j] += weight * sizes[i] * sizes[j];
+        for sizes in &sizes {
+            for i in 0..m {
+                for j in 0..m {
+                    sum.matrix[i * m + j] += weight * sizes[i] * sizes[j];
+                }
             }
         }
+    }
+
+    /// The way of known forces between the samples that meets the motion best; the model and its segments by it.
+    pub fn choose_between(&mut self, model: &mut Model, segments: &mut [Segment]) {
+        let mut least = self.settle(model, segments, 1).0;
+        let from = (model.clone(), segments.to_vec());
+        let mut best = self.between;
+        for between in [Between::Held, Between::Cubic, Between::BandLimited] {
+            self.between = between;
+            let (mut tried, mut starts) = from.clone();
+            self.settle(&tried, &mut starts, 3);
+            self.fit(&mut tried, &mut starts, PASSES);
+            let square = self.settle(&tried, &mut starts, 1).0;
+            if square < least {
+                (least, best) = (square, between);
+                *model = tried;
+                segments.clone_from_slice(&starts);
+            }
+        }
+        self.between = best;
     }
 
     /// Residuals of every sample in units of noise, `(samples, n)`; `NaN` from where a segment cannot be followed.

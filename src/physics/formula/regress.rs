@@ -52,14 +52,18 @@ pub fn formula_of_model(
     (q, v): (&[f64], &[f64]),
     options: &FormulaOptions,
 ) -> Result<FoundFormula, FormulaError> {
-    let extent = Extent { families: options.families, gyroscopic: options.gyroscopic, friction: options.friction };
+    let families = options.families.unwrap_or_default();
+    let extent = Extent { families, gyroscopic: options.gyroscopic, friction: options.friction };
     let library = Library::new(names, periodic, extent, &options.functions)?;
     let n = library.n();
     let mut rng = RngStream::Region.generator(options.seed);
     let mut terms = Terms::default();
     let mut known: Vec<Asked> = Vec::new();
     let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_STATES);
+    let stop = &options.cancellation;
+    stop.stage("states of the model");
     for (q, v) in rows() {
+        stop.check()?;
         let fine = model.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms).is_ok();
         if fine && terms.acceleration.iter().chain(&terms.mass_matrix).all(|x| x.is_finite()) {
             let (mass, own) = (terms.mass_matrix.clone(), terms.acceleration.clone());
@@ -79,7 +83,11 @@ pub fn formula_of_model(
     }
     let (kept, quotient) = library.independent(&bounds, options.seed);
     let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
-    let search = |windows: &Windows, start: &[f64]| eliminate_backward(windows, start, &sigma, &complexity, &judges);
+    stop.stage("choice of terms");
+    let all: Vec<usize> = (0..kept.len()).collect();
+    let search = |windows: &Windows, start: &[f64]| {
+        eliminate_backward(windows, (&all, start), (&sigma, &complexity), &judges, stop)
+    };
     // Its own motion, which holds nothing of the mass matrix but what moves it.
     let moving = known.iter().map(|Asked { q, v, own, .. }| {
         let (q, v, a) = (q.clone(), v.clone(), own.clone());
@@ -99,6 +107,7 @@ pub fn formula_of_model(
     let start = masses.unwrap_or_else(|| windows.unit_mass(&library, &kept, &vec![1.0; n]));
     let none = || FormulaError::NotFinite { failed, states };
     let mut path = search(&windows, &start);
+    stop.check()?;
     let mut choice = elbow(&path, n).cloned().ok_or_else(none)?;
     let residual = |choice: &Choice| (choice.held_out / n as f64).sqrt();
     choice = refit((&motion, &windows), choice, &sigma);
@@ -115,11 +124,15 @@ pub fn formula_of_model(
     let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
     let m = choice.set.len();
     let rest = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
-    // The motion leaves the common factor free.
+    // The motion leaves the common factor of every group free.
     let weight =
         (0..m).map(|k| normal.matrix[k * m + k] * choice.coefficients[choice.set[k]].powi(2)).fold(0.0, f64::max);
-    let pinned: Vec<f64> =
-        (0..m * m).map(|at| normal.matrix[at] + weight * normal.size[at / m] * normal.size[at % m]).collect();
+    let mut pinned = normal.matrix.clone();
+    for group in windows.groups(&choice.set) {
+        for &i in &group.places {
+            group.places.iter().for_each(|&j| pinned[i * m + j] += weight * normal.size[i] * normal.size[j]);
+        }
+    }
     let covariance = inverse_with(m, &pinned, RIDGE).unwrap_or(vec![f64::NAN; m * m]);
     let covariance: Vec<f64> = covariance.into_iter().map(|x| x * rest).collect();
     let of = Model {
@@ -133,9 +146,11 @@ pub fn formula_of_model(
     found.residual = residual;
     found.noise = sigma;
     found.searched = (library.searched, quotient.removed);
+    (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
     (found.bounds, found.speeds) = (bounds, speeds);
     found.rescale(options.scale.as_ref())?;
     found.name_constants();
+    stop.check()?;
     Ok(found)
 }
 
@@ -227,12 +242,13 @@ fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64],
     let mut counts = vec![0.0; windows.terms];
     let mut all: Vec<usize> = path.order.iter().take(2 * choice.set.len() + 6).copied().collect();
     all.extend(choice.set.iter().filter(|k| !path.order.iter().take(2 * choice.set.len() + 6).any(|o| o == *k)));
-    for _ in 0..options.bootstraps {
+    for _ in (0..options.bootstraps).take_while(|_| options.cancellation.go_on()) {
         let used: Vec<bool> = (0..windows.len()).map(|_| rng.random()).collect();
         let normal = windows.normal(&choice.coefficients, &all, sigma, &used);
         let mut places: Vec<usize> = (0..all.len()).collect();
         while places.len() > choice.set.len() {
-            let Some(costs) = normal.of(&places).costs(windows.driven()) else { break };
+            let left: Vec<usize> = places.iter().map(|&k| all[k]).collect();
+            let Some(costs) = normal.of(&places).costs(&windows.groups(&left)) else { break };
             let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
             places.remove(gone);
         }
@@ -281,7 +297,7 @@ mod tests {
         let mut draw =
             |low: f64, high: f64| (0..400).map(|_| low + (high - low) * rng.random::<f64>()).collect::<Vec<f64>>();
         let (q, v) = (draw(0.5, 2.0), draw(-1.0, 1.0));
-        let families = "polynomial:1,radial:2".parse().unwrap();
+        let families = Some("polynomial:1,radial:2".parse().unwrap());
         let options = FormulaOptions { families, units: vec!["m".to_string(); 2], ..FormulaOptions::default() };
         let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
         let seen: Vec<(&str, &str, Option<&str>)> =

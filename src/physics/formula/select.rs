@@ -1,6 +1,7 @@
 //! Backward elimination by the weak form, with refits and exchanges.
 
-use super::weak::{Normal, Windows};
+use super::weak::{Group, Normal, Windows};
+use crate::cancellation::Cancellation;
 use crate::identification::linear::{inverse, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
@@ -9,6 +10,8 @@ use std::collections::BTreeMap;
 const FEW: usize = 40;
 /// Terms up to which terms are exchanged as well.
 const EXCHANGED: usize = 10;
+/// Rounds of exchanges at most.
+const EXCHANGES: usize = 3;
 /// Drops, and additions, that are looked at each time.
 const TRIED: usize = 6;
 
@@ -26,11 +29,22 @@ pub(super) struct Choice {
 }
 
 /// Choices of terms by their number.
+#[derive(Default)]
 pub(super) struct Path {
     /// The best choice of every size.
     pub best: BTreeMap<usize, Choice>,
     /// All terms in the order in which they were given up, the last ones first.
     pub order: Vec<usize>,
+    /// `false` if exchanges still made choices better when they were cut off.
+    pub settled: bool,
+}
+
+impl Path {
+    /// The choices of this path, its terms before those of another one.
+    pub fn before(mut self, other: Self) -> Self {
+        self.order.extend(other.order.into_iter().filter(|k| !self.order.contains(k)).collect::<Vec<_>>());
+        self
+    }
 }
 
 struct Search<'a> {
@@ -41,18 +55,21 @@ struct Search<'a> {
     held_out: Vec<bool>,
 }
 
-/// Coefficients that solve normal equations: those of known forces, or those of the smallest error with a mass matrix of the size that it
-/// had. With the inverse matrix, and what is multiplied by it.
-fn solve(normal: &Normal, driven: bool) -> Option<(Vec<f64>, Vec<f64>)> {
-    let m = normal.size.len();
-    let inverse = inverse(m, &normal.matrix)?;
-    let right = if driven { &normal.right } else { &normal.size };
-    let mut x = times(m, &inverse, right);
-    if !driven {
-        let length = dot(&normal.size, &x);
-        x.iter_mut().for_each(|x| *x /= length);
+/// Coefficients that solve normal equations, group by group: those of known forces, or those of the smallest error with a mass matrix of
+/// the size that it had. A joint size would let the group of the larger errors vanish.
+fn solve(normal: &Normal, groups: &[Group]) -> Option<Vec<f64>> {
+    let mut all = vec![0.0; normal.size.len()];
+    for Group { places, share } in groups {
+        let own = normal.of(places);
+        let m = places.len();
+        let mut x = times(m, &inverse(m, &own.matrix)?, own.target());
+        if !own.driven() {
+            let length = dot(&own.size, &x);
+            x.iter_mut().for_each(|x| *x *= share / length);
+        }
+        places.iter().zip(x).for_each(|(&at, x)| all[at] = x);
     }
-    x.iter().all(|x| x.is_finite()).then_some((x, inverse))
+    all.iter().all(|x| x.is_finite()).then_some(all)
 }
 
 impl Normal {
@@ -62,18 +79,43 @@ impl Normal {
         Self { matrix: part(m, &self.matrix, places), right: pick(&self.right), size: pick(&self.size) }
     }
 
+    /// `true` if known forces give the size.
+    fn driven(&self) -> bool {
+        self.right.iter().any(|x| *x != 0.0)
+    }
+
+    /// What coefficients are asked for: the forces, or a size.
+    fn target(&self) -> &[f64] {
+        if self.driven() { &self.right } else { &self.size }
+    }
+
+    /// The least error less what no choice changes.
+    fn least(&self, groups: &[Group]) -> Option<f64> {
+        let of = |Group { places, share }: &Group| {
+            let own = self.of(places);
+            let m = places.len();
+            let gain = dot(own.target(), &times(m, &inverse(m, &own.matrix)?, own.target()));
+            Some(if own.driven() { -gain } else { share * share / gain })
+        };
+        groups.iter().map(of).sum()
+    }
+
     /// What giving up each term costs to first order.
-    pub fn costs(&self, driven: bool) -> Option<Vec<f64>> {
-        let m = self.size.len();
-        let inverse = inverse(m, &self.matrix)?;
-        if driven {
-            let x = times(m, &inverse, &self.right);
-            return Some((0..m).map(|k| x[k] * x[k] / inverse[k * m + k]).collect());
+    pub fn costs(&self, groups: &[Group]) -> Option<Vec<f64>> {
+        let mut costs = vec![0.0; self.size.len()];
+        for Group { places, share } in groups {
+            let own = self.of(places);
+            let m = places.len();
+            let inverse = inverse(m, &own.matrix)?;
+            let x = times(m, &inverse, own.target());
+            let total = dot(own.target(), &x);
+            for (k, &place) in places.iter().enumerate() {
+                let gain = x[k] * x[k] / inverse[k * m + k];
+                let without = (total - gain).max(1e-300 + 1e-14 * total);
+                costs[place] = if own.driven() { gain } else { share * share * (1.0 / without - 1.0 / total) };
+            }
         }
-        let x = times(m, &inverse, &self.size);
-        let total = dot(&self.size, &x);
-        let without = |k: usize| (total - x[k] * x[k] / inverse[k * m + k]).max(1e-300 + 1e-14 * total);
-        Some((0..m).map(|k| 1.0 / without(k) - 1.0 / total).collect())
+        Some(costs)
     }
 }
 
@@ -101,13 +143,24 @@ impl Search<'_> {
         if !self.windows.moves_all(set) {
             return None;
         }
+        let groups = self.windows.groups(set);
         let mut coefficients = start.to_vec();
         for _ in 0..refits {
             let normal = self.windows.normal(&coefficients, set, self.sigma, &self.learned);
-            let (x, _) = solve(&normal, self.windows.driven())?;
-            coefficients = self.spread(set, &x);
+            coefficients = self.spread(set, &solve(&normal, &groups)?);
+        }
+        // A nearly singular mass matrix explains everything.
+        if !self.windows.is_regular(&coefficients) {
+            return None;
         }
         self.judged(set.to_vec(), coefficients)
+    }
+
+    /// Coefficients as far on the way to others as the mass matrix does not become nearly singular.
+    fn kept_regular(&self, from: &[f64], to: Vec<f64>) -> Vec<f64> {
+        let between = |share: f64| from.iter().zip(&to).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>();
+        let regular = [1.0, 0.5, 0.25, 0.1].map(between).into_iter().find(|x| self.windows.is_regular(x));
+        regular.unwrap_or_else(|| from.to_vec())
     }
 
     fn judged(&self, set: Vec<usize>, coefficients: Vec<f64>) -> Option<Choice> {
@@ -119,7 +172,7 @@ impl Search<'_> {
     /// The best choice with a term less.
     fn shorter(&self, from: &Choice) -> Option<Choice> {
         let normal = self.windows.normal(&from.coefficients, &from.set, self.sigma, &self.learned);
-        let costs = normal.costs(self.windows.driven())?;
+        let costs = normal.costs(&self.windows.groups(&from.set))?;
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
         let refits = if from.set.len() <= 12 { 2 } else { 0 };
@@ -129,7 +182,7 @@ impl Search<'_> {
             if !self.windows.moves_all(&set) {
                 return None;
             }
-            let (x, _) = solve(&normal.of(&places), self.windows.driven())?;
+            let x = solve(&normal.of(&places), &self.windows.groups(&set))?;
             self.choice(&set, &self.spread(&set, &x), refits).map(|choice| (gone, choice))
         });
         let tries: Vec<(usize, Choice)> = tries.collect();
@@ -143,21 +196,14 @@ impl Search<'_> {
     /// Choices with a term more, of the terms that promise most.
     fn longer(&self, from: &Choice, all: &[usize]) -> Vec<Choice> {
         let normal = self.windows.normal(&from.coefficients, all, self.sigma, &self.learned);
-        let driven = self.windows.driven();
         let own: Vec<usize> = (0..all.len()).filter(|&k| from.set.contains(&all[k])).collect();
-        let objective = |normal: &Normal| {
-            let m = normal.size.len();
-            let inverse = inverse(m, &normal.matrix)?;
-            let right = if driven { &normal.right } else { &normal.size };
-            let gain = dot(right, &times(m, &inverse, right));
-            Some(if driven { -gain } else { 1.0 / gain })
-        };
         let mut gains: Vec<(f64, usize)> = (0..all.len())
             .filter(|k| !own.contains(k))
             .filter_map(|k| {
                 let mut places = own.clone();
                 places.push(k);
-                objective(&normal.of(&places)).map(|value| (value, k))
+                let set: Vec<usize> = places.iter().map(|&k| all[k]).collect();
+                normal.of(&places).least(&self.windows.groups(&set)).map(|value| (value, k))
             })
             .collect();
         gains.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -171,38 +217,37 @@ impl Search<'_> {
     }
 }
 
-/// Eliminates terms from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
+/// Eliminates terms of a set, from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
 ///
 /// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks
-/// that judge alone.
+/// that judge alone. What is returned after a cancellation is of no use.
 pub(super) fn eliminate_backward(
     windows: &Windows,
-    start: &[f64],
-    sigma: &[f64],
-    complexity: &[f64],
+    (all, start): (&[usize], &[f64]),
+    (sigma, complexity): (&[f64], &[f64]),
     held_out: &dyn Fn(usize) -> bool,
+    cancellation: &Cancellation,
 ) -> Path {
     let held_out: Vec<bool> = windows.blocks.iter().map(|&block| held_out(block)).collect();
     let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
     let search = Search { windows, sigma, complexity, learned, held_out };
-    let driven = windows.driven();
-    let all: Vec<usize> = (0..windows.terms).collect();
-    let mut set = all.clone();
+    let mut set = all.to_vec();
     let mut coefficients = start.to_vec();
     for _ in 0..3 {
         let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
-        if let Some((x, _)) = solve(&normal, driven) {
-            coefficients = search.spread(&set, &x);
+        if let Some(x) = solve(&normal, &windows.groups(&set)) {
+            coefficients = search.kept_regular(&coefficients, search.spread(&set, &x));
         }
     }
     let mut order = Vec::new();
     // Many at once while there are many.
-    while set.len() > FEW {
+    while set.len() > FEW && cancellation.go_on() {
         let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
         let mut places: Vec<usize> = (0..set.len()).collect();
         let goal = (set.len() * 9 / 10).max(FEW);
-        while places.len() > goal {
-            let Some(costs) = normal.of(&places).costs(driven) else { break };
+        while places.len() > goal && cancellation.go_on() {
+            let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
+            let Some(costs) = normal.of(&places).costs(&windows.groups(&left)) else { break };
             let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
             let kept: Vec<usize> = (0..places.len()).filter(|&k| k != gone).map(|k| set[places[k]]).collect();
             if !windows.moves_all(&kept) {
@@ -213,17 +258,19 @@ pub(super) fn eliminate_backward(
         if places.len() == set.len() {
             break;
         }
-        if let Some((x, _)) = solve(&normal.of(&places), driven) {
-            set = places.iter().map(|&k| set[k]).collect();
-            coefficients = search.spread(&set, &x);
+        let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
+        if let Some(x) = solve(&normal.of(&places), &windows.groups(&left)) {
+            let before = search.spread(&left, &left.iter().map(|&k| coefficients[k]).collect::<Vec<_>>());
+            coefficients = search.kept_regular(&before, search.spread(&left, &x));
+            set = left;
         } else {
             break;
         }
     }
     let mut best: BTreeMap<usize, Choice> = BTreeMap::new();
-    let mut choice = search.judged(set, coefficients);
+    let mut choice = search.choice(&set, &coefficients, 0);
     while let Some(found) = choice {
-        choice = if found.set.len() > 1 { search.shorter(&found) } else { None };
+        choice = if found.set.len() > 1 && cancellation.go_on() { search.shorter(&found) } else { None };
         if let Some(next) = &choice {
             order.extend(found.set.iter().filter(|k| !next.set.contains(k)));
         } else {
@@ -232,12 +279,13 @@ pub(super) fn eliminate_backward(
         best.insert(found.set.len(), found);
     }
     order.reverse();
-    for _ in 0..3 {
+    let mut settled = false;
+    for _ in 0..EXCHANGES {
         let mut changed = false;
         let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= EXCHANGED).collect();
-        for size in sizes {
+        for size in sizes.into_iter().take_while(|_| cancellation.go_on()) {
             let Some(from) = best.get(&size).cloned() else { continue };
-            for longer in search.longer(&from, &all) {
+            for longer in search.longer(&from, all) {
                 if let Some(shorter) = search.shorter(&longer) {
                     changed |= improve(&mut best, shorter);
                 }
@@ -245,10 +293,11 @@ pub(super) fn eliminate_backward(
             }
         }
         if !changed {
+            settled = true;
             break;
         }
     }
-    Path { best, order }
+    Path { best, order, settled }
 }
 
 /// Takes a choice in if it is better than the one of its size.

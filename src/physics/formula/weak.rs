@@ -3,15 +3,16 @@
 //! For a function `phi` of compact support `int (phi (dD/dv - dL/dq - F) - phi' dL/dv) dt = 0` along every motion. It is linear in the
 //! coefficients of the terms.
 
-use super::library::{Kind, Library, Term, Values};
+use super::library::{Kind, Library, Term, Values, blocks};
+use super::select::mean;
 use crate::linalg::{self, Workspace};
 
-/// Positions and velocities of a stretch of motion without gap, with known forces if there are any: `(samples, n)`.
-pub(super) struct Stretch<'a> {
-    pub times: &'a [f64],
-    pub q: &'a [f64],
-    pub v: &'a [f64],
-    pub force: &'a [f64],
+/// Positions and velocities of a stretch of motion at even steps, with known forces if there are any: `(samples, n)`.
+pub(super) struct Stretch {
+    pub times: Vec<f64>,
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub force: Vec<f64>,
     /// Block of the data that is held out, or drawn again, as a whole.
     pub block: usize,
 }
@@ -41,6 +42,8 @@ pub(super) struct Windows {
     width: usize,
     /// What the terms do to the mass matrix: `(i, j, function)`.
     kinetic: Vec<Option<(usize, usize, usize)>>,
+    /// Coordinates that each term joins.
+    joined: Vec<Vec<usize>>,
 }
 
 /// Windows at most.
@@ -48,7 +51,7 @@ const MOST_WINDOWS: f64 = 4000.0;
 
 impl Windows {
     /// Test functions `(1 - x^2)^4` of `width` seconds along stretches of motion, a quarter of their width or more apart.
-    pub fn new(library: &Library, terms: &[usize], stretches: &[Stretch<'_>], width: f64) -> Self {
+    pub fn new(library: &Library, terms: &[usize], stretches: &[Stretch], width: f64) -> Self {
         let n = library.n();
         let seconds: f64 = stretches.iter().map(|s| s.times[s.times.len() - 1] - s.times[0]).sum();
         let apart = (width / 6.0).max(seconds / MOST_WINDOWS);
@@ -65,6 +68,7 @@ impl Windows {
             blocks: Vec::new(),
             width: which.len(),
             kinetic: kinetic.collect(),
+            joined: terms.iter().map(|&k| library.coordinates(k)).collect(),
         };
         for stretch in stretches {
             windows.add(library, (terms, &which), stretch, (width, apart));
@@ -76,11 +80,11 @@ impl Windows {
         &mut self,
         library: &Library,
         (terms, which): (&[usize], &[usize]),
-        stretch: &Stretch<'_>,
+        stretch: &Stretch,
         (width, apart): (f64, f64),
     ) {
         let (n, count) = (self.n, self.terms);
-        let times = stretch.times;
+        let times = &stretch.times;
         let samples = times.len();
         // Momenta and forces of all terms at every sample.
         let (mut momenta, mut pulls) = (vec![0.0; samples * n * count], vec![0.0; samples * n * count]);
@@ -181,6 +185,25 @@ impl Windows {
         !self.forces.is_empty()
     }
 
+    /// Places of a set of terms in groups whose coordinates do not act on each other.
+    pub fn groups(&self, set: &[usize]) -> Vec<Group> {
+        let of = |coordinates: Vec<usize>| {
+            let own = |at: &usize| self.joined[set[*at]].first().is_some_and(|i| coordinates.contains(i));
+            let places = (0..set.len()).filter(own).collect();
+            Group { places, share: coordinates.len() as f64 / self.n as f64 }
+        };
+        blocks(self.n, set.iter().map(|&k| self.joined[k].as_slice())).into_iter().map(of).collect()
+    }
+
+    /// `true` if the mass matrix is not nearly singular in most windows.
+    pub fn is_regular(&self, coefficients: &[f64]) -> bool {
+        let n = self.n;
+        let masses = self.masses(coefficients);
+        let stride = self.len().div_ceil(LOOKED_AT).max(1);
+        let some: Vec<f64> = masses.chunks_exact(n * n).step_by(stride).flatten().copied().collect();
+        is_regular(n, &some)
+    }
+
     /// The mean mass matrices over all windows under the test function, `(windows, n, n)`.
     fn masses(&self, coefficients: &[f64]) -> Vec<f64> {
         let n = self.n;
@@ -206,9 +229,8 @@ impl Windows {
         4 * positive > 3 * self.len()
     }
 
-    /// Squared errors of the mean accelerations that some coefficients give, by window, in units of `sigma`; infinite where the mass
-    /// matrix is singular.
-    pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
+    /// Errors of the mean accelerations that some coefficients give, `(windows, n)`; `NaN` where the mass matrix is singular.
+    pub fn accelerations(&self, coefficients: &[f64]) -> Vec<f64> {
         let (n, count) = (self.n, self.terms);
         let used: Vec<usize> = (0..count).filter(|&k| coefficients[k] != 0.0).collect();
         let mut rest = Vec::with_capacity(self.len() * n);
@@ -220,8 +242,31 @@ impl Windows {
         let mut a = vec![0.0; rest.len()];
         // Windows that fail are NaN.
         let _ = linalg::solve(n, &self.masses(coefficients), &rest, &mut a, &mut Workspace::new());
+        a
+    }
+
+    /// Squared errors of the mean accelerations by window, in units of `sigma`; infinite where the mass matrix is singular.
+    pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
         let error = |a: &[f64]| a.iter().zip(sigma).map(|(a, s)| (a / s).powi(2)).sum::<f64>();
-        a.chunks_exact(n).map(error).map(|square| if square.is_nan() { f64::INFINITY } else { square }).collect()
+        let all = self.accelerations(coefficients);
+        all.chunks_exact(self.n).map(error).map(|square| if square.is_nan() { f64::INFINITY } else { square }).collect()
+    }
+
+    /// Mean squared errors of every coordinate's accelerations.
+    pub fn errors_by_coordinate(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
+        let all = self.accelerations(coefficients);
+        let used = vec![true; self.len()];
+        let of = |i: usize| {
+            let own = all.iter().skip(i).step_by(self.n).map(|a| (a / sigma[i]).powi(2));
+            mean(&own.map(|e| if e.is_nan() { f64::INFINITY } else { e }).collect::<Vec<_>>(), &used)
+        };
+        (0..self.n).map(of).collect()
+    }
+
+    /// Places of the terms that join none of the coordinates `alone` with another one.
+    pub fn apart(&self, alone: &[usize]) -> Vec<usize> {
+        let kept = |joined: &Vec<usize>| joined.iter().all(|i| !alone.contains(i) || joined.iter().all(|j| i == j));
+        (0..self.terms).filter(|&k| kept(&self.joined[k])).collect()
     }
 
     /// Normal equations of the errors of accelerations, the mass matrix being that of `coefficients`: matrix of the terms `set`, what the
@@ -299,6 +344,42 @@ impl Windows {
         };
         terms.iter().map(of).collect()
     }
+}
+
+/// Windows whose mass matrices are looked at for their condition, about.
+const LOOKED_AT: usize = 200;
+/// Largest condition number of a mass matrix in units of its diagonal: textbooks' systems stay below 100 but next to singular places.
+const MOST_CONDITION: f64 = 1e4;
+
+/// `true` if most of some symmetric matrices `(n, n)` have a condition number, rows and columns scaled to size 1, below
+/// [`MOST_CONDITION`].
+pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
+    let mut scaled = matrices.to_vec();
+    for matrix in scaled.chunks_exact_mut(n * n) {
+        // Of a positive definite matrix the largest element of each row is then its diagonal's; others need not have a diagonal.
+        for _ in 0..3 {
+            let size = |i: usize| matrix[i * n..(i + 1) * n].iter().fold(0.0, |most: f64, x| most.max(x.abs())).sqrt();
+            let sizes: Vec<f64> = (0..n).map(size).collect();
+            matrix.iter_mut().enumerate().for_each(|(at, x)| *x /= sizes[at / n] * sizes[at % n]);
+        }
+    }
+    let mut values = vec![0.0; scaled.len() / n];
+    // Matrices that fail are NaN.
+    let _ = linalg::eigenvalues(n, &scaled, &mut values, &mut Workspace::new());
+    let regular = values.chunks_exact(n).filter(|values| {
+        let sizes = || values.iter().map(|x| x.abs());
+        let (least, most) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+        values.iter().all(|x| x.is_finite()) && least * MOST_CONDITION > most
+    });
+    4 * regular.count() > 3 * (values.len() / n)
+}
+
+/// Terms that act on coordinates of their own.
+pub(super) struct Group {
+    /// Places of the terms in the set.
+    pub places: Vec<usize>,
+    /// Share of the coordinates.
+    pub share: f64,
 }
 
 /// Normal equations of some terms.

@@ -5,15 +5,18 @@
 //! step suffices for given weights.
 
 use super::IdentifyError;
+use super::bootstrap::{self, COPIES};
+use super::covariance::Root;
 use super::follow::{Follower, LANES, Segment};
 use super::found::{Identified, Outlier, Residual};
-use super::quality::{outliers, usual, whiteness};
+use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
-use super::stages::{EXPLAINED, Fitted, unknowns};
+use super::stages::Fitted;
+use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
-use crate::recording::smooth::noise;
-use crate::recording::{deviation, rms};
+use crate::recording::smooth::{Smoothing, noise};
+use crate::recording::{deviation, quantile, rms};
 
 /// How often coordinates are weighed anew at most, and relative change of all weights that ends it.
 const ROUNDS: usize = 6;
@@ -27,7 +30,7 @@ const ROUNDING: f64 = 1e-9;
 pub(super) fn identify(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
-    states: &mut States,
+    (smoothing, states): (&Smoothing, &mut States),
     (mut x, segments): (Vec<f64>, Vec<Segment>),
 ) -> Result<Identified, IdentifyError> {
     let n = problem.course.equations.n;
@@ -45,6 +48,7 @@ pub(super) fn identify(
     let mut search = Normal::default();
     for _ in 0..ROUNDS {
         states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
+        problem.cancellation.check()?;
         search = states.fit(problem, &mut x, Met::Forces).ok_or(IdentifyError::Singular)?;
         let residuals = [states.force_residuals(problem, &x)];
         let left: Vec<f64> = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
@@ -59,40 +63,114 @@ pub(super) fn identify(
     states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
     let mut normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;
     (normal.converged, normal.decrement, normal.held) = (search.converged, search.decrement, search.held);
-    let fitted = Fitted { x, segments, normal, substeps: 0 };
-    let (inflation, widened) = fitted.inflation();
-    let residuals = states.force_residuals(problem, &fitted.x);
-    let blocks: Vec<Vec<f64>> = residuals.chunks(LANES * n).map(<[f64]>::to_vec).collect();
-    let expected = noises(problem, states, &fitted.x);
+    let residuals = states.force_residuals(problem, &x);
+    let copies = bootstrap::copies(problem, smoothing, (states, &x, &sigma));
+    let expected: Vec<Vec<f64>> = match &copies {
+        Some(copies) => (0..n).map(|i| copies.squares(&states.places, (n, i))).collect(),
+        None => noises(problem, states, &x).iter().map(|noise| vec![noise * noise; count]).collect(),
+    };
+    let over = |residuals: &[f64], i: usize| {
+        let of = |(r, square): (&f64, &f64)| if *square > 0.0 { r / square.sqrt().max(least[i]) } else { f64::NAN };
+        residuals.iter().zip(&expected[i]).map(of).collect::<Vec<f64>>()
+    };
+    // Residuals over the errors of their samples, by coordinate.
+    let own = |i: usize| over(&residuals.iter().skip(i).step_by(n).copied().collect::<Vec<_>>(), i);
+    let scaled: Vec<Vec<f64>> = (0..n).map(own).collect();
+    let size = |i: usize| {
+        let far = FAR * usual(std::slice::from_ref(&scaled[i]), 1, 0);
+        rms(scaled[i].iter().copied().filter(|z| z.abs() <= far))
+    };
+    let sizes: Vec<f64> = (0..n).map(size).collect();
+    let probability = |i: usize| {
+        let Some(copies) = &copies else { return 1.0 };
+        let others = (0..COPIES).map(|copy| over(&copies.residuals(copy, &states.places, (n, i)), i));
+        drifting(&scaled[i], &others.collect::<Vec<_>>(), &states.places)
+    };
+    let probabilities: Vec<f64> = (0..n).map(|i| (n as f64 * probability(i)).min(1.0)).collect();
     let left = |i: usize| {
-        let rms = rms(residuals.iter().skip(i).step_by(n).copied());
-        let (autocorrelation, white) = whiteness(&blocks, n, i);
-        let coordinate = recording.coordinates[i].clone();
-        Residual { coordinate, rms, noise: expected[i].max(least[i]), spread: spread[i], autocorrelation, white }
+        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
+        let autocorrelation = correlation(std::slice::from_ref(&scaled[i])).neighbours;
+        let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= CHANCE);
+        Residual { coordinate, rms: sizes[i] * noise, noise, spread: spread[i], autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(left).collect();
-    let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
-    let explained = fitted.normal.converged && (0..n).all(|i| sigma[i] < EXPLAINED * by_coordinate[i].noise);
-    // States of all trajectories in a row.
     let whole = Segment { track: 0, first: 0, samples: count, start: Vec::new() };
     let far = |_, state: usize, i: usize, size: f64| {
         let (track, sample) = states.places[state];
         let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
         Outlier { track, sample, time, coordinate, size }
     };
-    let (outliers, outlier_count) = outliers((&[whole], &[residuals]), n, far);
+    // States of all trajectories in a row.
+    let together: Vec<f64> = (0..count * n).map(|at| scaled[at % n][at / n]).collect();
+    let (outliers, outlier_count) = outliers((&[whole], &[together]), n, far);
+    let verdict = Evidence {
+        converged: normal.converged,
+        residuals: &by_coordinate,
+        sizes: by_coordinate.iter().map(|r| r.rms).collect(),
+        exact: least.clone(),
+        probabilities,
+        outliers: outlier_count as f64 / (count * n) as f64,
+        agreement: 1.0,
+    }
+    .verdict();
+    let over_noise = over_noise(&by_coordinate);
+    let (normal, inflation) = match &copies {
+        Some(copies) => {
+            let root = Root::of(x.len(), &normal.matrix);
+            let (bias, mut covariance) = copies.bias(&root, &x);
+            let away: Vec<f64> = bias.iter().map(|bias| -bias).collect();
+            x = problem.moved(&x, &away, &normal);
+            // Residuals that are larger than those of the copies come with errors that are.
+            covariance.iter_mut().for_each(|c| *c *= over_noise.max(1.0).powi(2));
+            let inflation = mean_eigenvalue(&covariance, root.forward.len());
+            (root.informed(&normal, &covariance, f64::MIN_POSITIVE), inflation)
+        }
+        None => (normal, 1.0),
+    };
+    let fitted = Fitted { x, segments, normal: normal.with_held(), substeps: 0 };
+    let normal_at = |x: &[f64]| states.normal(problem, x, Met::Forces);
+    problem.cancellation.check()?;
     Ok(Identified {
         converged: fitted.normal.converged,
         decrement: fitted.normal.decrement,
-        explained,
+        explained: verdict.explains(),
+        verdict,
         residuals: by_coordinate,
-        over_noise: square.sqrt(),
+        over_noise,
         outliers,
         outlier_count,
-        inflation: widened,
+        inflation,
         samples: count,
-        ..unknowns(instance, problem, &fitted, (&start, inflation), Met::Forces)
+        ..unknowns(instance, problem, &fitted, (&start, 1.0), (Met::Forces, &normal_at))
     })
+}
+
+/// Samples over which residuals are added up to see slow ones.
+const BLOCKS: [usize; 3] = [4, 16, 64];
+
+/// Probability that residuals of the right form vary as much over many samples, judged by those of copies: sums over blocks, `t`-distributed in
+/// their logarithm.
+fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -> f64 {
+    let slow = |values: &[f64], block: usize| {
+        let mut square = f64::MIN_POSITIVE;
+        for (part, places) in values.chunks(block).zip(places.chunks(block)) {
+            let whole = part.len() == block && places[0].0 == places[block - 1].0;
+            let known = part.iter().filter(|z| z.is_finite());
+            if whole {
+                square += known.clone().sum::<f64>().powi(2) / (known.count() as f64).max(1.0);
+            }
+        }
+        square.ln()
+    };
+    let count = copies.len() as f64;
+    let of = |block: &usize| {
+        let others: Vec<f64> = copies.iter().map(|copy| slow(copy, *block)).collect();
+        let mean = others.iter().sum::<f64>() / count;
+        let scatter = others.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0) * (1.0 + 1.0 / count);
+        let t = (slow(residuals, *block) - mean) / scatter.sqrt().max(f64::MIN_POSITIVE);
+        if t > 0.0 { tail(t * t, 1.0, count - 1.0) / 2.0 } else { 1.0 }
+    };
+    (BLOCKS.iter().map(of).fold(1.0, f64::min) * BLOCKS.len() as f64).min(1.0)
 }
 
 /// Standard deviation of the residual of every force that noise alone leaves: that of the force itself, and what the errors of the

@@ -33,6 +33,9 @@ pub(super) fn met(
     options: &IdentifyOptions,
 ) -> Result<Met, IdentifyError> {
     let driven = recording.is_driven();
+    // A joint that nothing drives has a known force of 0.
+    let mut forces = recording.tracks.iter().flat_map(|track| &track.force);
+    let pushed = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
     // Both belong to motion that is followed.
     let follows = options.segment.is_some()
         || !options.errors.is_empty()
@@ -43,7 +46,7 @@ pub(super) fn met(
     };
     match options.targets {
         Some(Targets::Motion) => Ok(Met::Accelerations),
-        Some(Targets::Forces) if !driven => refused("motion, of a recording without known forces", "forces"),
+        Some(Targets::Forces) if !pushed => refused("motion, of a recording without known forces", "forces"),
         Some(Targets::Forces) if follows => refused(
             "motion, beside unknown constants of sensors, errors of positions or a length of segments",
             "forces",

@@ -150,7 +150,8 @@ impl Problem<'_> {
         self.judge(x, &mut normal, &muted, false);
         let mut damping = FIRST_DAMPING;
         for _ in 0..iterations {
-            if normal.converged {
+            let residual = (normal.square / normal.count.max(1.0)).sqrt();
+            if normal.converged || !self.cancellation.iterate(residual) {
                 break;
             }
             let change = self.step(x, &normal, &muted, damping).change;
@@ -223,7 +224,7 @@ impl Problem<'_> {
             }
             let total: f64 = best.iter().flatten().map(|linear| linear.square).sum();
             settled = gained < SETTLED * total;
-            if settled {
+            if settled || self.cancellation.is_cancelled() {
                 break;
             }
         }
@@ -254,4 +255,13 @@ fn solution(normal: &Normal, free: &[usize], damping: f64) -> Vec<f64> {
         vector.iter().zip(free).for_each(|(v, &k)| change[k] += v * size / root(k));
     }
     change
+}
+
+/// Leaves unknowns out of normal equations: they stay where they are.
+pub(super) fn mute(muted: &[bool], matrix: &mut [f64], right: &mut [f64]) {
+    let m = right.len();
+    for (k, _) in muted.iter().enumerate().filter(|(_, muted)| **muted) {
+        (0..m).for_each(|l| (matrix[k * m + l], matrix[l * m + k]) = (0.0, 0.0));
+        (matrix[k * m + k], right[k]) = (1.0, 0.0);
+    }
 }

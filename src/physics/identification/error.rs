@@ -1,5 +1,6 @@
 //! Why nothing is identified.
 
+use crate::cancellation::Cancelled;
 use crate::names::unknown;
 use crate::recording::TrajectoryError;
 use crate::recording::smooth::SmoothError;
@@ -9,6 +10,9 @@ use crate::tape::TapeError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
+    /// The search was ended from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// Arrays that do not make a trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),

@@ -5,13 +5,10 @@ use crate::lagrangian::Equations;
 use crate::linalg::{self, Workspace};
 use crate::recording::{RecordedTrajectory, Recording};
 use crate::tape::Replay;
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Segments that are followed side by side.
 pub(super) const LANES: usize = 64;
-/// Samples to either side that a band-limited force is made of.
-const REACH: isize = 8;
 
 /// Samples that are followed from one start.
 #[derive(Clone, Debug)]
@@ -50,6 +47,16 @@ impl State {
     fn sized(lanes: usize, n: usize, columns: usize) -> Self {
         let [state, slopes] = [lanes * n, lanes * n * columns].map(|size| vec![0.0; size]);
         Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
+    }
+
+    /// Slopes of positions and velocities by the starts, `(lanes, 2n, 2n)`, of derivatives with `columns` numbers.
+    pub fn by_starts(&self, n: usize, columns: usize) -> Vec<f64> {
+        let lane = |(q, v): (&[f64], &[f64])| {
+            let rows = q.chunks_exact(columns).chain(v.chunks_exact(columns));
+            rows.flat_map(|row| &row[..2 * n]).copied().collect::<Vec<f64>>()
+        };
+        let lanes = self.q_slopes.chunks_exact(n * columns).zip(self.v_slopes.chunks_exact(n * columns));
+        lanes.flat_map(lane).collect()
     }
 
     /// `from` moved by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
@@ -352,41 +359,8 @@ pub(super) fn forces(track: &RecordedTrajectory, between: Between, (sample, x): 
     if track.force.is_empty() {
         return;
     }
-    let before = sample.saturating_sub(1);
-    let last = track.len() as isize - 1;
-    let mut take = |at: isize, weight: f64| {
-        let row = &track.force[at.clamp(0, last) as usize * n..][..n];
+    between.weigh(&track.times, (sample, x), |at, weight| {
+        let row = &track.force[at * n..][..n];
         into.iter_mut().zip(row).for_each(|(f, r)| *f += weight * r);
-    };
-    match between {
-        Between::Held => take(before as isize, 1.0),
-        Between::Linear => {
-            take(before as isize, 1.0 - x);
-            take(sample as isize, x);
-        }
-        Between::Cubic => {
-            let time = |at: isize| track.times[at as usize];
-            let first = (before as isize - 1).clamp(0, (last - 3).max(0));
-            // Repeated measurements are one node.
-            let nodes = (first..=(first + 3).min(last)).filter(|&k| k == first || time(k) > time(k - 1));
-            let now = time(before as isize) + x * (time(sample as isize) - time(before as isize));
-            for k in nodes.clone() {
-                let others = nodes.clone().filter(|&j| j != k);
-                take(k, others.map(|j| (now - time(j)) / (time(k) - time(j))).product());
-            }
-        }
-        Between::BandLimited => {
-            let weight = |k: isize| {
-                let t = x - k as f64;
-                if t.abs() < 1e-12 {
-                    return 1.0;
-                }
-                let width = REACH as f64;
-                if t.abs() >= width { 0.0 } else { width * (PI * t).sin() * (PI * t / width).sin() / (PI * t).powi(2) }
-            };
-            let weights = || (1 - REACH..=REACH).map(|k| (k, weight(k)));
-            let whole: f64 = weights().map(|(_, w)| w).sum();
-            weights().for_each(|(k, w)| take(before as isize + k, w / whole));
-        }
-    }
+    });
 }

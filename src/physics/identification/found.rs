@@ -1,7 +1,7 @@
 //! What was identified.
 
-use super::Between;
-use serde::Serialize;
+use super::{Between, Verdict};
+use serde::{Serialize, Serializer};
 
 /// A constant of the system.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -38,11 +38,13 @@ pub struct SensorConstant {
 pub struct Undetermined {
     /// The constants.
     pub constants: Vec<String>,
-    /// Relative change of each along the direction that is open, the largest 1.
-    pub direction: Vec<f64>,
-    /// The combinations that are known nevertheless, with their values.
-    pub known: Vec<(String, f64)>,
-    /// Standard error along the direction, relative to the values; none where the motion does not depend on it at all.
+    /// Relative change of each constant along each open direction, the largest 1: `(directions, constants)`. A constant is compared with its
+    /// value or its start, whichever is larger.
+    pub directions: Vec<Vec<f64>>,
+    /// Combinations that are known nevertheless, each confirmed by moving the constants by a factor of two along every direction and fitting
+    /// the others again.
+    pub known: Vec<Combination>,
+    /// Largest standard error along a direction, relative to the values; none where the motion does not depend on one at all.
     pub relative_error: Option<f64>,
     /// What is open, in words.
     pub text: String,
@@ -50,17 +52,39 @@ pub struct Undetermined {
     pub cure: String,
 }
 
-/// A sum of constants that is known though they are not: a base parameter of a robot.
+/// A sum or a product of powers of constants that is known though they are not, such as a base parameter of a robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Combination {
-    /// Each constant with its factor; the first has the factor 1.
+    /// Its formula, such as `c1/(g^2*m1)` or `m1 + 0.5*m2`.
+    pub name: String,
+    /// `true` for a product of powers.
+    pub product: bool,
+    /// Each constant with its factor in a sum, or its exponent in a product; as an object in JSON.
+    #[serde(serialize_with = "as_object")]
     pub terms: Vec<(String, f64)>,
-    /// The value of the sum.
+    /// Its value.
     pub value: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// Unit of the sum.
+    /// Its unit; empty where it has none.
     pub unit: String,
+}
+
+fn as_object<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, x)| (name, x)))
+}
+
+/// How the inertias of a chain of links became those of bodies: positive masses and positive definite pseudo-inertias
+/// `[[tr(I)/2 E - I, h], [h', m]]` (Wensing, Kim and Slotine, "Linear matrix inequalities for physically consistent inertial parameter
+/// identification", 2018).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Bodies {
+    /// Links whose constants had to be moved, from 1.
+    pub moved: Vec<usize>,
+    /// Largest change of a known sum by it, in standard errors of the sum.
+    pub largest_change: f64,
+    /// `false` if no bodies have the known sums within their errors, or none have the constants that are given.
+    pub exist: bool,
 }
 
 /// What is left of the motion of one coordinate, or of the force on it.
@@ -74,9 +98,9 @@ pub struct Residual {
     pub noise: f64,
     /// Standard deviation of what is met: of the positions, or of the forces.
     pub spread: f64,
-    /// Correlation of residuals that follow each other; that of noise is 0.
+    /// Correlation of residuals that follow each other, as far as the start of a segment does not make it; that of white noise is 0.
     pub autocorrelation: f64,
-    /// `true` if they follow each other as noise does.
+    /// `true` if residuals do not follow from the earlier ones, over all lags together at a level of 1 %.
     pub white: bool,
 }
 
@@ -108,6 +132,8 @@ pub struct Identified {
     pub undetermined: Vec<Undetermined>,
     /// Sums of constants that are known, where forces are met and are linear in the constants.
     pub combinations: Vec<Combination>,
+    /// How inertias became those of bodies; none for a system that is no chain of links.
+    pub bodies: Option<Bodies>,
     /// What is left, by coordinate.
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
@@ -118,14 +144,18 @@ pub struct Identified {
     pub converged: bool,
     /// The decrease of the sum of squares that was left to gain at the end, over the variance of the noise: the Newton decrement.
     pub decrement: f64,
-    /// `true` if what is left is as large as the noise and white: the form explains the motion.
+    /// Whether the form explains what was measured, and if not, why.
+    pub verdict: Verdict,
+    /// `true` if it does: [`Verdict::explains`].
     pub explained: bool,
     /// Samples far from the motion, the farthest first, 100 at most.
     pub outliers: Vec<Outlier>,
     /// Number of all of them.
     pub outlier_count: usize,
-    /// Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+    /// Mean factor by which variances of the unknowns are larger than those of independent residuals of the same size; 1 for these.
     pub inflation: f64,
+    /// Standard deviation of the noise of the known force on every coordinate, as the motion shows it; empty if it shows none.
+    pub force_noise: Vec<f64>,
     /// Samples that were followed, or whose forces were met.
     pub samples: usize,
     /// Number of segments; none where forces were met.

@@ -23,6 +23,26 @@ pub(crate) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f
     Some(inverse)
 }
 
+/// Inverses of a batch of matrices of any kind, `(batch, n, n)`: `[[0, A], [A', 0]]` is symmetric, and its inverse has that of `A` in a corner.
+pub(super) fn inverses(n: usize, matrices: &[f64]) -> Vec<f64> {
+    let batch = matrices.len() / (n * n);
+    let mut symmetric = vec![0.0; 4 * matrices.len()];
+    for (whole, matrix) in symmetric.chunks_exact_mut(4 * n * n).zip(matrices.chunks_exact(n * n)) {
+        for (at, x) in matrix.iter().enumerate() {
+            let (i, j) = (at / n, at % n);
+            (whole[i * 2 * n + n + j], whole[(n + j) * 2 * n + i]) = (*x, *x);
+        }
+    }
+    let mut inverse = vec![0.0; symmetric.len()];
+    // Those that are singular are NaN.
+    let _ = linalg::inverse(2 * n, &symmetric, &mut inverse, &mut Workspace::new());
+    let corner = |at: usize| {
+        let (matrix, i, j) = (at / (n * n), at / n % n, at % n);
+        inverse[matrix * 4 * n * n + (n + i) * 2 * n + j]
+    };
+    (0..batch * n * n).map(corner).collect()
+}
+
 /// `A x`.
 pub(crate) fn times(n: usize, matrix: &[f64], x: &[f64]) -> Vec<f64> {
     (0..n).map(|i| dot(&matrix[i * n..(i + 1) * n], x)).collect()
@@ -44,6 +64,18 @@ mod tests {
         let x = times(3, &inverse, &[1.0, 2.0, 3.0]);
         let again = times(3, &matrix, &x);
         assert!(again.iter().zip([1.0, 2.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-10), "{again:?}");
+    }
+
+    #[test]
+    fn matrices_without_symmetry_are_inverted() {
+        let matrices = [0.0, 2.0, -1.0, 1e-3, 3.0, 4.0, 0.0, 5.0];
+        let found = inverses(2, &matrices);
+        for (matrix, inverse) in matrices.chunks(4).zip(found.chunks(4)) {
+            for k in 0..2 {
+                let column = times(2, matrix, &[inverse[k], inverse[2 + k]]);
+                assert!((0..2).all(|i| (column[i] - f64::from(u8::from(i == k))).abs() < 1e-12), "{column:?}");
+            }
+        }
     }
 
     #[test]

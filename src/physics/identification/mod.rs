@@ -25,14 +25,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bodies;
+mod bootstrap;
 mod by_forces;
 mod choices;
+mod covariance;
+mod cure;
 mod descent;
 mod determined;
 mod error;
 mod follow;
 mod found;
+mod innovations;
+mod invariants;
 pub(crate) mod linear;
+mod moves;
 mod pieces;
 mod quality;
 #[cfg(test)]
@@ -42,33 +49,24 @@ mod solve;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod unknowns;
+mod verdict;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
-pub use found::{Combination, Constant, Identified, Residual, Undetermined};
+pub use found::{Bodies, Combination, Constant, Identified, Residual, Undetermined};
 #[doc(hidden)]
 pub use found::{Outlier, SensorConstant};
+pub(crate) use innovations::Disturbances;
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
-pub(crate) use stages::{choose_steps, joined, spread_of};
+pub(crate) use stages::{choose_steps, joined, spread_of, thinned};
+pub use verdict::Verdict;
 
+use crate::cancellation::Cancellation;
 use crate::recording::Targets;
-use serde::{Deserialize, Serialize};
-
-/// Known forces between the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Between {
-    /// Each as it was at the sample before: zero-order hold, what a converter or a controller does.
-    Held,
-    /// On straight lines.
-    Linear,
-    /// On curves of the third degree, each through the four nearest samples: for forces that are smooth from sample to sample.
-    Cubic,
-    /// By the smooth curve without frequencies above half the rate of the samples: a windowed sum of `sin(x)/x`.
-    BandLimited,
-}
+pub use crate::rollout::Between;
+use serde::Deserialize;
 
 /// What is identified, and how.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -98,4 +96,7 @@ pub struct IdentifyOptions {
     pub robust: bool,
     /// Threads; 0 for one. The result does not depend on their number.
     pub threads: usize,
+    /// Ends the search, and receives reports of how far it is.
+    #[serde(skip)]
+    pub cancellation: Cancellation,
 }

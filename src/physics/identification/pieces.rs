@@ -3,6 +3,7 @@
 //! Smoothing does not reach across a long gap, but the equations of motion do: pieces are only where the search begins.
 
 use super::follow::Segment;
+use super::stages::thinned;
 use super::{IdentifyError, IdentifyOptions};
 use crate::linalg::{self, Workspace};
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise as estimated};
@@ -18,22 +19,26 @@ const SMOOTHED: usize = 12;
 pub(super) const LEAST_SEGMENT: usize = 6;
 /// Samples of a trajectory that has something to say: two are taken by its start.
 const LEAST_TRACK: usize = 3;
-/// Samples that are followed at most.
-const MOST_SAMPLES: usize = 60_000;
 
 /// A piece of a trajectory.
 pub(super) struct Piece {
     pub track: usize,
     pub samples: Range<usize>,
-    /// Its motion smoothed, with the sample of each state, of repeated measurements the first; none of a short piece.
-    pub smoothed: Option<(Smoothed, Vec<usize>)>,
+    /// Its number among the long ones.
+    long: Option<usize>,
 }
 
 /// The pieces of a recording in order.
 pub(super) struct Pieces<'a> {
     recording: &'a Recording,
     /// Pieces of a recording, those of one trajectory after each other.
-    pub all: Vec<Piece>,
+    all: Vec<Piece>,
+    /// The long pieces as trajectories of their own, of repeated measurements the first, with the trajectory and the samples they come from.
+    pub long: Recording,
+    origin: Vec<(usize, Vec<usize>)>,
+    /// Their motion, if there are any.
+    pub smoothing: Option<Smoothing>,
+    pub smoothed: Vec<Option<Smoothed>>,
     /// Usual step in s.
     pub step: f64,
     /// Standard deviation of every coordinate's noise, as given or as estimated.
@@ -60,19 +65,20 @@ impl<'a> Pieces<'a> {
                 let states = &distinct[pair[0]..pair[1]];
                 let end = distinct.get(pair[1]).copied().unwrap_or(recorded.len());
                 parts.push((part(recorded, states, n), states.to_vec()));
-                all.push(Piece { track, samples: states[0]..end, smoothed: None });
+                all.push(Piece { track, samples: states[0]..end, long: None });
             }
         }
         let usable: usize = all.iter().map(|piece: &Piece| piece.samples.len()).sum();
         if usable < LEAST_SAMPLES {
             return Err(IdentifyError::Short { found: usable, needed: LEAST_SAMPLES });
         }
-        let long = parts.iter().map(|(part, _)| part).filter(|part| part.len() >= SMOOTHED).cloned().collect();
-        let long = Recording {
-            coordinates: recording.coordinates.clone(),
-            periodic: recording.periodic.clone(),
-            tracks: long,
-        };
+        let mut long = Recording { tracks: Vec::new(), ..recording.clone() };
+        let mut origin = Vec::new();
+        for (piece, (part, states)) in all.iter_mut().zip(&parts).filter(|(_, (part, _))| part.len() >= SMOOTHED) {
+            piece.long = Some(origin.len());
+            long.tracks.push(part.clone());
+            origin.push((piece.track, states.clone()));
+        }
         let choices = SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() };
         // Short pieces tell of the noise, but are not smoothed.
         let chosen = (!long.tracks.is_empty()).then(|| Smoothing::choose(&long, &choices)).transpose();
@@ -97,12 +103,31 @@ impl<'a> Pieces<'a> {
         let still = smoothing.as_ref().map_or_else(Vec::new, |smoothing| stillness(&long, smoothing));
         let still = still.into_iter().filter(|(_, how)| !matches!(how, Stillness::Copy(_)));
         let still = still.map(|(i, how)| format!("{} {how}", recording.coordinates[i])).collect();
-        for (piece, (part, states)) in all.iter_mut().zip(parts) {
-            if let Some(smoothing) = smoothing.as_ref().filter(|_| part.len() >= SMOOTHED) {
-                piece.smoothed = Some((smoothing.apply(&part)?, states));
-            }
-        }
-        Ok(Self { recording, all, step, noise, noise_of, still })
+        let smooth =
+            |track: &RecordedTrajectory| smoothing.as_ref().map(|smoothing| smoothing.apply(track)).transpose();
+        let smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { recording, all, long, origin, smoothing, smoothed, step, noise, noise_of, still })
+    }
+
+    /// Trajectory and sample of a sample of a long piece.
+    pub fn origin(&self, track: usize, sample: usize) -> (usize, usize) {
+        let (from, samples) = &self.origin[track];
+        (*from, samples[sample])
+    }
+
+    /// Segments of the long pieces.
+    pub fn cut_long(&self) -> Vec<Segment> {
+        let n = self.recording.n();
+        let of = |(track, smoothed): (usize, &Option<Smoothed>)| {
+            let smoothed = smoothed.as_ref()?;
+            let length = smoothed.times.len();
+            let start = |first: usize| {
+                let start = [&smoothed.q, &smoothed.v].map(|values| &values[first * n..(first + 1) * n]).concat();
+                Segment { track, first, samples: LEAST_SEGMENT.min(length - first), start }
+            };
+            Some((0..length).step_by(LEAST_SEGMENT).map(start).collect::<Vec<_>>())
+        };
+        thinned(self.smoothed.iter().enumerate().filter_map(of).flatten().collect())
     }
 
     /// First samples behind long gaps, by trajectory.
@@ -141,8 +166,9 @@ impl<'a> Pieces<'a> {
         let n = self.recording.n();
         let behind = self.all.partition_point(|piece| (piece.track, piece.samples.start) <= (track, sample));
         let piece = behind.checked_sub(1).and_then(|at| self.all.get(at));
-        if let Some((smoothed, states)) = piece.and_then(|piece| piece.smoothed.as_ref()) {
-            let at = states.partition_point(|state| *state <= sample).saturating_sub(1);
+        let long = piece.and_then(|piece| piece.long);
+        if let Some((smoothed, k)) = long.and_then(|k| Some((self.smoothed[k].as_ref()?, k))) {
+            let at = self.origin[k].1.partition_point(|state| *state <= sample).saturating_sub(1);
             return [&smoothed.q, &smoothed.v].map(|values| &values[at * n..(at + 1) * n]).concat();
         }
         nearby(&self.recording.tracks[track], n, sample, piece.map_or(0..0, |piece| piece.samples.clone()))
@@ -196,17 +222,4 @@ fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usiz
         (start[i], start[n + i]) = (solved[0], if span > 0.0 { solved[1] / span } else { 0.0 });
     }
     start
-}
-
-/// At most so many samples, in runs of segments that follow each other, so that they can be joined later.
-fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
-    const RUN: usize = 16;
-    let all: usize = segments.iter().map(|segment| segment.samples).sum();
-    if all <= MOST_SAMPLES {
-        return segments;
-    }
-    let runs = segments.len().div_ceil(RUN);
-    let kept = (runs * MOST_SAMPLES / all).max(1);
-    let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
-    segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }

@@ -1,43 +1,102 @@
 //! Residuals: whether they are noise, and which samples stand out.
 
-use super::follow::Segment;
-use super::found::Outlier;
+use super::follow::{LANES, Segment};
+use super::found::{Outlier, Residual};
+use super::innovations::Disturbances;
+use super::solve::Problem;
+use super::verdict::Verdict;
+use crate::recording::robust_deviation;
+use crate::scalar::Real;
 
+/// Size of residuals over the noise up to which a form explains what was measured.
+pub(super) const EXPLAINED: f64 = 1.3;
+/// Probability below which independent residuals of the right form are not believed to be as correlated as those that were found. Of right
+/// forms this test and that of [`DIFFERENT`] refuse one and a half in a hundred.
+pub(super) const CHANCE: f64 = 0.01;
+/// Probability below which parts of a recording are not believed to have the same constants.
+const DIFFERENT: f64 = 0.005;
+/// Residual over the spread of what is met from which on there is more noise than anything else.
+const NOISY: f64 = 0.5;
+/// Share of samples that may stand out.
+const FEW: f64 = 0.01;
 /// Residuals this many times the usual one stand out.
-const FAR: f64 = 5.5;
+pub(super) const FAR: f64 = 5.5;
 /// Samples that stand out, listed at most.
 const MOST_LISTED: usize = 100;
-/// Correlation of neighbours below which residuals pass for white whatever their number.
-const NEGLIGIBLE: f64 = 0.1;
+/// Lags of the test of independence. A missing term is correlated over many samples, and a sum over as many lags shows it best; more than these
+/// find no more (`cargo bench --bench rates -- --part identify`).
+const LAGS: usize = 20;
 
-/// Correlation of neighbours among the residuals of a coordinate, and whether that is noise. What starts and constants take away
-/// makes neighbours differ a little more than noise does.
-pub(super) fn whiteness(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> (f64, bool) {
-    let (mut products, mut squares, mut pairs, mut numbers) = (0.0, 0.0, 0.0, 0.0);
-    for segment in residuals {
-        let of: Vec<f64> = segment.iter().skip(coordinate).step_by(n).copied().collect();
-        products += of.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
-        squares += of.iter().map(|r| r * r).sum::<f64>();
-        pairs += (of.len() - 1) as f64;
-        numbers += of.len() as f64;
+/// Probability that a variable of the F distribution with these degrees of freedom is larger: Paulson's normal approximation of its cube root
+/// (Annals of Mathematical Statistics 13 (1942) 233), and Wilson and Hilferty's of chi squared for many of the second.
+pub(super) fn tail(ratio: f64, first: f64, second: f64) -> f64 {
+    let [a, b] = [first, second].map(|freedom| 2.0 / (9.0 * freedom));
+    let root = ratio.max(0.0).cbrt();
+    let z = ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt();
+    Real::erfc(z / std::f64::consts::SQRT_2) / 2.0
+}
+
+/// How the residuals of a coordinate follow each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Correlation {
+    /// Correlation of neighbours.
+    pub neighbours: f64,
+    /// Probability that independent residuals are as correlated (Ljung and Box, Biometrika 65 (1978) 297).
+    pub probability: f64,
+    /// Samples over which residuals are plainly correlated.
+    pub length: usize,
+}
+
+/// Correlation of runs of numbers, of which those that are missing are `NaN`.
+pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
+    let (squares, count) = runs
+        .iter()
+        .flatten()
+        .filter(|x| x.is_finite())
+        .fold((0.0, 0.0), |(sum, count): (f64, f64), x| (sum + x * x, count + 1.0));
+    let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
+    let square = squares / count.max(1.0);
+    // The correlation at a lag in units of its scatter, and the number of pairs.
+    let at = |lag: usize| {
+        let pairs = runs.iter().flat_map(|run| run.iter().zip(run.iter().skip(lag)));
+        let (sum, pairs) = pairs
+            .map(|(a, b)| a * b)
+            .filter(|x| x.is_finite())
+            .fold((0.0, 0.0), |(sum, pairs): (f64, f64), x| (sum + x, pairs + 1.0));
+        if square > 0.0 && pairs > 0.0 { (sum / square / f64::sqrt(pairs), pairs) } else { (0.0, 0.0) }
+    };
+    let (first, pairs) = at(1);
+    let lags = LAGS.min(longest / 4).max(1);
+    let statistic: f64 = (1..=lags).map(|lag| at(lag).0.powi(2)).sum();
+    let length = (1..longest / 2).find(|&lag| at(lag).0 < 2.0).unwrap_or(longest / 2);
+    Correlation {
+        neighbours: first / f64::sqrt(pairs.max(1.0)),
+        probability: tail(statistic / lags as f64, lags as f64, 1e9),
+        length,
     }
-    if squares <= 0.0 || pairs < 1.0 {
-        return (0.0, true);
+}
+
+/// Innovations of every coordinate along segments that start anywhere: those of the right form are independent, of variance 1.
+pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<Vec<f64>>> {
+    let n = problem.sigma.len();
+    let mut open = problem.clone();
+    open.disturbances = Disturbances { unknown_start: true, ..problem.disturbances.clone() };
+    let runs = || segments.iter().map(|segment| vec![f64::NAN; segment.samples]).collect::<Vec<_>>();
+    let mut found: Vec<Vec<Vec<f64>>> = (0..n).map(|_| runs()).collect();
+    let mut order: Vec<usize> = (0..segments.len()).collect();
+    order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
+    for batch in order.chunks(LANES) {
+        let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
+        open.residuals(x, &lanes, true, |lane, sample, i, r, _| found[i][batch[lane]][sample] = r);
     }
-    let correlation = products / pairs / (squares / numbers);
-    // Each start takes two numbers of a coordinate.
-    let taken = 2.0 * residuals.len() as f64 / numbers;
-    let expected = -taken;
-    (correlation, (correlation - expected).abs() <= (4.0 / pairs.sqrt()).max(NEGLIGIBLE) + taken)
+    found
 }
 
 /// Standard deviation of the residuals of a coordinate by the median of their size, which samples that stand out do not move.
 pub(super) fn usual(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> f64 {
     let own = residuals.iter().flat_map(|segment| segment.iter().skip(coordinate).step_by(n));
-    let mut sizes: Vec<f64> = own.map(|r| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    // The median of the size of normal numbers is 0.6745 of their deviation.
-    sizes.get(sizes.len() / 2).copied().unwrap_or(0.0) / 0.6745
+    let mut sizes: Vec<f64> = own.copied().collect();
+    if sizes.is_empty() { 0.0 } else { robust_deviation(&mut sizes) }
 }
 
 /// Samples far from the motion, the farthest first, and the number of all of them.
@@ -62,4 +121,107 @@ pub(super) fn outliers(
         found.into_iter().take(MOST_LISTED).map(|(track, sample, i, size)| describe(track, sample, i, size)).collect(),
         count,
     )
+}
+
+/// Root mean square of the residuals over the noise, all coordinates together.
+pub(super) fn over_noise(residuals: &[Residual]) -> f64 {
+    (residuals.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / residuals.len().max(1) as f64).sqrt()
+}
+
+/// Mean eigenvalue of a symmetric matrix `(n, n)`.
+pub(super) fn mean_eigenvalue(matrix: &[f64], n: usize) -> f64 {
+    (0..n).map(|k| matrix[k * n + k]).sum::<f64>() / n.max(1) as f64
+}
+
+/// What speaks for a form and against it.
+pub(super) struct Evidence<'a> {
+    pub converged: bool,
+    /// By coordinate, with its noise and its spread, which is 0 where nothing is to be compared with.
+    pub residuals: &'a [Residual],
+    /// Size of the residuals of every coordinate that samples far from the motion do not move.
+    pub sizes: Vec<f64>,
+    /// The same that integration and rounding leave.
+    pub exact: Vec<f64>,
+    /// Probability that independent residuals are as correlated, by coordinate, whichever of all it is.
+    pub probabilities: Vec<f64>,
+    /// Share of samples far from the motion.
+    pub outliers: f64,
+    /// Probability that noise makes parts of the recording differ as much.
+    pub agreement: f64,
+}
+
+impl Evidence<'_> {
+    pub fn verdict(&self) -> Verdict {
+        let share = |i: usize| {
+            let spread = self.residuals[i].spread;
+            if spread > 0.0 { self.sizes[i] / spread } else { 0.0 }
+        };
+        let name = |i: usize| self.residuals[i].coordinate.clone();
+        let all = || 0..self.sizes.len();
+        let over = |i: &usize| self.sizes[*i] / self.residuals[*i].noise;
+        let worst = all().max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
+        let least = all().min_by(|&a, &b| self.probabilities[a].total_cmp(&self.probabilities[b])).unwrap_or(0);
+        if !self.converged {
+            return Verdict::NotConverged;
+        }
+        if all().all(|i| self.sizes[i] <= self.exact[i]) {
+            return Verdict::Exact;
+        }
+        if let Some(i) = all().find(|&i| share(i) > NOISY && over(&i) <= EXPLAINED) {
+            return Verdict::Uninformative { coordinate: name(i), share: share(i) };
+        }
+        if over(&worst) > EXPLAINED {
+            return Verdict::Large { coordinate: name(worst), over_noise: over(&worst), share: share(worst) };
+        }
+        if self.outliers > FEW {
+            return Verdict::Outliers { share: self.outliers };
+        }
+        if self.probabilities[least] < CHANCE {
+            let probability = self.probabilities[least];
+            return Verdict::Correlated { coordinate: name(least), probability, share: share(least) };
+        }
+        if self.agreement < DIFFERENT {
+            return Verdict::Disagreement { probability: self.agreement };
+        }
+        Verdict::Explained
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::RngStream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn tails_are_those_of_tables() {
+        // F(5, 10) is beyond 3.3258 in 5 of 100, F(1, 30) beyond 7.5625 in 1, chi squared of 20 beyond 37.5662 in 1.
+        for (ratio, first, second, exact) in
+            [(3.3258, 5.0, 10.0, 0.05), (7.5625, 1.0, 30.0, 0.01), (37.5662 / 20.0, 20.0, 1e9, 0.01)]
+        {
+            let found = tail(ratio, first, second);
+            assert!((found / exact - 1.0).abs() < 0.12, "{found} {exact}");
+        }
+        assert!(tail(1e3, 10.0, 1e3) < 1e-30 && tail(0.0, 3.0, 9.0) > 0.99);
+    }
+
+    #[test]
+    fn independent_numbers_pass_and_others_do_not() {
+        let mut rng = RngStream::Region.generator(1);
+        let mut series = |memory: f64| {
+            let mut last = 0.0;
+            let mut next = || {
+                let draw: f64 = StandardNormal.sample(&mut rng);
+                last = memory * last + draw;
+                last
+            };
+            correlation(&[(0..600).map(|_| next()).collect::<Vec<f64>>(), (0..400).map(|_| next()).collect()])
+        };
+        let refused = (0..200).filter(|_| series(0.0).probability < CHANCE).count();
+        assert!(refused <= 8, "{refused}");
+        let coloured = series(0.9);
+        assert!(coloured.probability < 1e-30 && (coloured.neighbours - 0.9).abs() < 0.05, "{coloured:?}");
+        assert!((10..80).contains(&coloured.length), "{coloured:?}");
+        assert!(series(0.15).probability < CHANCE);
+    }
 }

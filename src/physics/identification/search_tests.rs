@@ -92,7 +92,9 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
         gaps: Vec::new(),
         spread: vec![1.0],
         robust: false,
+        disturbances: Disturbances::default(),
         threads: 1,
+        cancellation: Default::default(),
     };
     let start: Vec<f64> = problem.chosen.iter().map(|&k| problem.values[k]).collect();
     let segments = || vec![Segment { track: 0, first: 0, samples: 201, start: vec![1.3, 0.2] }];

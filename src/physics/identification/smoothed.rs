@@ -2,7 +2,6 @@
 
 use super::descent::{LEAST_DAMPING, MOST_DAMPING};
 use super::follow::{Follower, LANES, forces};
-use super::pieces::Piece;
 use super::solve::{Normal, Problem};
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
@@ -38,17 +37,16 @@ pub(super) enum Met {
 
 impl States {
     /// Of the samples with full windows.
-    pub fn new(problem: &Problem<'_>, pieces: &[Piece]) -> Self {
+    pub fn new(problem: &Problem<'_>, smoothed: &[Option<Smoothed>]) -> Self {
         let n = problem.course.equations.n;
         let (mut states, mut force) = (Self::default(), vec![0.0; n]);
-        let smoothed = || pieces.iter().filter_map(|piece| Some((piece.track, piece.smoothed.as_ref()?)));
         let full = |s: &Smoothed| s.interior().filter(|&at| s.is_full(at)).collect::<Vec<_>>();
-        let all: usize = smoothed().map(|(_, (s, _))| full(s).len()).sum();
+        let all: usize = smoothed.iter().flatten().map(|s| full(s).len()).sum();
         let stride = all.div_ceil(MOST_STATES).max(1);
-        for (at, (smoothed, samples)) in smoothed() {
-            let track = &problem.course.recording.tracks[at];
-            for state in full(smoothed).into_iter().step_by(stride) {
-                let (sample, range) = (samples[state], state * n..(state + 1) * n);
+        for (at, (track, smoothed)) in problem.course.recording.tracks.iter().zip(smoothed).enumerate() {
+            let Some(smoothed) = smoothed else { continue };
+            for sample in full(smoothed).into_iter().step_by(stride) {
+                let range = sample * n..(sample + 1) * n;
                 states.places.push((at, sample));
                 states.q.extend(&smoothed.q[range.clone()]);
                 states.v.extend(&smoothed.v[range.clone()]);
@@ -165,7 +163,8 @@ impl States {
         for _ in 0..ITERATIONS {
             let muted = problem.too_weak(x, &best, NO_EFFECT * size);
             problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
-            if best.converged || damping > MOST_DAMPING {
+            let residual = (best.square / best.count.max(1.0)).sqrt();
+            if best.converged || damping > MOST_DAMPING || !problem.cancellation.iterate(residual) {
                 break;
             }
             let moved = problem.moved(x, &problem.step(x, &best, &muted, damping).change, &best);

@@ -4,13 +4,21 @@
 
 use super::descent::{FAILED, RIDGE};
 use super::follow::{Course, Follower, LANES, Segment, State};
+use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
+use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 use std::f64::consts::TAU;
 
 /// Residuals beyond so many standard deviations count linearly where that is asked for.
-const HUBER: f64 = 3.0;
+pub(super) const HUBER: f64 = 3.0;
+/// Rounds in which starts follow other unknowns.
+const SETTLING: usize = 6;
+
+/// Part of normal equations of a constant that is as good as given.
+const GIVEN: f64 = 1e100;
+
 /// A constant of a sensor: measured positions are `gain q(t - delay) + offset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SensorKind {
@@ -54,7 +62,11 @@ pub(crate) struct Problem<'a> {
     /// Spread of every coordinate over all samples.
     pub spread: Vec<f64>,
     pub robust: bool,
+    /// What moves the motion beside the equations.
+    pub disturbances: Disturbances,
     pub threads: usize,
+    /// Ends every loop.
+    pub cancellation: Cancellation,
 }
 
 /// Normal equations of a segment: start, constants, sensors.
@@ -97,13 +109,13 @@ impl Normal {
     }
 
     /// The same with the constants at their bounds taken for known to far below their least value.
-    pub fn with_held(&self) -> Self {
-        let (mut known, m) = (self.clone(), self.right.len());
+    pub fn with_held(mut self) -> Self {
+        let m = self.right.len();
         for k in (0..m).filter(|&k| self.held[k]) {
-            (0..m).for_each(|l| (known.matrix[k * m + l], known.matrix[l * m + k]) = (0.0, 0.0));
-            (known.matrix[k * m + k], known.diagonal[k], known.right[k]) = (f64::MAX.sqrt(), f64::MAX.sqrt(), 0.0);
+            (0..m).for_each(|l| (self.matrix[k * m + l], self.matrix[l * m + k]) = (0.0, 0.0));
+            (self.matrix[k * m + k], self.diagonal[k], self.right[k]) = (GIVEN, GIVEN, 0.0);
         }
-        known
+        self
     }
 }
 
@@ -150,19 +162,24 @@ impl Problem<'_> {
     }
 
     /// Calls `visit(segment, sample, coordinate, residual, row)` along segments: residuals of positions in units of noise, and their
-    /// derivatives by start, constants and sensors of one lane if those are asked for.
-    fn residuals(
+    /// derivatives by start, constants and sensors of one lane if those are asked for; innovations where something disturbs the motion.
+    /// Gives the sum of the logarithms of the innovations' variances, in units of the noise.
+    pub(super) fn residuals(
         &self,
         x: &[f64],
         segments: &[&Segment],
         derivatives: bool,
         mut visit: impl FnMut(usize, usize, usize, f64, &[f64]),
-    ) {
+    ) -> f64 {
         let (n, m) = (self.n(), self.chosen.len());
         let values = self.parameters(x);
         let columns = 2 * n + m;
+        let mut filters = self.filters(segments.len(), columns + self.sensors.len());
+        let derivatives = derivatives || !filters.is_empty();
         let sensors: Vec<[f64; 3]> = (0..n).map(|i| self.sensor(x, i)).collect();
         let mut row = vec![0.0; if derivatives { columns + self.sensors.len() } else { 0 }];
+        let mut a = vec![0.0; segments.len() * n];
+        let noisy = !self.disturbances.force.is_empty();
         let mut delayed: Vec<(f64, State)> = Vec::new();
         for [_, _, delay] in &sensors {
             if *delay != 0.0 && delayed.iter().all(|(known, _)| known != delay) {
@@ -201,11 +218,21 @@ impl Problem<'_> {
                             };
                         }
                     }
+                    let residual = match filters.get_mut(lane) {
+                        Some(filter) => filter.pass(residual, &mut row),
+                        None => residual,
+                    };
                     visit(lane, sample, i, residual, &row);
                 }
             }
+            if noisy {
+                follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
+                let impulses = self.impulses(&state.by_starts(n, columns), follower.mass(), self.course.step);
+                filters.iter_mut().zip(impulses.chunks_exact(2 * n * n)).for_each(|(filter, own)| filter.disturb(own));
+            }
         };
         Follower::new(&self.course).follow(&values, segments, derivatives, read);
+        filters.iter().map(|filter| filter.log_variance).sum()
     }
 
     /// Normal equations of a batch of segments; `None` for those that cannot be followed.
@@ -254,7 +281,7 @@ impl Problem<'_> {
                 let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
                 batch.iter().copied().zip(self.batch(x, &lanes)).collect::<Vec<_>>()
             };
-            batches.iter().flat_map(of).collect::<Vec<_>>()
+            batches.iter().take_while(|_| self.cancellation.go_on()).flat_map(of).collect::<Vec<_>>()
         };
         let share = batches.len().div_ceil(self.threads.max(1)).max(1);
         let mut found = vec![None; segments.len()];
@@ -276,7 +303,7 @@ impl Problem<'_> {
         let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * n]).collect();
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-        for batch in order.chunks(LANES) {
+        for batch in order.chunks(LANES).take_while(|_| self.cancellation.go_on()) {
             let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
             let put = |lane: usize, sample: usize, i: usize, r: f64, _: &[f64]| found[batch[lane]][sample * n + i] = r;
             self.residuals(x, &lanes, false, put);
@@ -348,5 +375,12 @@ impl Problem<'_> {
         });
         let own: Vec<f64> = own.collect();
         inverse_with(starts, &own, RIDGE).unwrap_or_else(|| vec![0.0; starts * starts])
+    }
+
+    /// Undamped normal equations at other unknowns, the starts of the segments fitted to them.
+    pub fn normal_at(&self, x: &[f64], segments: &[Segment]) -> Normal {
+        let mut segments = segments.to_vec();
+        self.settle(x, &mut segments, SETTLING);
+        self.normal(&self.all(x, &segments), &segments)
     }
 }

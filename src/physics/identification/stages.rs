@@ -1,20 +1,26 @@
 //! From smoothed accelerations to longer and longer segments of motion.
 
 use super::choices::{check_errors, chosen, met, sensors};
-use super::determined::{Determined, Examiner};
+use super::covariance::{Root, Weighing, agreement, long_run, scores};
 use super::follow::{Course, Segment};
-use super::found::{Combination, Constant, Identified, Outlier, Residual, SensorConstant};
+use super::found::{Identified, Outlier, Residual};
+use super::innovations::Disturbances;
 use super::pieces::{LEAST_SEGMENT, Pieces};
-use super::quality::{outliers, usual, whiteness};
+use super::quality::{
+    CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
+};
 use super::smoothed::{Met, States};
-use super::solve::{Normal, Problem, Sensor, SensorKind};
-use super::{Between, IdentifyError, IdentifyOptions, by_forces};
+use super::solve::{Normal, Problem};
+use super::unknowns::unknowns;
+use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::{Recording, deviation, rms};
 
 /// Times in which the motion changes that a first segment lasts.
 const PACES: f64 = 2.5;
+/// Samples that are followed at most.
+const MOST_SAMPLES: usize = 60_000;
 /// Noise over the spread of a coordinate that is taken at least: the equations are integrated so well.
 const LEAST_NOISE: f64 = 1e-9;
 /// Error of the integrator over the noise.
@@ -26,10 +32,8 @@ const WORSE: f64 = 1.5;
 const GAIN: f64 = 0.01;
 /// Segments from which on their scatter tells how far errors are to be widened.
 const MANY: usize = 8;
-/// Size of residuals over the noise up to which a form explains what was measured.
-pub(super) const EXPLAINED: f64 = 1.3;
-/// Standard deviations by which the pulls of segments may scatter more than noise does, if a form explains the motion.
-const ALIKE: f64 = 4.0;
+/// Residual over the spread of a coordinate up to which it is that of the integration, a few times [`LEAST_NOISE`].
+const EXACT: f64 = 5.0 * LEAST_NOISE;
 const ITERATIONS: usize = 40;
 /// Samples of a trajectory that tell its own noise.
 const MANY_SAMPLES: usize = 40;
@@ -107,8 +111,12 @@ pub fn identify(
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
     let met = met(instance, recording, options)?;
+    let stop = &options.cancellation;
+    stop.stage("equations of motion");
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
+    stop.check()?;
+    stop.stage("smoothed motion");
     let pieces = Pieces::new(recording, options)?;
     let spread: Vec<f64> = (0..n).map(|i| spread_of(recording, i)).collect();
     let least: Vec<f64> = spread.iter().map(|spread| LEAST_NOISE * spread).collect();
@@ -141,19 +149,29 @@ pub fn identify(
         gaps: pieces.gaps(),
         spread,
         robust: options.robust,
+        disturbances: Disturbances::default(),
         threads: options.threads.max(1),
+        cancellation: options.cancellation.clone(),
     };
+    stop.check()?;
     let mut x = given.clone();
-    let mut states = States::new(&problem, &pieces.all);
+    let on_pieces = Problem { course: Course { recording: &pieces.long, ..problem.course.clone() }, ..problem.clone() };
+    let mut states = States::new(&on_pieces, &pieces.smoothed);
     if met == Met::Forces {
-        let segments = pieces.cut(LEAST_SEGMENT);
-        return by_forces::identify(instance, &problem, &mut states, (x, segments));
+        stop.stage("forces");
+        let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
+        let mut found = by_forces::identify(instance, &on_pieces, (smoothing, &mut states), (x, pieces.cut_long()))?;
+        for outlier in &mut found.outliers {
+            (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
+        }
+        return Ok(Identified { obstacles: pieces.still, ..found });
     }
-    if states.len(n) > 0 && states.fit(&problem, &mut x, met).is_none() {
+    if states.len(n) > 0 && states.fit(&on_pieces, &mut x, met).is_none() {
         return Err(IdentifyError::Singular);
     }
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
     let samples = first_samples(&states, (n, pieces.step), options.segment)?;
+    stop.stage("short segments");
     let mut fitted = first(&mut problem, [x, given.clone()], pieces.cut(samples))?;
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
@@ -161,12 +179,19 @@ pub fn identify(
     if forced && options.between.is_none() {
         fitted = best_between(&mut problem, fitted);
     }
+    if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+        refit(&problem, &mut fitted, ITERATIONS);
+    }
     if !known {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
         refit(&problem, &mut fitted, ITERATIONS);
     }
+    stop.stage("longer segments");
     fitted = grown(&mut problem, fitted, options.segment);
+    if forced {
+        problem.estimate_force_noise(&fitted.x, &fitted.segments);
+    }
     if !known {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
@@ -180,10 +205,16 @@ pub fn identify(
         };
         noise = (0..n).map(|i| (own(i) / recording.samples() as f64).sqrt().max(least[i])).collect();
     }
-    let found = result(instance, &problem, &fitted, (&start, &noise), options);
-    // Of coordinates that all stand still no form is seen to be right.
-    let explained = found.explained && pieces.still.len() < n;
-    Ok(Identified { explained, obstacles: pieces.still, ..found })
+    stop.check()?;
+    stop.stage("what is determined");
+    let mut found = result(instance, &problem, &fitted, (&start, &noise), known);
+    stop.check()?;
+    if pieces.still.len() == n {
+        // Of coordinates that all stand still no form is seen to be right.
+        let coordinate = recording.coordinates[0].clone();
+        (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
+    }
+    Ok(Identified { obstacles: pieces.still, ..found })
 }
 
 /// Standard deviation of a coordinate over all samples; 1 for one that rests.
@@ -209,6 +240,19 @@ fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) 
     Ok(samples.min(wanted))
 }
 
+/// Segments of as many samples as are followed: runs of segments that follow each other, so that they can be joined later.
+pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
+    const RUN: usize = 16;
+    let all: usize = segments.iter().map(|segment| segment.samples).sum();
+    if all <= MOST_SAMPLES {
+        return segments;
+    }
+    let runs = segments.len().div_ceil(RUN);
+    let kept = (runs * MOST_SAMPLES / all).max(1);
+    let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
+    segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
+}
+
 /// The fit of the first segments from either of two starts, the better one; segments that cannot be followed are left out. The second
 /// start is tried where the first one does not arrive at the noise.
 fn first(problem: &mut Problem<'_>, starts: [Vec<f64>; 2], segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
@@ -217,7 +261,9 @@ fn first(problem: &mut Problem<'_>, starts: [Vec<f64>; 2], segments: Vec<Segment
         if best.as_ref().is_some_and(Fitted::is_plain) {
             break;
         }
-        let Some(tried) = first_from(problem, x, segments.clone()) else { continue };
+        let tried = first_from(problem, x, segments.clone());
+        problem.cancellation.check()?;
+        let Some(tried) = tried else { continue };
         if best.as_ref().is_none_or(|best| tried.normal.square < best.normal.square) {
             best = Some(tried);
         }
@@ -247,11 +293,6 @@ fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>
     Some(fitted)
 }
 
-fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
-    fitted.substeps = problem.course.substeps;
-    fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
-}
-
 /// The better one of a fit with constants at their bounds and of that from the values these were given.
 fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     if !fitted.normal.held.contains(&true) {
@@ -264,6 +305,11 @@ fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     refit(problem, &mut tried, LAST_ITERATIONS);
     let better = tried.normal.square < fitted.normal.square && tried.normal.converged >= fitted.normal.converged;
     if better { tried } else { fitted }
+}
+
+fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
+    fitted.substeps = problem.course.substeps;
+    fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
 }
 
 fn log(fitted: &Fitted, what: &str) {
@@ -282,7 +328,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.sigma.len();
     let mut coarse = problem.ends(x, &probes);
-    while problem.course.substeps < MOST_SUBSTEPS {
+    while problem.course.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
         let mut finer = problem.clone();
         finer.course.substeps *= 2;
         let fine = finer.ends(x, &probes);
@@ -396,7 +442,7 @@ fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
 /// Shorter segments of a form that misses the motion, as long as constants become better known by them: what is missing adds up along a
 /// segment.
 fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
-    while fitted.mean_square() > EXPLAINED * EXPLAINED {
+    while fitted.mean_square() > EXPLAINED * EXPLAINED && !problem.cancellation.is_cancelled() {
         let segments = halved(problem, &fitted);
         if segments.len() == fitted.segments.len() {
             break;
@@ -417,7 +463,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
 fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
     let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
     let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * 1.5 < wanted);
-    while wanted_more != Some(false) {
+    while wanted_more != Some(false) && !problem.cancellation.is_cancelled() {
         let segments = joined(&fitted.segments);
         if segments.len() == fitted.segments.len() {
             break;
@@ -446,124 +492,33 @@ fn usual_samples(segments: &[Segment]) -> usize {
     samples.get(samples.len() / 2).copied().unwrap_or(0)
 }
 
-/// The part of the result about constants and sensors; the caller adds the residuals.
-pub(super) fn unknowns(
-    instance: &SystemInstance<f64>,
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    (start, inflation): (&[f64], f64),
-    met: Met,
-) -> Identified {
-    let (n, m) = (problem.sigma.len(), fitted.x.len());
-    let recording = problem.course.recording;
-    // A constant at its bound is known as if it had been given.
-    let determined = Determined::new(problem, &fitted.x, &fitted.normal.with_held(), inflation);
-    let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
-    let sensor_name = |sensor: &Sensor| {
-        let kind = kind(sensor.kind);
-        format!("{kind} of {}", recording.coordinates[sensor.coordinate])
-    };
-    let names: Vec<String> = (0..problem.chosen.len())
-        .map(|k| parameter(k).symbol.to_string())
-        .chain(problem.sensors.iter().map(sensor_name))
-        .collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let examiner = Examiner {
-        problem,
-        x: &fitted.x,
-        segments: &fitted.segments,
-        coordinates: &recording.coordinates,
-        bounds: instance.system.validation(n),
-        names: &names,
-    };
-    let (undetermined, combinations) = match met {
-        // What sums are known says what is open.
-        Met::Forces if problem.is_linear(&fitted.segments) => {
-            let units: Vec<&str> = (0..m).map(|k| parameter(k).unit.as_ref()).collect();
-            (examiner.together(&determined.null), determined.base_parameters(&names, &units, &fitted.x))
-        }
-        _ => {
-            let open = determined.open.iter();
-            (open.map(|(direction, error)| examiner.describe(direction, *error)).collect(), Vec::new())
-        }
-    };
-    let alone: Vec<&str> = combinations
-        .iter()
-        .filter(|sum: &&Combination| sum.terms.len() == 1)
-        .map(|sum| sum.terms[0].0.as_str())
-        .collect();
-    let errors: Vec<Option<f64>> = match combinations.is_empty() {
-        true => determined.errors.clone(),
-        false => {
-            let error = |k: usize| alone.contains(&names[k]).then(|| determined.covariance[k * m + k].sqrt());
-            (0..m).map(error).collect()
-        }
-    };
-    let constants = start.iter().enumerate().map(|(k, &start)| Constant {
-        symbol: parameter(k).symbol.to_string(),
-        value: fitted.x[k],
-        standard_error: errors[k].filter(|_| !fitted.normal.held[k]),
-        unit: parameter(k).unit.to_string(),
-        start,
-        at_bound: fitted.normal.held[k],
-    });
-    let sensors = problem.sensors.iter().zip(start.len()..).map(|(sensor, k)| SensorConstant {
-        kind: kind(sensor.kind),
-        coordinate: recording.coordinates[sensor.coordinate].clone(),
-        value: fitted.x[k],
-        standard_error: errors[k],
-    });
-    let correlation = |at: usize| {
-        let (i, j) = (at / m, at % m);
-        let root = |k: usize| determined.covariance[k * m + k].sqrt();
-        match (errors[i], errors[j]) {
-            _ if i == j => 1.0,
-            (Some(_), Some(_)) if root(i) * root(j) > 0.0 => determined.covariance[at] / (root(i) * root(j)),
-            _ => 0.0,
-        }
-    };
-    Identified {
-        constants: constants.collect(),
-        sensors: sensors.collect(),
-        correlations: (0..m * m).map(correlation).collect(),
-        undetermined,
-        combinations,
-        ..Identified::default()
-    }
-}
-
 fn result(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
     fitted: &Fitted,
     (start, noise): (&[f64], &[f64]),
-    options: &IdentifyOptions,
+    known: bool,
 ) -> Identified {
-    let (n, m) = (problem.sigma.len(), fitted.x.len());
+    let n = problem.sigma.len();
     let recording = problem.course.recording;
-    let (mut inflation, widened) = fitted.inflation();
-    if options.noise.is_some() {
-        inflation = inflation.max(1.0);
-    }
+    let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
     let numbers: f64 = residuals.iter().map(|r| r.len() as f64).sum();
-    let taken = (fitted.normal.count - m as f64).max(1.0) / numbers;
+    let taken = (fitted.normal.count - fitted.x.len() as f64).max(1.0) / numbers;
+    let weighing = Weighing::of(&residuals, problem.robust, taken);
+    let follow: Vec<Correlation> =
+        innovations(problem, &fitted.x, &fitted.segments).iter().map(|runs| correlation(runs)).collect();
+    let is_white = |of: &Correlation| of.probability * n as f64 >= CHANCE;
+    // Samples that stand out do not excuse the others.
+    let size = |i: usize| usual(&residuals, n, i) * problem.sigma[i] / taken.sqrt();
     let of = |i: usize| {
-        let own = || residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n)).filter(|r| r.is_finite());
-        let square = own().map(|r| r * r).sum::<f64>() / own().count().max(1) as f64 / taken;
-        let (autocorrelation, white) = whiteness(&residuals, n, i);
-        let rms = square.sqrt() * problem.sigma[i];
+        let own = residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n).copied());
+        let rms = rms(own.filter(|r| r.is_finite())) / taken.sqrt() * problem.sigma[i];
         let (coordinate, spread) = (recording.coordinates[i].clone(), problem.spread[i]);
+        let (autocorrelation, white) = (follow[i].neighbours, is_white(&follow[i]));
         Residual { coordinate, rms, noise: noise[i], spread, autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
-    let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
-    let over_noise = square.sqrt();
-    // Within short segments a wrong form may pass for right: each then has constants of its own.
-    let alike = widened <= 1.0 + ALIKE * (2.0 / fitted.segments.len() as f64).sqrt();
-    // Samples that stand out do not excuse the others.
-    let usual = (0..n).map(|i| usual(&residuals, n, i) * problem.sigma[i] / noise[i]).map(|r| r * r / taken);
-    let usual_over_noise = (usual.sum::<f64>() / n as f64).sqrt();
     let far = |track: usize, sample: usize, i: usize, size: f64| Outlier {
         track,
         sample,
@@ -572,31 +527,66 @@ fn result(
         size,
     };
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
+    let lags = follow.iter().filter(|of| !is_white(of)).map(|of| 2 * of.length).max();
+    let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
+    let (normal, inflation) = informed(problem, fitted, (weighing, lags), known);
+    let verdict = Evidence {
+        converged: fitted.normal.converged,
+        sizes: (0..n).map(size).collect(),
+        exact: (0..n).map(|i| EXACT * problem.spread[i]).collect(),
+        residuals: &by_coordinate,
+        probabilities: follow.iter().map(|of| (of.probability * n as f64).min(1.0)).collect(),
+        outliers: outlier_count as f64 / numbers,
+        agreement,
+    }
+    .verdict();
     Identified {
         converged: fitted.normal.converged,
         decrement: fitted.normal.decrement,
-        explained: fitted.normal.converged
-            && by_coordinate.iter().all(|r| r.white)
-            && usual_over_noise < EXPLAINED
-            && alike,
+        explained: verdict.explains(),
+        verdict,
+        over_noise: over_noise(&by_coordinate),
         residuals: by_coordinate,
-        over_noise,
         outliers,
         outlier_count,
-        inflation: widened,
+        inflation,
+        force_noise: problem.disturbances.force.clone(),
         samples: fitted.segments.iter().map(|segment| segment.samples).sum(),
         segments: fitted.segments.len(),
         segment_seconds: usual_samples(&fitted.segments) as f64 * problem.course.step,
         substeps: fitted.substeps,
         between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
-        ..unknowns(instance, problem, fitted, (start, inflation), Met::Accelerations)
+        ..unknowns(
+            instance,
+            problem,
+            // A constant at its bound is known as if it had been given.
+            &Fitted { normal: normal.with_held(), ..fitted.clone() },
+            (start, 1.0),
+            (Met::Accelerations, &normal_at),
+        )
     }
 }
 
-fn kind(kind: SensorKind) -> &'static str {
-    match kind {
-        SensorKind::Offset => "offset",
-        SensorKind::Gain => "gain",
-        SensorKind::Delay => "delay",
-    }
+/// The normal equations that know the unknowns as well as the residuals say, and the factor of variances by which correlated residuals
+/// know less than independent ones. Correlated ones have `lags`; with `given` noise residuals count as large as that at least.
+fn informed(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    (weighing, lags): (Weighing, Option<usize>),
+    given: bool,
+) -> (Normal, f64) {
+    let m = fitted.x.len();
+    let root = Root::of(m, &fitted.normal.matrix);
+    let bread = weighing.bread * weighing.bread;
+    let plain = weighing.square * bread;
+    let least = if given { plain.max(1.0) } else { plain.max(f64::MIN_POSITIVE) };
+    let Some(lags) = lags else {
+        let unit = vec![0.0; root.forward.len().pow(2)];
+        return (root.informed(&fitted.normal, &unit, least), 1.0);
+    };
+    let scores = scores(problem, &fitted.x, &fitted.segments);
+    let mut seen = root.seen(m, &long_run(&scores, &fitted.segments, m, lags));
+    seen.iter_mut().for_each(|x| *x *= bread);
+    let mean = mean_eigenvalue(&seen, root.forward.len());
+    (root.informed(&fitted.normal, &seen, least), (mean / plain).max(1.0))
 }

@@ -100,8 +100,9 @@ fn what_free_motion_leaves_open_is_named_with_its_cure() {
     let mass = of(&["m"]);
     assert!(mass.cure.contains("--force") && mass.known.is_empty(), "{mass:?}");
     let pair = of(&["g", "l"]);
-    assert_eq!(pair.known[0].0, "l/g");
-    assert!((pair.known[0].1 * 9.8 - 1.0).abs() < 1e-3, "{pair:?}");
+    let known = &pair.known[0];
+    assert_eq!((known.name.as_str(), known.product, known.terms.len()), ("g/l", true, 2));
+    assert!((known.value - 9.8).abs() < 4.0 * known.standard_error && known.standard_error < 1e-2, "{pair:?}");
     // The mass stays where it started.
     assert_eq!(found.constants.iter().find(|c| c.symbol == "m").unwrap().value, 2.0);
     // With one of them known the other is determined.
@@ -316,4 +317,89 @@ fn a_smooth_force_is_seen_between_coarse_samples() {
         follow::forces(&track, Between::Cubic, ((samples - 1) as usize, 0.25), &mut found);
         assert_eq!(found, [expected]);
     }
+}
+
+/// A driven oscillator whose force is measured with noise, 20 a second over 40 s.
+fn pushed(noise_of_force: f64, seed: u64) -> (SystemInstance<f64>, Recording) {
+    let text = r#"{"name": "cart", "lagrangian": "m*x_dot^2/2 - k*x^2/2", "dissipation": "c*x_dot^2/2",
+        "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-2, 2]}],
+        "parameters": {"m": 1.5, "k": 1, "c": 0.3}}"#;
+    let model = described(text, &[("m", 1.0), ("k", 1.3), ("c", 0.2)]).build().unwrap();
+    let push = |t: f64| (0.8 * t).sin() + 0.7 * (2.1 * t).cos();
+    let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = push(t);
+    let motion = Driven::new(&*model, &force).rollout(&[0.2], &[0.0], &Options::reference(40.0, 0.05));
+    let motion = motion.complete().unwrap();
+    let mut rng = RngStream::Trajectories.generator(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let q = motion.q.iter().map(|q| q + 1e-3 * normal()).collect();
+    let force = motion.t.iter().map(|t| push(*t) + noise_of_force * normal()).collect();
+    let track = RecordedTrajectory { name: "run".into(), times: motion.t, q, v: vec![], a: vec![], force };
+    (described(text, &[]), Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] })
+}
+
+#[test]
+fn noise_of_a_known_force_is_seen_in_the_motion() {
+    let truth = |symbol: &str| [("m", 1.0), ("k", 1.3), ("c", 0.2)].iter().find(|(name, _)| *name == symbol).unwrap().1;
+    let mut squares = Vec::new();
+    for seed in 0..4 {
+        let (form, recording) = pushed(0.1, seed);
+        let found = identify(&form, &recording, &IdentifyOptions::default()).unwrap();
+        assert!((found.force_noise[0] / 0.1 - 1.0).abs() < 0.5, "{:?}", found.force_noise);
+        squares
+            .extend(found.constants.iter().map(|c| ((c.value - truth(&c.symbol)) / c.standard_error.unwrap()).powi(2)));
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!((0.2..2.5).contains(&mean) && squares.iter().all(|z| *z < 16.0), "{squares:?}");
+    let (form, recording) = pushed(0.0, 9);
+    let exact = identify(&form, &recording, &IdentifyOptions::default()).unwrap();
+    assert!(exact.force_noise.is_empty() && exact.explained, "{exact:?}");
+}
+
+#[test]
+fn errors_under_correlated_noise_are_those_of_the_scatter() {
+    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let options = IdentifyOptions { constants: vec!["l".into()], ..Default::default() };
+    let of = |memory: f64, seed: u64| {
+        let mut recording = recorded(&instance, &[&[1.0, 0.0]], (12.0, 0.02), &[0.0], seed);
+        let (mut rng, mut last) = (RngStream::Region.generator(seed), 0.0);
+        for q in &mut recording.tracks[0].q {
+            let draw: f64 = StandardNormal.sample(&mut rng);
+            last = memory * last + (1.0 - memory * memory).sqrt() * draw;
+            *q += 1e-3 * last;
+        }
+        identify(&form, &recording, &options).unwrap()
+    };
+    let white = of(0.0, 1);
+    assert!(white.verdict == Verdict::Explained && white.inflation == 1.0, "{white:?}");
+    let off = |seed: u64| {
+        let found = of(0.9, seed);
+        assert!(!found.explained && found.inflation > 3.0, "{found:?}");
+        ((found.constants[0].value - 0.7) / found.constants[0].standard_error.unwrap()).powi(2)
+    };
+    let mean = (0..12).map(off).sum::<f64>() / 12.0;
+    assert!((0.3..2.2).contains(&mean), "{mean}");
+}
+
+#[test]
+fn a_verdict_says_why() {
+    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let options = IdentifyOptions { constants: vec!["l".into()], ..Default::default() };
+    let verdict = |noise: f64, spoil: &dyn Fn(&mut f64, f64)| {
+        let mut recording = recorded(&instance, &[&[1.0, 0.0], &[0.5, 1.0]], (6.0, 0.02), &[noise], 3);
+        let mut rng = RngStream::Region.generator(3);
+        recording
+            .tracks
+            .iter_mut()
+            .flat_map(|track| &mut track.q)
+            .for_each(|q| spoil(q, StandardNormal.sample(&mut rng)));
+        identify(&form, &recording, &options).unwrap().verdict
+    };
+    assert_eq!(verdict(1e-3, &|_, _| ()), Verdict::Explained);
+    assert_eq!(verdict(0.0, &|_, _| ()), Verdict::Exact);
+    let noise = verdict(0.0, &|q, draw| *q = draw);
+    assert!(matches!(noise, Verdict::Uninformative { .. }), "{noise:?}");
+    let far = verdict(1e-3, &|q, draw| *q += if draw.abs() > 2.2 { 0.05 * draw.signum() } else { 0.0 });
+    assert!(!far.explains(), "{far:?}");
 }

@@ -4,7 +4,7 @@
 use super::RelativityError;
 use super::orbits::directions;
 use crate::geometry::{Equator, Turn, TurningPoint};
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms, acting_groups};
 use std::f64::consts::FRAC_PI_2;
 
 /// Which coordinates say where something is around a centre; the axis of a spin is `z`.
@@ -287,6 +287,29 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
     }
 }
 
+/// Share of an acceleration up to which an influence may be an error of a learned metric.
+const APART: f64 = 0.05;
+
+/// `true` if the time and the places of a metric do not act on each other, as of `-c dt^2 + h`: motion then leaves the unit of the time beside that of
+/// the places open, and with it every impact parameter. Looked at within a `distance` from the centre.
+pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: f64) -> bool {
+    const POINTS: usize = 128;
+    let q = CentralCoordinates::Cartesian(chart).points(POINTS, (0.3 * distance, distance));
+    let v: Vec<f64> = (0..q.len()).map(|k| (1.0 + 2.4 * k as f64).cos()).collect();
+    let accelerations = |q: &[f64], v: &[f64]| {
+        let mut terms = Terms::default();
+        // Where the metric is none it says nothing.
+        let _ = model.terms(q, v, Request::ACCELERATION, &mut terms);
+        terms.acceleration
+    };
+    let own = accelerations(&q, &v);
+    let finite = own.chunks_exact(4).filter(|a| a.iter().all(|a| a.is_finite()));
+    let (sum, count) =
+        finite.fold((0.0, 0.0), |(sum, count), a| (sum + a.iter().map(|a| a * a).sum::<f64>(), count + 4.0));
+    let noise = APART * f64::sqrt(sum / count);
+    acting_groups(4, (&q, &v), &accelerations, &[noise; 4]).contains(&vec![chart.time])
+}
+
 /// Later and earlier times at which a metric is looked at, in parts of the span that matters.
 const TIMES: [f64; 3] = [0.31, -0.57, 1.0];
 /// Differences of the components, over the largest of them, that are rounding.
@@ -314,15 +337,12 @@ pub(crate) fn depends_on_time(
             Ok(()) | Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. }) => {}
             Err(error) => return Err(error),
         }
-        let (now, then) = terms.mass_matrix.split_at(n * n);
-        let most = now.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-        // Where the metric is none there is nothing to compare; where it is one, it must be one at all times.
-        if now.iter().all(|g| g.is_finite())
-            && then.chunks_exact(n * n).flat_map(|g| g.iter().zip(now)).any(|(g, now)| {
-                let difference = (g - now).abs();
-                difference.is_nan() || difference > ROUNDING * most
-            })
-        {
+        // Of times at which the metric is none there is nothing to compare; if it is one at some times, it must be the same at all.
+        let metrics = || terms.mass_matrix.chunks_exact(n * n);
+        let Some(one) = metrics().find(|g| g.iter().all(|g| g.is_finite())) else { continue };
+        let most = one.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
+        let differs = |(g, one): (&f64, &f64)| (g - one).is_nan() || (g - one).abs() > ROUNDING * most;
+        if metrics().any(|g| g.iter().zip(one).any(differs)) {
             return Ok(true);
         }
     }
@@ -390,11 +410,48 @@ mod tests {
         }
     }
 
+    /// `(dx^2 - dt^2)/t^2`.
+    struct Shrinking;
+
+    impl Lagrangian for Shrinking {
+        fn coordinates(&self) -> usize {
+            2
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            (v[1].sqr() - v[0].sqr()) * R::half() / q[0].sqr()
+        }
+    }
+
+    #[test]
+    fn a_time_that_nothing_moves_is_alone() {
+        let chart = Chart::default();
+        let of = |name: &str| time_moves_alone(&*build::<f64>(name, &[]).unwrap(), chart, 20.0);
+        assert!(!of("schwarzschild-cartesian"));
+        assert!(time_moves_alone(&Mechanics::<_, f64>::new(Ultrastatic, vec![]), chart, 20.0));
+    }
+
+    /// `-3 dt^2 + (1 + 1/(1 + r^2)) (dx^2 + dy^2 + dz^2)`.
+    struct Ultrastatic;
+
+    impl Lagrangian for Ultrastatic {
+        fn coordinates(&self) -> usize {
+            4
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let square = |x: &[R]| x[1].sqr() + x[2].sqr() + x[3].sqr();
+            let space = (R::one() + (R::one() + square(q)).recip()) * square(v);
+            (space - R::of(3.0) * v[0].sqr()) * R::half()
+        }
+    }
+
     #[test]
     fn time_is_told_from_place() {
         let points = [0.0, 1.0, 0.0, 30.0];
         let of = |rate: f64| depends_on_time(&Mechanics::<_, f64>::new(Breathing(rate), vec![]), 0, &points, 7.0);
         assert_eq!([of(0.0), of(1e-12), of(1e-6), of(0.5)], [Ok(false), Ok(false), Ok(true), Ok(true)]);
+        // A metric that is none at the present is one at other times: `(dx^2 - dt^2)/t^2`.
+        let shrinking = Mechanics::<_, f64>::new(Shrinking, vec![]);
+        assert_eq!(depends_on_time(&shrinking, 0, &points, 7.0), Ok(true));
         // Of a place it may depend.
         let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
         let points = [0.0, 8.0, 0.0, 0.0, 0.0, 0.0, -3.0, 1.0, 0.0, 0.0, 0.0, 0.0];

@@ -39,6 +39,8 @@ pub use camera::{MOST_PIXELS, Tetrad};
 pub use coordinates::CentralCoordinates;
 pub use coordinates::Chart;
 pub(crate) use coordinates::depends_on_time;
+#[doc(hidden)]
+pub use coordinates::time_moves_alone;
 pub(crate) use orbits::{Orbit, orbits};
 pub use rays::{Ray, RayOutcome};
 #[doc(hidden)]

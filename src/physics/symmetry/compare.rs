@@ -5,7 +5,7 @@ use super::find::room;
 use super::null_space::{add, dot, norm, orthonormal};
 use super::sample::Sample;
 use super::{SymmetryError, field, null_space};
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Regrouped, Request, Terms};
 use crate::linalg::{Workspace, eigh};
 use serde::Serialize;
 
@@ -16,6 +16,9 @@ pub struct Comparison {
     /// Coefficients of `f`, from the first power of `B`: a factor, or for geodesics of a metric a polynomial, whose first coefficient
     /// `f'(0)` is the factor of the mass matrix at rest.
     pub factors: Vec<f64>,
+    /// Factors of the groups of coordinates that do not act on each other by `B`, in the order of their first coordinates; empty if all
+    /// coordinates are one group. They have been taken out first: everything here is of `B` with these factors.
+    pub group_factors: Vec<f64>,
     /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the
     /// states know `f'` at this one value, and mass matrices up to a part `h p p^T`.
     pub on_shell: bool,
@@ -49,7 +52,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Compares two Lagrangians at states `(q, v)`, `(states, n)`: what they have in common beyond the freedom that `L` has.
 ///
-/// The motion determines `L` at best up to a factor and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
+/// The motion determines `L` at best up to a factor of each group of coordinates that act on each other and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
 /// geodesics, along which `L` is the energy, up to a function `f(L)`, where `B` is the metric. The best `s` (or `f`, a
 /// polynomial of degree 3), follows by linear least squares from the mass matrices, which know nothing of a gauge, `F`, over the functions
 /// of a basis, from the momenta, both in the frame of `|M|` of `B`, the constant from the values. They are taken out, and the residual is
@@ -69,6 +72,8 @@ pub fn compare(
         return Err(SymmetryError::Basis { expected: b.coordinates(), found });
     }
     room(b.coordinates(), unknowns(b.coordinates(), basis.len()), q.len() / b.coordinates().max(1))?;
+    let regrouped = Regrouped::nearest(b, a, (q, v));
+    let b = regrouped.as_ref().map_or(b, |regrouped| regrouped as &dyn EulerLagrange<f64>);
     // States at which both are finite.
     let of_a = Sample::new(a, q, v)?;
     let of_b = Sample::new(b, &of_a.q, &of_a.v)?;
@@ -84,6 +89,7 @@ pub fn compare(
     Ok(Comparison {
         gauge_formula: field::sum(fit.known_gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
         factors: fit.factors,
+        group_factors: regrouped.as_ref().map_or(Vec::new(), |regrouped| regrouped.factors.clone()),
         on_shell: fit.on_shell,
         gauge: fit.gauge,
         constant: fit.constant,

@@ -28,14 +28,16 @@ enum Monomial {
 }
 
 impl Monomial {
-    /// Value at state `k`, and its rate along the motion: `dp/dt = dL/dq`, `dE/dt = 0`.
+    /// Value at state `k`, and its rate along the motion: `dp/dt = dL/dq + Q`, `dE/dt = v.Q`, with the forces `Q` beside those of `L`.
     fn at(self, sample: &Sample, k: usize) -> [f64; 2] {
-        let (p, g) = (|i: usize| sample.p[k * sample.n + i], |i: usize| sample.g[k * sample.n + i]);
+        let p = |i: usize| sample.p[k * sample.n + i];
+        let g = |i: usize| sample.g[k * sample.n + i] + sample.force(k, i);
+        let power = || (0..sample.n).map(|i| sample.v[k * sample.n + i] * sample.force(k, i)).sum();
         match self {
             Self::One => [1.0, 0.0],
             Self::Linear(i) => [p(i), g(i)],
             Self::Quadratic(i, j) => [p(i) * p(j), g(i) * p(j) + p(i) * g(j)],
-            Self::Energy => [sample.energy[k], 0.0],
+            Self::Energy => [sample.energy[k], power()],
         }
     }
 
@@ -101,7 +103,7 @@ pub struct Quadratic {
 
 /// Finds conserved quantities `k^ij p_i p_j + h E + k^i p_i + k` whose factors are functions of a basis.
 ///
-/// Along the motion `dq/dt = v`, `dp/dt = dL/dq`, so that `dK/dt = 0` is linear in the unknown functions; it is written down at the
+/// Along the motion `dq/dt = v`, `dp/dt = dL/dq` and forces beside those of `L`, so that `dK/dt = 0` is linear in the unknown functions; it is written down at the
 /// states `(q, v)`, `(states, n)`. The function `h` times the energy `E` reaches quantities whose part without momenta is the
 /// potential times a function, or whose tensor has a part along the inverse metric, whatever formulas these have: in the Kepler
 /// problem and in Kerr's metric it is needed. Of a Lagrangian that is even in the velocities the even quantities are sought, the odd

@@ -8,6 +8,9 @@ use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::rollout::Trajectory;
 use serde::Serialize;
 
+/// Work of a force along a field, over that of its components, that is rounding.
+const WORKLESS: f64 = 1e-9;
+
 /// `xi = sum of coefficients * function * d_i` and the gauge function `F` that goes with it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
@@ -56,6 +59,19 @@ impl Field {
         let along = |gradient: &[f64]| gradient.iter().zip(v).map(|(d, v)| d * v).sum::<f64>();
         let gauge: f64 = self.gauge.iter().zip(at.gradient.chunks_exact(n)).map(|(c, d)| c * along(d)).sum();
         pull + turn - gauge
+    }
+
+    /// `true` if the forces beside those of `L` do no work along the field, to rounding.
+    pub(crate) fn is_workless(&self, sample: &Sample, basis: &Basis) -> bool {
+        let (n, mut at, mut work, mut parts) = (sample.n, Values::default(), 0.0_f64, 0.0);
+        for (k, q) in sample.q.chunks_exact(n).enumerate().filter(|_| !sample.force.is_empty()) {
+            basis.evaluate(q, &mut at);
+            let powers = self.vector(&at, n).into_iter().enumerate().map(|(i, xi)| xi * sample.force(k, i));
+            let powers: Vec<f64> = powers.collect();
+            work += powers.iter().sum::<f64>().abs();
+            parts += powers.iter().map(|power| power.abs()).sum::<f64>();
+        }
+        work <= WORKLESS * parts
     }
 
     /// Turns the field so that its last term has a positive factor: `-y d_x + x d_y`.

@@ -3,7 +3,7 @@
 use super::algebra::MOST_FIELDS;
 use super::basis::{Basis, MOST_UNKNOWNS, Values, most_states, unknowns};
 use super::null_space::{Orthonormal, Separation, check, dot, norm, orthonormal, reduce};
-use super::sample::Sample;
+use super::sample::{Invariant, Sample};
 use super::{Algebra, Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
@@ -38,6 +38,10 @@ pub struct Symmetries {
     pub states: usize,
     /// See `states`.
     pub singular_states: usize,
+    /// What is conserved because `L` does not depend on the parameter of the motion.
+    pub invariant: Invariant,
+    /// For every field, whether its charge is conserved: forces beside those of `L`, such as friction, do no work along the field.
+    pub conserved: Vec<bool>,
 }
 
 /// Values of functions, and their derivatives along the velocity, at all states: one column per function.
@@ -175,8 +179,17 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
         1..=MOST_FIELDS => Some(Algebra::new(sample, basis, &fields, noise)?),
         _ => None,
     };
-    let (basis, singular_states) = (basis.clone(), sample.singular);
-    Ok(Symmetries { basis, singular_values: found.values, separation, fields, algebra, states, singular_states })
+    Ok(Symmetries {
+        conserved: fields.iter().map(|field| field.is_workless(sample, basis)).collect(),
+        basis: basis.clone(),
+        singular_values: found.values,
+        separation,
+        fields,
+        algebra,
+        states,
+        singular_states: sample.singular,
+        invariant: sample.invariant(),
+    })
 }
 
 /// The equation of a symmetry in the coefficients of the functions as they are.

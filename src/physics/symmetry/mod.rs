@@ -62,9 +62,9 @@ pub use find::{Symmetries, symmetries};
 pub(crate) use null_space::TOLERANCES;
 #[doc(hidden)]
 pub use null_space::{Separation, bases, enough, most_symmetries};
-pub use sample::Region;
 #[doc(hidden)]
 pub use sample::middle;
+pub use sample::{Invariant, Region};
 
 use crate::lagrangian::MechanicsError;
 

@@ -5,6 +5,7 @@ use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, eigh, inertia};
 use crate::random::RngStream;
 use rand::Rng;
+use serde::Serialize;
 
 /// Terms of a Lagrangian at states `(states, n)`.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub(crate) struct Sample {
     pub p: Vec<f64>,
     /// `dL/dq`, `(states, n)`.
     pub g: Vec<f64>,
+    /// Forces beside those of `L`, such as friction, `(states, n)`; empty without.
+    pub force: Vec<f64>,
     /// `E = p.v - L`, `(states)`.
     pub energy: Vec<f64>,
     /// `|M|`, the mass matrix with the magnitudes of its eigenvalues, `(states, n, n)`.
@@ -33,6 +36,37 @@ pub(crate) struct Sample {
     pub even: bool,
     /// `true` if `L` is a quadratic form of the velocity, as that of geodesics: then it is the energy.
     pub homogeneous: bool,
+    /// States at which the mass matrix has positive and negative eigenvalues, as the metric of a space with a time.
+    pub indefinite: usize,
+}
+
+/// What every motion conserves because `L` does not depend on the parameter of the motion, in words for people and for files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Invariant {
+    /// The energy.
+    #[serde(rename = "energy")]
+    Energy,
+    /// Of geodesics of a metric with a time, whose parameter is no time: their length squared. The energy is the charge of a translation of the
+    /// time, if the metric does not depend on it.
+    #[serde(rename = "g(v, v)")]
+    Square,
+    /// `p.v - L` of another Lagrangian with a time among its coordinates.
+    #[serde(rename = "p.v - L")]
+    Legendre,
+    /// Nothing, for there is friction.
+    #[serde(rename = "nothing")]
+    Nothing,
+}
+
+impl Invariant {
+    /// Name of the number `p.v - L`.
+    pub fn charge(self) -> &'static str {
+        match self {
+            Self::Energy | Self::Nothing => "energy",
+            Self::Square => "g(v, v)/2",
+            Self::Legendre => "p.v - L",
+        }
+    }
 }
 
 /// Relative rounding of terms that differ between `v` and `-v`.
@@ -49,7 +83,7 @@ impl Sample {
         if q.len() != v.len() || n == 0 || !q.len().is_multiple_of(n) {
             return Err(SymmetryError::Shape { coordinates: n, q: q.len(), v: v.len() });
         }
-        let request = Request::MOMENTUM | Request::DL_DQ | Request::MASS_MATRIX | Request::ENERGY;
+        let request = Request::MOMENTUM | Request::DL_DQ | Request::MASS_MATRIX | Request::ENERGY | Request::FORCE;
         let (mut terms, mut back) = (Terms::default(), Terms::default());
         // A state that is not finite is reported and left out below.
         let _ = model.terms(q, v, request, &mut terms);
@@ -61,6 +95,7 @@ impl Sample {
             v: vec![],
             p: vec![],
             g: vec![],
+            force: vec![],
             energy: vec![],
             frame: vec![],
             size: vec![],
@@ -68,6 +103,7 @@ impl Sample {
             singular: 0,
             even: true,
             homogeneous: true,
+            indefinite: 0,
         };
         let (states, mut scratch) = (q.len() / n, vec![0.0; n * n]);
         for k in 0..states {
@@ -84,7 +120,11 @@ impl Sample {
             sample.g.extend_from_slice(g);
             sample.energy.push(energy);
             sample.frame.extend_from_slice(m);
-            sample.singular += usize::from(inertia(n, m, &mut scratch).is_ok_and(|signs| signs.zero > 0));
+            sample.force.extend_from_slice(terms.force.get(one.clone()).unwrap_or_default());
+            if let Ok(signs) = inertia(n, m, &mut scratch) {
+                sample.singular += usize::from(signs.zero > 0);
+                sample.indefinite += usize::from(signs.positive > 0 && signs.negative > 0);
+            }
             let same = |here: &[f64], there: &[f64], sign: f64| {
                 let size = here.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
                 here.iter().zip(there).all(|(a, b)| (a - sign * b).abs() <= EVEN * size)
@@ -150,6 +190,21 @@ impl Sample {
         let least = f64::MIN_POSITIVE.sqrt();
         self.size = parts.iter().map(|[motion, pull]| (motion / length).hypot(*pull).max(least)).collect();
         self.pace = momenta.iter().zip(&self.size).map(|(momentum, size)| momentum / size).collect();
+    }
+
+    /// Force beside those of `L` on coordinate `i` at state `k`.
+    pub fn force(&self, k: usize, i: usize) -> f64 {
+        self.force.get(k * self.n + i).copied().unwrap_or(0.0)
+    }
+
+    /// What every motion conserves because `L` does not depend on its parameter.
+    pub fn invariant(&self) -> Invariant {
+        match 2 * self.indefinite > self.len() {
+            _ if !self.force.is_empty() => Invariant::Nothing,
+            true if self.homogeneous => Invariant::Square,
+            true => Invariant::Legendre,
+            false => Invariant::Energy,
+        }
     }
 
     /// For every coordinate whether `L` does not depend on it.

@@ -184,6 +184,24 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole(&Disk, path, bytes)
 }
 
+/// As [`write_atomically`], but a file that holds something is never replaced, not even one that another writer puts there meanwhile.
+///
+/// # Errors
+/// [`io::ErrorKind::AlreadyExists`] for a file that holds something; else as of [`write_atomically`].
+pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if fs::symlink_metadata(path).is_ok() {
+        let full = fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() > 0);
+        return if full { Err(io::ErrorKind::AlreadyExists.into()) } else { write_atomically(path, bytes) };
+    }
+    let temporary = TemporaryFile::write(&Disk, path, bytes)?;
+    match fs::hard_link(&temporary.path, path) {
+        Ok(()) => uninterrupted(|| Disk.sync_directory(&temporary.directory)),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
+        // A file system without such links.
+        Err(_) => temporary.take_name(),
+    }
+}
+
 /// [`write_atomically`] by the operations of `files`.
 ///
 /// # Errors

@@ -8,7 +8,7 @@ mod machine;
 
 pub use files::{
     AtomicWriter, Disk, Files, ReadError, check_target, open_regular, read_regular, remove_leftovers, replace,
-    write_atomically, write_whole,
+    write_atomically, write_new, write_whole,
 };
 pub use lock::{Acquired, DirectoryLock, LockOwner};
 pub use machine::available_memory;

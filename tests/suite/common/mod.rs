@@ -7,6 +7,9 @@ pub mod accuracy;
 pub mod arm;
 pub mod damped;
 #[cfg(feature = "cli")]
+#[path = "../../../benches/shared/forms.rs"]
+pub mod forms;
+#[cfg(feature = "cli")]
 pub mod kinds;
 pub mod matrices;
 pub mod nested;

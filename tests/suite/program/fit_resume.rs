@@ -112,3 +112,29 @@ fn arguments_of_a_fit_that_goes_on_are_checked() {
     }
     assert_eq!(folder.names(), ["none"]);
 }
+
+#[test]
+fn members_that_are_trained_are_not_trained_again() {
+    let folder = Folder::new();
+    let data = folder.file("swings.csv", pendulum(6, true, 0.003));
+    let fit = ["fit", &data, "--hidden", "16", "--epochs", "150", "--members", "4", "--targets", "smoothed"];
+    let base = [&fit[..], &COLUMNS, &["--threads", "1"]].concat();
+    let (whole, out) = (text(&folder.path("whole")), text(&folder.path("out")));
+    lnn(&[&base[..], &["--out", &whole]].concat()).succeeded();
+    let last = stopped(&[&base[..], &["--out", &out]].concat(), |log| log.contains("member 3 of 4"), &folder);
+    let on = format!("continue with: lnn fit --resume {out}");
+    assert!(last.contains("2 of 4 members are trained") && last.ends_with(&on), "{last}");
+    let first = folder.path("out/member-1.safetensors");
+    let written = || fs::metadata(&first).unwrap().modified().unwrap();
+    let before = written();
+    let run = lnn(&["fit", "--resume", &out, "--threads", "1"]);
+    run.succeeded();
+    assert!(run.stderr.contains("member 3 of 4") && !run.stderr.contains("member 2 of 4"), "{}", run.stderr);
+    assert!(written() == before && result(&folder.path("out")) == result(&folder.path("whole")));
+    let models = ["member-1.safetensors", "member-3.safetensors"];
+    assert!(
+        models.iter().all(|name| fs::read(folder.path("out").join(name)).unwrap()
+            == fs::read(folder.path("whole").join(name)).unwrap())
+    );
+    assert!(!folder.path("out").join(LATEST).exists());
+}

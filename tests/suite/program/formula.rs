@@ -156,6 +156,91 @@ fn what_the_library_lacks_is_said_and_a_function_of_the_user_helps() {
     assert_eq!(with["terms"][1]["term"], "(cosh(a))");
 }
 
+/// Rows `run,t,..` of runs of 150 samples every 20 ms as a CSV, each row by its run and time with noise of 1e-3; `kept` by run and sample.
+fn recorded(names: &str, row: impl Fn(usize, f64) -> Vec<f64>, kept: impl Fn(usize, usize) -> bool) -> String {
+    let mut rng = RngStream::Trajectories.generator(3);
+    let mut csv = format!("run,t,{names}\n");
+    for (run, k) in (0..6).flat_map(|run| (0..150).map(move |k| (run, k))) {
+        let t = 0.02 * k as f64;
+        let mut noise = || 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
+        let row: Vec<String> = row(run, t).into_iter().map(|x| (x + noise()).to_string()).collect();
+        if kept(run, k) {
+            writeln!(csv, "{run},{t},{}", row.join(",")).unwrap();
+        }
+    }
+    csv
+}
+
+/// The answer to rows of recorded motion.
+fn answer(csv: String, coordinates: &str, more: &[&str]) -> Result<serde_json::Value, (Option<i32>, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("motion.csv").to_str().unwrap().to_string();
+    fs::write(&path, csv).unwrap();
+    let data = ["formula", &path, "--coords", coordinates, "--trajectory", "run", "--json", "--bootstraps", "4"];
+    let run = lnn(&[&data[..], more].concat());
+    if run.code == Some(0) { Ok(serde_json::from_str(&run.stdout).unwrap()) } else { Err((run.code, run.stderr)) }
+}
+
+fn terms(found: &serde_json::Value) -> Vec<&str> {
+    found["terms"].as_array().unwrap().iter().map(|t| t["term"].as_str().unwrap()).collect()
+}
+
+/// An anharmonic oscillator from rest, `x'' = -4 x + x^2`.
+fn wave(run: usize, t: f64) -> f64 {
+    let (mut x, mut v, h) = (0.4 + 0.2 * run as f64, 0.0, 1e-3);
+    for _ in 0..(t / h).round() as usize {
+        v -= h / 2.0 * (4.0 * x - x * x);
+        x += h * v;
+        v -= h / 2.0 * (4.0 * x - x * x);
+    }
+    x
+}
+
+#[test]
+fn what_holds_no_law_is_refused_with_its_reason() {
+    let all = |_: usize, _: usize| true;
+    let refused = |csv: String, coordinates: &str, names: &str| match answer(csv, coordinates, &[]) {
+        Err((Some(1), text)) => assert!(text.contains(names), "{names}: {text}"),
+        other => panic!("{names}: {other:?}"),
+    };
+    refused(recorded("x", |_, _| vec![0.0], all), "x", "x ");
+    refused(recorded("x,y", |run, t| vec![wave(run, t), 2.0 * wave(run, t) + 1.0], all), "x,y", "y ");
+    refused(recorded("x", |run, t| vec![((t + run as f64 / 7.0) as usize % 2) as f64], all), "x", "x ");
+    let wild = |run: usize, t: f64| vec![if run == 2 && (t - 1.0).abs() < 1e-6 { 1e6 } else { wave(run, t) }];
+    refused(recorded("x", wild, all), "x", "row 352");
+    let rod = |run: usize, t: f64| vec![wave(run, t).sin(), -wave(run, t).cos()];
+    refused(recorded("x,y", rod, all), "x,y", "x^2");
+}
+
+#[test]
+fn blocks_have_a_factor_each_and_the_ladder_finds_their_terms() {
+    let row =
+        |run: usize, t: f64| vec![(3.0 * t + run as f64).sin() * (0.5 + 0.1 * run as f64), wave((run + 3) % 6, t)];
+    let found = answer(recorded("x,y", row, |_, _| true), "x,y", &[]).unwrap();
+    assert_eq!(found["verdict"], "found", "{found}");
+    assert_eq!(found["blocks"], serde_json::json!([["x"], ["y"]]));
+    assert_eq!(terms(&found), ["x_dot^2", "y_dot^2", "x^2", "y^2", "y^3"], "{found}");
+    let values: Vec<f64> =
+        found["terms"].as_array().unwrap().iter().map(|t| t["coefficient"].as_f64().unwrap()).collect();
+    for (value, truth) in values.iter().zip([0.5, 0.5, -4.5, -2.0, 1.0 / 3.0]) {
+        assert!((value / truth - 1.0).abs() < 0.02, "{values:?}");
+    }
+    assert_eq!(found["basis"], "polynomial:3,trigonometric:3");
+}
+
+#[test]
+fn lost_rows_change_nothing() {
+    let row = |run: usize, t: f64| vec![wave(run, t)];
+    for kept in [|run: usize, k: usize| (7 * k * k + 3 * k + 11 * run) % 25 != 4, |_: usize, k: usize| k % 25 != 24] {
+        let found = answer(recorded("x", row, kept), "x", &["--basis", "polynomial:3"]).unwrap();
+        assert_eq!(
+            (found["verdict"].as_str(), terms(&found)),
+            (Some("found"), vec!["x_dot^2", "x^2", "x^3"]),
+            "{found}"
+        );
+    }
+}
+
 #[test]
 fn a_model_has_its_own_columns() {
     let run = lnn(&["formula", "examples/data/double_pendulum.safetensors", "--coords", "a"]);

@@ -33,4 +33,5 @@ mod symmetries;
 mod system_files;
 mod train;
 mod tube;
+mod verdicts;
 mod words;

@@ -132,3 +132,36 @@ fn a_motion_never_takes_the_place_of_its_model() {
     succeeded(&rollout(&folder.file("empty.csv", ""), &[]));
     succeeded(&rollout("/dev/null", &[]));
 }
+
+/// One rule for every command that writes a file: nothing that is read, nothing that holds something without `--overwrite`.
+#[test]
+fn system_files_and_tables_are_replaced_on_demand_alone() {
+    let folder = Folder::new();
+    let swing: String = (0..120).map(|k| format!("{},{}\n", 0.05 * f64::from(k), (0.1 * f64::from(k)).sin())).collect();
+    let data = folder.file("swing.csv", format!("t,x\n{swing}"));
+    let spring = "name = \"spring\"\nlagrangian = \"x_dot^2/2 - k*x^2/2\"\n[parameters]\nk = 3.0\n\
+                  [[coordinates]]\nname = \"x\"\nbounds = [-1, 1]\nvelocity_bounds = [-3, 3]\n";
+    let system = folder.file("spring.toml", spring);
+    let circle: String =
+        (0..200).map(|k| 0.1 * f64::from(k)).map(|t| format!("{t},{},{}\n", t.cos(), t.sin())).collect();
+    let circle = folder.file("circle.csv", format!("t,x,y\n{circle}"));
+    let kept = folder.file("kept.toml", "# months of work");
+    let identify = ["identify", &data, "--system", &system];
+    let formula = ["formula", &data, "--coords", "x", "--basis", "polynomial:2", "--bootstraps", "1"];
+    let constraints = ["constraints", &circle, "--coords", "x,y"];
+    for (command, own) in [(&identify[..], &system), (&formula[..], &data), (&constraints[..], &circle)] {
+        let run = |out: &str, more: &[&str]| lnn(&[command, &["--out", out], more].concat());
+        run(&kept, &[]).refused(1, &["kept.toml: there is a file already; --overwrite replaces it"]);
+        if own.ends_with(".toml") || command[0] == "constraints" {
+            run(own, &["--overwrite"]).refused(1, &["this command reads it", "never overwritten"]);
+        }
+        assert_eq!(fs::read_to_string(&kept).unwrap(), "# months of work");
+    }
+    assert_eq!(fs::read_to_string(&system).unwrap(), spring);
+    succeeded(&lnn(&[&identify[..], &["--out", &kept, "--overwrite"]].concat()));
+    assert!(fs::read_to_string(&kept).unwrap().contains("lagrangian"));
+    // On standard output the file stands alone.
+    let piped = lnn(&[&identify[..], &["--out", "-"]].concat());
+    assert!(piped.code == Some(0) && toml::from_str::<toml::Table>(&piped.stdout).is_ok(), "{}", piped.stdout);
+    assert!(piped.stderr.contains("constant"), "{}", piped.stderr);
+}

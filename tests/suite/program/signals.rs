@@ -213,3 +213,37 @@ fn a_certificate_ends_with_what_is_proven() {
     assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares[2] > 0.0, "{found}");
     assert_eq!(stderr.lines().count(), 1, "{stderr}");
 }
+
+/// Searches of seconds and more: signs of life at once, an end within a second, and nothing written.
+#[test]
+fn searches_show_life_and_end_at_once() {
+    use std::io::{BufRead, BufReader};
+    let folder = Folder::new();
+    let row = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let q = (0..7).map(|i| format!(",{}", ((1.0 + 0.37 * f64::from(i)) * t + f64::from(i)).sin()));
+        format!("{t}{}\n", q.collect::<String>())
+    };
+    let data = folder.file("arm.csv", format!("t,q1,q2,q3,q4,q5,q6,q7\n{}", (0..6000).map(row).collect::<String>()));
+    let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/seven_joints.toml");
+    let out = text(&folder.path("found.toml"));
+    let columns = ["--coords", "q1,q2,q3,q4,q5,q6,q7"];
+    let identify = ["identify", &data, "--system", arm, "--targets", "motion", "--threads", "1", "--out", &out];
+    let formula = ["formula", &data, "--basis", "polynomial:3", "--threads", "1", "--out", &out];
+    for arguments in [&identify[..], &[&formula[..], &columns].concat()] {
+        let began = Instant::now();
+        let mut child = start(arguments);
+        let mut line = String::new();
+        let mut said = BufReader::new(child.stderr.take().unwrap());
+        said.read_line(&mut line).unwrap();
+        assert!(line.starts_with("progress: "), "{line}");
+        // Smoothing takes its time where tests are compiled without optimisation.
+        assert!(began.elapsed() < Duration::from_secs(8), "{:?}", began.elapsed());
+        send("-INT", &child);
+        let pressed = Instant::now();
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert!(pressed.elapsed() < Duration::from_secs(3), "{arguments:?}: {:?}", pressed.elapsed());
+        let last = said.lines().last().unwrap().unwrap();
+        assert!(last.starts_with("error: interrupted") && !folder.path("found.toml").exists(), "{last}");
+    }
+}

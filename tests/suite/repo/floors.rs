@@ -6,7 +6,7 @@ use std::path::Path;
 /// Floors from the bottom to the top, with their modules in order.
 const FLOORS: [(&str, &[&str]); 6] = [
     ("numerics", &["scalar", "random", "ops", "forward", "linalg", "tape"]),
-    ("support", &["names", "storage"]),
+    ("support", &["cancellation", "names", "storage"]),
     ("mechanics", &["lagrangian", "rollout", "network"]),
     ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
     (

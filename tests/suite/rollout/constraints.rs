@@ -1,7 +1,8 @@
 //! Roll-outs on constraints: order, drift of the constraint and of the energy, starts, failures.
 
 use lnn::lagrangian::{
-    Constrained, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, ManifoldRows, Mechanics, configure,
+    Constrained, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, ManifoldRows, Mechanics, MechanicsError,
+    configure, inverse_dynamics,
 };
 use lnn::rollout::{Driven, Integrator, Options, RolloutError, Trajectory, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -182,5 +183,86 @@ fn forces_from_outside_act_within_the_constraints() {
         let angle = end[0].atan2(-end[1]);
         let gained = energy[energy.len() - 1] - energy[0];
         assert!(angle > 0.1 && (gained - 3.0 * angle).abs() < 1e-5, "{method:?}: {gained} {angle}");
+    }
+}
+
+/// Two wheels, `b = 2a + 0.3`, held by a formula.
+fn gear(formula: &str) -> impl EulerLagrange<f64> {
+    let lagrangian = ExpressionLagrangian::new(&["a", "b"], &[], "(a_dot^2 + 2*b_dot^2)/2 - 0.1*cos(a)").unwrap();
+    let rows = ExpressionConstraints::new(&["a", "b"], &[], &[("gear", formula)]).unwrap();
+    Constrained::new(Mechanics::<_, f64>::new(lagrangian, []), rows, []).unwrap()
+}
+
+#[test]
+fn a_motion_ends_where_a_constraint_has_a_second_branch() {
+    for method in Integrator::ALL {
+        for sign in [1.0, -1.0] {
+            let options = Options { method, ..Options::new(6.0, 0.02) };
+            // Wheels that turn on and on. The cosine vanishes with its gradient where b is a whole number of half turns.
+            let (q, v) = ([0.0, 0.3], [sign * 1.0, sign * 2.0]);
+            let stopped = rollout(&gear("cos(b) - cos(2*a + 0.3)"), &q, &v, &options);
+            // The sine of the difference is regular wherever they are.
+            let whole = rollout(&gear("sin(b - 2*a - 0.3)"), &q, &v, &options).complete().unwrap();
+            let end = last(&whole);
+            assert!((end[1] - 2.0 * end[0] - 0.3).abs() < 1e-9 && end[0] * sign > 4.0, "{method:?}: {end:?}");
+            let Some(RolloutError::SecondBranch { t, constraint: 0, at, .. }) = stopped.stop else {
+                panic!("{method:?}: {:?}", stopped.stop);
+            };
+            let edge = if sign < 0.0 { 0.0 } else { std::f64::consts::PI };
+            let b = |time: f64| whole.q[2 * whole.t.iter().position(|x| *x >= time).unwrap() + 1];
+            assert!(t <= at && (b(at) - edge).abs() < 0.06, "{method:?}: {t} {at}");
+            assert!(stopped.trajectory.q.iter().skip(1).step_by(2).all(|b| sign * (edge - b) > -1e-6), "{method:?}");
+        }
+    }
+}
+
+/// A rod whose bob goes round and round has one branch, however far it turns in a step.
+#[test]
+fn a_motion_that_turns_far_in_a_step_has_one_branch() {
+    let pendulum = model("cartesian-chain-1");
+    for (method, dt) in [(Integrator::Gauss6, 0.2), (Integrator::Dop853, 1.0), (Integrator::Variational, 0.02)] {
+        let options = Options { method, ..Options::new(4.0, dt) };
+        let motion = rollout(&*pendulum, &[0.0, -1.0], &[9.0, 0.0], &options);
+        assert!(motion.stop.is_none(), "{method:?}: {:?}", motion.stop);
+    }
+}
+
+/// Forces that move a state as it moves are those that act on it, to within what the constraints carry.
+#[test]
+fn inverse_dynamics_divides_forces_between_the_outside_and_the_constraints() {
+    for (name, q, v) in starts() {
+        let model = model(name);
+        let n = q.len();
+        let rows = {
+            let mut rows = ManifoldRows::default();
+            model.manifold().unwrap().rows(&q, &v, &mut rows);
+            rows.matrix
+        };
+        let push: Vec<f64> = (0..n).map(|i| 0.3 * (1.7 * i as f64 + 1.0).sin()).collect();
+        let force = |_: f64, _: &[f64], _: &[f64], force: &mut [f64]| force.copy_from_slice(&push);
+        let Ok(a) = Driven::new(&*model, &force).acceleration(0.0, &q, &v) else { continue };
+        let found = inverse_dynamics(&*model, &q, &v, &a).unwrap();
+        // The shortest force from outside that does the same: nothing along the rows, and the rest of the push.
+        for row in rows.chunks(n) {
+            let along: f64 = row.iter().zip(&found.external).map(|(a, f)| a * f).sum();
+            assert!(along.abs() < 1e-9, "{name}: {along}");
+        }
+        let parts = found.external.iter().zip(&found.constraint).map(|(a, b)| a + b);
+        assert!(parts.zip(&found.generalized).all(|(sum, all)| (sum - all).abs() < 1e-9), "{name}");
+        let shortest = found.external.clone();
+        let again = |_: f64, _: &[f64], _: &[f64], force: &mut [f64]| force.copy_from_slice(&shortest);
+        let same = Driven::new(&*model, &again).acceleration(0.0, &q, &v).unwrap();
+        assert!(distance(&same, &a) < 1e-8, "{name}: {same:?} {a:?}");
+        let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+        assert!(length(&found.external) <= length(&push) + 1e-9, "{name}");
+        // An acceleration off the constraints is refused with its distance, 50 along the first row.
+        let size = length(&rows[..n]).sqrt();
+        let off: Vec<f64> = a.iter().zip(&rows[..n]).map(|(a, row)| a + 50.0 * row / size).collect();
+        match inverse_dynamics(&*model, &q, &v, &off) {
+            Err(MechanicsError::OffConstraints { row: 0, distance, .. }) => {
+                assert!((distance - 50.0).abs() < 1e-6, "{name}: {distance}");
+            }
+            other => panic!("{name}: {other:?}"),
+        }
     }
 }

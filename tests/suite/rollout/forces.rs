@@ -5,9 +5,11 @@ use lnn::lagrangian::systems::DoublePendulum;
 use lnn::lagrangian::systems::HarmonicOscillator;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, force_parts, inverse_dynamics};
 use lnn::rollout::{
-    Driven, Force, Integrable, Integrator, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,
+    Between, Driven, Force, Integrable, Integrator, Options, Rollout, RolloutError, SampledForce, Start, rollout,
+    rollout_each,
 };
 use lnn::scalar::{Dd, Real, Scalar};
+use std::ops::ControlFlow;
 
 /// A free mass of 1 kg.
 struct Mass;
@@ -318,4 +320,55 @@ fn the_forces_of_a_motion_are_found_again() {
     assert!(slow.friction.is_empty() && force_parts(&free, &q, &v, &a[..2]).is_err());
     assert!(inverse_dynamics(&free, &q, &v, &a[..2]).is_err());
     assert!(inverse_dynamics(&free, &q, &v, &[f64::NAN; 4]).is_err());
+}
+
+/// What an integrator says of the energy of its own motion does not depend on how often that is sampled.
+#[test]
+fn the_account_of_the_energy_is_integrated_beside_the_motion() {
+    let chain = damped::chain(2);
+    let motor = |t: f64, q: &[f64], v: &[f64], force: &mut [f64]| {
+        force[0] = 4.0 * (9.0 * t).sin() - q[0];
+        force[1] = 1.0 - 0.2 * v[1];
+    };
+    let driven = Driven::new(&chain, &motor);
+    let account = |method: Integrator, t_end: f64, dt: f64| {
+        let step = method.is_structure_preserving().then_some(0.005);
+        let options = Options { method, step, energy: true, ..Options::reference(t_end, dt) };
+        let ending = driven.rollout_in_pieces(&[0.4, -0.2], &[1.0, 0.5], &options, &mut |_| ControlFlow::Continue(()));
+        assert_eq!(ending.stop, None);
+        ending.balance.unwrap()
+    };
+    for (method, close) in
+        [(Integrator::Dopri5, 1e-7), (Integrator::Dop853, 1e-7), (Integrator::Gauss6, 1e-5), (Integrator::Gauss4, 1e-4)]
+    {
+        for (t_end, dt) in [(3.0, 0.01), (3.0, 3.0), (-2.0, 1.0)] {
+            let balance = account(method, t_end, dt);
+            assert!(balance.work.abs() > 0.05 && balance.dissipated.abs() > 0.05, "{method:?} {balance:?}");
+            assert!(balance.defect().abs() < close * balance.size, "{method:?} {dt} {balance:?}");
+        }
+    }
+}
+
+/// The same samples of a smooth force, eight a period, joined in each way: only what was sampled decides how near the motion comes.
+#[test]
+fn forces_between_samples_are_as_they_are_said_to_be() {
+    let model = mass::<f64>();
+    let omega = std::f64::consts::TAU;
+    let times: Vec<f64> = (0..=80).map(|k| 0.125 * f64::from(k)).collect();
+    let values: Vec<f64> = times.iter().map(|t| (omega * t).cos()).collect();
+    let sampled = SampledForce::new(1, times, values).unwrap();
+    let options = Options::reference(6.0, 0.05);
+    // From 2 s on, away from the ends of the samples.
+    let options = Options { t0: 2.0, ..options };
+    let exact = |t: f64| (1.0 - (omega * (t - 2.0)).cos()) / omega.powi(2);
+    let off = |between: Between| {
+        let force = sampled.clone().between(between);
+        let motion = Driven::new(&model, &force).rollout(&[0.0], &[0.0], &options).complete().unwrap();
+        motion.t.iter().zip(&motion.q).map(|(t, x)| (x - exact(*t)).abs()).fold(0.0, f64::max) * omega.powi(2) / 2.0
+    };
+    let [held, linear, cubic, band] = Between::ALL.map(off);
+    assert!(
+        held > 0.2 && (0.02..0.1).contains(&linear) && cubic < 0.5 * linear && band < 0.02 && band < cubic,
+        "{held} {linear} {cubic} {band}"
+    );
 }

@@ -1,7 +1,7 @@
 //! Structure-preserving integrators: order, reversibility, invariants, energy over long times, and how they fail.
 
 use lnn::lagrangian::systems::{DoublePendulum, SpringPendulum};
-use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, Terms, configure};
 use lnn::rollout::{Domain, Integrator, Options, Rollout, RolloutError, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
@@ -449,4 +449,58 @@ fn collocation_on_momenta_is_no_worse_than_on_velocities() {
         assert!(late < 1.2 * early && last < 1.2 * first, "{early:e} {late:e} {first:e} {last:e}");
         assert!(late < ratio * last, "{late:e} {last:e}");
     }
+}
+
+/// Two masses on a spring that is a million times as stiff as what holds them: its force is the rounding of their places times its constant.
+#[test]
+fn stiff_springs_end_the_iteration_at_the_rounding_of_places() {
+    let formula = "(x_dot^2 + y_dot^2)/2 - k*(x - y)^2/2 - x^2/2";
+    let lagrangian = |k: f64| Mechanics::new(ExpressionLagrangian::new(&["x", "y"], &["k"], formula).unwrap(), [k]);
+    // Both move as one of twice the mass, but for a millionth.
+    let exact = |t: f64| (t / 2f64.sqrt()).cos();
+    for (method, order) in METHODS {
+        for step in [0.01, 0.05, 0.2, 1.0] {
+            for k in [1e4, 1e6, 1e8] {
+                let options = Options { method, ..Options::new(10.0, step) };
+                let motion = rollout(&lagrangian(k), &[1.0, 1.0], &[0.0, 0.0], &options);
+                assert!(motion.stop.is_none(), "{method:?} {step} {k}: {:?}", motion.stop);
+                let x = motion.trajectory.q[2 * motion.trajectory.len() - 2];
+                let error = (x - exact(10.0)).abs();
+                assert!(error < 10.0 * step.powf(order) * 0.1 + 2e-4, "{method:?} {step} {k}: {error}");
+            }
+        }
+    }
+    let options = Options { method: Integrator::Gauss6, ..Options::new(10.0, 0.01) };
+    let motion = rollout(&lagrangian(1e6), &[1.0, 1.0], &[0.0, 0.0], &options).complete().unwrap();
+    assert!((motion.q[2000] - 0.705_347_906_3).abs() < 1e-6, "{}", motion.q[2000]);
+}
+
+/// `max(0, -y)^1.5` has an infinite second derivative where it does not act, which no acceleration asks for.
+#[test]
+fn second_derivatives_that_nothing_needs_are_not_taken() {
+    let formula = "(y_dot^2 + x_dot^2)/2 - 9.81*y - 1000*max(0, -y)^1.5";
+    let soft = Mechanics::<_, f64>::new(ExpressionLagrangian::new(&["x", "y"], &[], formula).unwrap(), []);
+    for method in Integrator::ALL {
+        let options = Options { method, ..Options::new(0.3, 0.01) };
+        let motion = rollout(&soft, &[0.0, 1.0], &[0.0, 0.0], &options).complete().unwrap();
+        let y = motion.q[2 * 30 + 1];
+        assert!((y - (1.0 - 9.81 * 0.3 * 0.3 / 2.0)).abs() < 1e-6, "{method:?}: {y}");
+    }
+    // It bounces, and many states at once are evaluated as one is.
+    let options = Options::reference(1.0, 0.01);
+    let motion = rollout(&soft, &[0.0, 1.0], &[0.0, 0.0], &options).complete().unwrap();
+    assert!(motion.q.iter().skip(1).step_by(2).any(|y| *y < -0.01));
+    let (mut all, mut one) = (Terms::default(), Terms::default());
+    soft.terms(&motion.q, &motion.v, Request::ALL, &mut all).unwrap();
+    for (k, (q, v)) in motion.q.chunks(2).zip(motion.v.chunks(2)).enumerate() {
+        soft.terms(q, v, Request::ALL, &mut one).unwrap();
+        assert!((one.acceleration[1] - all.acceleration[2 * k + 1]).abs() < 1e-9, "{k}");
+    }
+    // More coordinates than forward numbers serve.
+    let names = ["a", "b", "c", "d", "y"];
+    let formula = "(a_dot^2 + b_dot^2 + c_dot^2 + d_dot^2 + y_dot^2)/2 - 9.81*y - 1000*max(0, -y)^1.5";
+    let many = Mechanics::<_, f64>::new(ExpressionLagrangian::new(&names, &[], formula).unwrap(), []);
+    let mut terms = Terms::default();
+    many.terms(&[0.0, 0.0, 0.0, 0.0, 1.0], &[1.0; 5], Request::ALL, &mut terms).unwrap();
+    assert_eq!(terms.acceleration[4], -9.81);
 }

@@ -36,10 +36,15 @@ fn what_is_left_is_stated_by_quantity() {
     let found = compared(&Subject::formula(&XY, &format!("{PLAIN} + 0.1*y^3")), &plain);
     assert!(found.mass_matrix < 0.1 && found.motion > 1e-2 && found.energy > 1e-2, "{found:?}");
     // Free motion has many Lagrangians: the same straight lines, another mass matrix.
-    let [round, long] =
-        ["(x_dot^2 + y_dot^2)/2", "(x_dot^2 + 4*y_dot^2)/2"].map(|formula| Subject::formula(&XY, formula));
-    let found = compared(&long, &round);
+    let [round, long, skew] =
+        ["(x_dot^2 + y_dot^2)/2", "(x_dot^2 + 4*y_dot^2)/2", "(x_dot^2 + 4*y_dot^2 + 2*x_dot*y_dot)/2"]
+            .map(|formula| Subject::formula(&XY, formula));
+    let found = compared(&skew, &round);
     assert!(found.motion == 0.0 && found.mass_matrix > 0.1 && found.lagrangian > 0.1, "{found:?}");
+    // Those of coordinates that do not act on each other differ by a factor each.
+    let found = compared(&long, &round);
+    assert!(distances(&found).iter().all(|x| *x < 1e-12), "{found:?}");
+    assert!(found.group_factors.len() == 2 && (found.group_factors[1] - 4.0).abs() < 1e-12, "{found:?}");
 }
 
 #[test]

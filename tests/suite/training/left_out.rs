@@ -7,6 +7,7 @@ use lnn::data::Dataset;
 use lnn::data::{Noise, StateEstimate};
 use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, initial_weights};
 use lnn::recording::RecordedTrajectory;
+use lnn::rollout::Between;
 use lnn::scalar::{Dd, Scalar};
 use lnn::shooting::{Segments, ShootingObjective};
 use lnn::training::Objective;
@@ -99,8 +100,10 @@ fn track(name: &str) -> RecordedTrajectory {
 fn the_gradient_of_shooting_is_that_of_the_mean_over_the_segments_that_count() {
     let architecture = architecture(2, 0.75);
     let tracks = [track("one"), track("two")];
-    let estimated: Vec<StateEstimate<'_>> =
-        tracks.iter().map(|track| StateEstimate { track, q: &track.q, v: &track.v }).collect();
+    let estimated: Vec<StateEstimate<'_>> = tracks
+        .iter()
+        .map(|track| StateEstimate { track, q: &track.q, v: &track.v, between: Between::Linear })
+        .collect();
     let noise = Noise { q: vec![0.05; 2], v: vec![0.1; 2] };
     let double = Segments::<f64>::new(&architecture, &estimated, &noise, 5, 4);
     let exact = Segments::<Dd>::new(&architecture, &estimated, &noise, 5, 4);

@@ -12,6 +12,7 @@ use lnn::network::{
 };
 use lnn::presets::Preset;
 use lnn::recording::RecordedTrajectory;
+use lnn::rollout::Between;
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::shooting::{self, Curvature, Fitted, Segments, Shooting, ShootingError, ShootingObjective, Task, fit};
 use lnn::storage::Disk;
@@ -235,7 +236,7 @@ impl Motion {
 
     fn estimated(&self) -> Vec<StateEstimate<'_>> {
         let pairs = self.tracks.iter().zip(&self.states);
-        pairs.map(|(track, (q, v))| StateEstimate { track, q, v }).collect()
+        pairs.map(|(track, (q, v))| StateEstimate { track, q, v, between: Between::Linear }).collect()
     }
 }
 

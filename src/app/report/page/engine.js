@@ -346,9 +346,10 @@ class Motion {
     const momentum = list((i) => lagrangian.first(n + i)), slope = list((i) => lagrangian.first(i));
     const mass = list((i) => list((j) => lagrangian.second(n + i, n + j)));
     const drift = list((i) => v.reduce((sum, v, j) => sum + lagrangian.second(j, n + i) * v, 0));
-    if (friction) friction.evaluate(x);
+    // Where a function is not defined, as the logarithm of a negative number, its derivatives may be finite all the same.
+    const defined = !Number.isNaN(value) && !(friction && Number.isNaN(friction.evaluate(x)));
     const force = list((i) => (friction ? -friction.first(n + i) : 0));
-    const right = list((i) => slope[i] - drift[i] + force[i]);
+    const right = list((i) => (defined ? slope[i] - drift[i] + force[i] : NaN));
     const energy = dot(momentum, v) - value, found = { lagrangian: value, momentum, mass, energy };
     if (!this.held.length) {
       const { x: acceleration, determinant } = solve(mass, right);

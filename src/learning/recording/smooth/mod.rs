@@ -133,6 +133,8 @@ pub struct Smoothed {
     pub v_bias: Vec<f64>,
     /// Estimated bias of the accelerations.
     pub a_bias: Vec<f64>,
+    /// Last sample that each state is estimated from, `(samples)`.
+    pub reach: Vec<usize>,
     /// Samples left and right that have no full window around them: their errors are several times larger.
     pub margins: [usize; 2],
     /// Samples between the margins that a gap leaves without enough others around them, ascending.
@@ -264,7 +266,7 @@ impl Smoothing {
         if track.q.len() != length * n || (velocities && track.v.len() != length * n) {
             return Err(SmoothError::Shape { track: track.name.clone(), n });
         }
-        let mut smoothed = Smoothed { times: track.times.clone(), ..Smoothed::default() };
+        let mut smoothed = Smoothed { times: track.times.clone(), reach: vec![0; length], ..Smoothed::default() };
         for values in smoothed.arrays().into_iter().flatten() {
             values.resize(length * n, 0.0);
         }
@@ -316,6 +318,7 @@ fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoot
     let full: Vec<bool> = (0..length).map(|at| clock.surrounds(times, at, windows[at]) == [true; 2]).collect();
     for (at, &window) in windows.iter().enumerate() {
         let range = signal.window(0, at, window);
+        smoothed.reach[at] = smoothed.reach[at].max(range.end - 1);
         let usual = (full[at] && !clock.even).then(|| signal.even_variance(&mut fits, 0, window));
         let fit = signal.fit(&mut fits, 0, range.clone(), (at, window));
         if let Some(usual) = usual {

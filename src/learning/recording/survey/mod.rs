@@ -8,7 +8,7 @@ mod warnings;
 pub(crate) use coordinate::CoordinateSurvey;
 pub(crate) use motionless::Stillness;
 pub(crate) use motionless::stillness;
-pub(crate) use suspicious::{Kind, Warning};
+pub(crate) use suspicious::{Kind, Warning, find as find_suspicious};
 
 use crate::recording::clock::Clock;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
@@ -127,8 +127,9 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     let mut coordinates: Vec<CoordinateSurvey> =
         (0..n).map(|i| CoordinateSurvey::new(recording, i, &alone, &planned.coordinates[i])).collect();
     let (mut suspicious, mut suspicious_count) = (Vec::new(), 0);
+    let row = |track: usize, at: usize| reading.rows[track].row(at);
     for (i, coordinate) in coordinates.iter_mut().enumerate() {
-        suspicious_count += suspicious::find(reading, i, coordinate.noise, &mut suspicious);
+        suspicious_count += find_suspicious(recording, &row, (i, coordinate.noise), &mut suspicious);
         if coordinate.periodic {
             guesses(reading, i, coordinate);
         }

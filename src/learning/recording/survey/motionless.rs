@@ -24,7 +24,10 @@ impl std::fmt::Display for Stillness {
         match self {
             Self::Constant(value) => write!(f, "does not move: it is {value} in every sample"),
             Self::Copy(sum) => write!(f, "follows from the other coordinates: it is {sum} plus a constant"),
-            Self::Noise(sigma) => write!(f, "does not move beyond its noise of {}", number(*sigma)),
+            Self::Noise(sigma) if sigma.is_finite() => {
+                write!(f, "does not move beyond its noise of {}", number(*sigma))
+            }
+            Self::Noise(_) => write!(f, "does not move beyond its noise"),
         }
     }
 }
@@ -63,7 +66,8 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
         square += values(track).map(|x| (x - mean).powi(2)).sum::<f64>();
         count += samples;
     }
-    let still = noise.resolved && (square / count).sqrt() <= MOVES * noise.sigma;
+    // Numbers whose squares overflow say nothing.
+    let still = noise.resolved && noise.sigma.is_finite() && (square / count).sqrt() <= MOVES * noise.sigma;
     still.then_some(Stillness::Noise(noise.sigma))
 }
 

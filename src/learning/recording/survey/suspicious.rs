@@ -1,6 +1,6 @@
 //! Samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
 
-use crate::recording::LoadedRecording;
+use crate::recording::Recording;
 use crate::recording::clock::Clock;
 use crate::recording::smooth::contrast_weights;
 use crate::recording::statistics::robust_deviation;
@@ -39,6 +39,9 @@ pub struct Warning {
     pub track: String,
     /// Row of the file (line, or row of an array, from 1).
     pub row: u64,
+    /// Trajectory and sample, both from 0.
+    #[serde(skip)]
+    pub place: (usize, usize),
     /// Name of the coordinate.
     pub coordinate: String,
     /// Its kind.
@@ -61,17 +64,22 @@ const PATTERNS: [(Kind, &[f64]); 3] = [
 ///
 /// Sixth differences, scaled to the noise of one sample, are noise alone where motion is smooth. Where one is beyond six
 /// standard deviations (robust, from their median) and its neighbours have the other sign (motion that is sampled too
-/// coarsely has the same), the pattern around it tells what happened.
-pub fn find(reading: &LoadedRecording, i: usize, sigma: f64, found: &mut Vec<Warning>) -> usize {
-    let (recording, n) = (&reading.recording, reading.recording.n());
+/// coarsely has the same), the pattern around it tells what happened. `row` is the row of a sample of a trajectory.
+pub fn find(
+    recording: &Recording,
+    row: &dyn Fn(usize, usize) -> u64,
+    (i, sigma): (usize, f64),
+    found: &mut Vec<Warning>,
+) -> usize {
+    let n = recording.n();
     let (mut count, mut z) = (0, Vec::new());
-    for (track, rows) in recording.tracks.iter().zip(&reading.rows) {
+    for (number, track) in recording.tracks.iter().enumerate() {
         let mut report = |at: usize, kind: Kind, size: f64| {
             count += 1;
             if found.len() < MOST {
                 let (name, coordinate) = (track.name.clone(), recording.coordinates[i].clone());
-                let (row, value) = (rows.row(at), track.q[at * n + i]);
-                found.push(Warning { track: name, row, coordinate, kind, value, size });
+                let (row, value, place) = (row(number, at), track.q[at * n + i], (number, at));
+                found.push(Warning { track: name, row, place, coordinate, kind, value, size });
             }
         };
         let q = |at: usize| track.q[at * n + i];
@@ -162,7 +170,7 @@ fn frozen(samples: usize, q: impl Fn(usize) -> f64, sigma: f64, mut report: impl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{RecordedTrajectory, Recording};
+    use crate::recording::RecordedTrajectory;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
@@ -176,7 +184,7 @@ mod tests {
         let track = RecordedTrajectory { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
         let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         let mut found = Vec::new();
-        let count = find(&LoadedRecording::from(recording), 0, 1e-3, &mut found);
+        let count = find(&recording, &|_, at| at as u64 + 1, (0, 1e-3), &mut found);
         assert_eq!(count, found.len());
         found.into_iter().map(|s| (s.row, s.kind, s.size)).collect()
     }

@@ -15,11 +15,14 @@ const REDUNDANT: f64 = 1e-6;
 #[non_exhaustive]
 pub enum ConstraintError {
     /// No state was found that satisfies all of them.
-    #[error("constraint `{name}` contradicts the others: the nearest states miss it by {defect:.3e}")]
+    #[error("constraint `{name}` {}", match defect.is_finite() {
+        true => format!("contradicts the others: the nearest states miss it by {defect:.3e}"),
+        false => "is not finite at any of the states that were tried".to_string(),
+    })]
     Contradiction {
         /// The constraint that is missed most.
         name: String,
-        /// By how much, in units of the coordinates.
+        /// By how much, in units of the coordinates; not finite if it is not at any state.
         defect: f64,
     },
     /// As many independent rows as coordinates.
@@ -121,7 +124,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
                     needed.extend(independent(n, &rows.matrix, REDUNDANT).0);
                 }
                 Err(off) => {
-                    if nearest.is_none_or(|best| off.defect < best.defect) {
+                    if nearest.is_none_or(|best| best.defect.is_nan() || off.defect < best.defect) {
                         nearest = Some(off);
                     }
                 }

@@ -83,6 +83,12 @@ impl FormulaConstraints {
         Ok(Self { formulas, compiled })
     }
 
+    /// The same with those first that are written first.
+    #[must_use]
+    pub(crate) fn in_order(self, place: impl Fn(&str) -> usize) -> Self {
+        Self { compiled: self.compiled.in_order(place), ..self }
+    }
+
     /// The formulas by name.
     pub(crate) fn formulas(&self) -> &BTreeMap<String, String> {
         &self.formulas

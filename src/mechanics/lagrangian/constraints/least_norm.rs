@@ -1,7 +1,7 @@
 //! Motion that a degenerate Lagrangian leaves open, chosen to be the shortest.
 
-use super::ReducedMass;
 use super::rows::dot;
+use super::{ReducedMass, along_rows};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{Workspace, minimum_norm};
 use crate::scalar::{Real, Scalar};
@@ -33,13 +33,7 @@ impl<S: Scalar> LeastNormMotion<S> {
     /// The shortest `a` with `A a = -gamma` that satisfies `M a = f` within the constraints.
     fn of(n: usize, mass: &[S], rows: &[S], drift: &[S], force: &[S]) -> Option<Self> {
         let reduced = ReducedMass::of(n, mass, rows).ok()?;
-        let zero = <S as Real>::zero();
-        let (mut a, m) = (vec![zero; n], drift.len());
-        let gram: Vec<S> = (0..m * m).map(|k| dot(&rows[k / m * n..][..n], &rows[k % m * n..][..n])).collect();
-        let by_rows = |right: &[S]| Some(minimum_norm(m, &gram, right, &mut Workspace::new()).ok()?.solution);
-        for (row, weight) in rows.chunks_exact(n).zip(by_rows(drift)?) {
-            a.iter_mut().zip(row).for_each(|(a, &x)| *a -= weight * x);
-        }
+        let mut a: Vec<S> = along_rows(n, rows, drift).0.into_iter().map(|x| -x).collect();
         let rest =
             |a: &[S]| -> Vec<S> { force.iter().zip(mass.chunks_exact(n)).map(|(&f, row)| f - dot(row, a)).collect() };
         let start = rest(&a);
@@ -51,7 +45,7 @@ impl<S: Scalar> LeastNormMotion<S> {
         // A^T lambda = M a - f.
         let balance = rest(&a);
         let right_of_rows: Vec<S> = rows.chunks_exact(n).map(|row| -dot(row, &balance)).collect();
-        let multipliers = by_rows(&right_of_rows)?;
+        let multipliers = along_rows(n, rows, &right_of_rows).1;
         Some(Self { acceleration: a, multipliers, open: right.len() - found.rank, unbalanced: found.outside })
     }
 }

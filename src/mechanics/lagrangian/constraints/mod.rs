@@ -31,10 +31,13 @@ pub(crate) use kkt::Bordered;
 pub(super) use kkt::{Motion, accelerate};
 pub use least_norm::{LeastNorm, LeastNormMotion};
 pub use manifold::{Manifold, ManifoldRows, RowAdjoint};
+pub(super) use projection::along_rows;
 pub use projection::{OffManifold, project, project_acceleration};
 pub use reduced::ReducedMass;
+pub(crate) use rows::dot;
 #[cfg(feature = "training")]
 pub(crate) use rows::independent_rows;
+pub(super) use rows::length;
 #[cfg(feature = "data")]
 pub(crate) use rows::take_out;
 

@@ -74,29 +74,28 @@ pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &
 
 /// The shortest `x` with `A x = defects` for some of the rows, as near to it as can be where they depend on each other.
 fn least_change<S: Scalar>(n: usize, rows: &ManifoldRows<S>, of: &[usize], defects: &[S]) -> Vec<S> {
-    let unit: Vec<(Vec<S>, S)> = of.iter().map(|&row| at_unit_length(n, rows, row, defects)).collect();
-    let gram: Vec<S> = unit.iter().flat_map(|(a, _)| unit.iter().map(move |(b, _)| dot(a, b))).collect();
-    let right: Vec<S> = unit.iter().map(|(_, defect)| *defect).collect();
-    let mut change = vec![<S as Real>::zero(); n];
-    match minimum_norm(of.len(), &gram, &right, &mut Workspace::new()) {
-        Ok(found) => {
-            for ((row, _), &weight) in unit.iter().zip(&found.solution) {
-                change.iter_mut().zip(row).for_each(|(x, &a)| *x += weight * a);
-            }
-        }
-        Err(_) => change.fill(S::nan()),
-    }
-    change
+    let picked: Vec<S> = of.iter().flat_map(|&row| rows.matrix[row * n..(row + 1) * n].iter().copied()).collect();
+    let right: Vec<S> = of.iter().map(|&row| defects[row]).collect();
+    along_rows(n, &picked, &right).0
 }
 
-/// A row and its defect over the length of the row; a row that vanishes asks for nothing.
-fn at_unit_length<S: Scalar>(n: usize, rows: &ManifoldRows<S>, row: usize, defects: &[S]) -> (Vec<S>, S) {
-    let gradient = &rows.matrix[row * n..(row + 1) * n];
-    let size = length(gradient);
-    if size == <S as Real>::zero() {
-        return (gradient.to_vec(), size);
+/// The shortest `x = A^T w` with `A x = right`, and the shortest `w`, of rows `A`, `(m, n)`; as near to it as can be where the rows depend
+/// on each other. A row that vanishes asks for nothing.
+pub fn along_rows<S: Scalar>(n: usize, rows: &[S], right: &[S]) -> (Vec<S>, Vec<S>) {
+    let (m, zero) = (right.len(), <S as Real>::zero());
+    let sizes: Vec<S> = rows.chunks_exact(n).map(length).collect();
+    let over = |x: S, size: S| if size == zero { zero } else { x / size };
+    let unit: Vec<S> = rows.iter().enumerate().map(|(at, &x)| over(x, sizes[at / n])).collect();
+    let gram: Vec<S> = (0..m * m).map(|at| dot(&unit[at / m * n..][..n], &unit[at % m * n..][..n])).collect();
+    let right: Vec<S> = right.iter().zip(&sizes).map(|(&x, &size)| over(x, size)).collect();
+    let Ok(found) = minimum_norm(m, &gram, &right, &mut Workspace::new()) else {
+        return (vec![S::nan(); n], vec![S::nan(); m]);
+    };
+    let mut x = vec![zero; n];
+    for (row, &weight) in unit.chunks_exact(n).zip(&found.solution) {
+        x.iter_mut().zip(row).for_each(|(x, &a)| *x += weight * a);
     }
-    (gradient.iter().map(|&x| x / size).collect(), defects[row] / size)
+    (x, found.solution.iter().zip(&sizes).map(|(&weight, &size)| over(weight, size)).collect())
 }
 
 /// Refuses defects that are more than rounding.

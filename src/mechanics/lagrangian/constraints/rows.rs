@@ -16,12 +16,12 @@ pub(crate) fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
 }
 
 /// Scalar product.
-pub(super) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
+pub(crate) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     a.iter().zip(b).fold(<S as Real>::zero(), |sum, (&a, &b)| a.mul_add(b, sum))
 }
 
 /// Euclidean length, of numbers of any size.
-pub(super) fn length<S: Scalar>(x: &[S]) -> S {
+pub(in crate::mechanics::lagrangian) fn length<S: Scalar>(x: &[S]) -> S {
     let size = largest(x);
     if size > <S as Real>::zero() && size.is_finite() {
         let unit = size.ilogb();

@@ -11,6 +11,7 @@
 use super::quantity::Decimal;
 use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
 use crate::lagrangian::system::Range;
+use crate::names::unknown;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -133,6 +134,16 @@ fn cross(a: &Vector, b: &Vector, i: usize) -> [Term; 2] {
     [a[j].times(&b[k]), a[k].times(&b[j]).scaled(-1.0)]
 }
 
+/// Symbols of the ten constants of a link, from 1: its mass, first moments and inertia about the origin of its frame.
+pub(crate) fn inertia_symbols(link: usize) -> [String; 10] {
+    ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"].map(|what| format!("{what}{link}"))
+}
+
+/// Symbols of the constants of a joint, from 1, that are not negative: the inertia of its drive, viscous and dry friction.
+pub(crate) fn loss_symbols(link: usize) -> [String; 3] {
+    ["Ia", "Fv", "Fc"].map(|what| format!("{what}{link}"))
+}
+
 impl Description {
     /// The same with links written out; as it is if they are wrong, which its compilation says.
     pub(crate) fn plain(&self) -> Self {
@@ -150,6 +161,7 @@ impl Description {
             (_, 1..=MAX_LINKS) => {}
             _ => return fault("links", format!("expected 1 to {MAX_LINKS} tables [[links]], found {count}")),
         }
+        plain.parameters.clear();
         if self.metric.is_some() {
             return fault("metric", "expected `[[links]]` or `[metric]`, found both".to_string());
         }
@@ -207,6 +219,16 @@ impl Description {
         if chain.friction {
             plain.dissipation = whole(losses, &self.dissipation);
         }
+        // What the file says of a constant counts; one that is neither of the links nor in a formula would be passed over in silence.
+        let known = || plain.parameters.keys().map(String::as_str);
+        let stray = |name: &&String| !plain.parameters.contains_key(*name) && !self.uses(name);
+        if let Some(name) = self.parameters.keys().find(stray) {
+            return fault(
+                &format!("parameters.{name}"),
+                unknown("constant of the links", name, known().collect::<Vec<_>>()),
+            );
+        }
+        plain.parameters.extend(self.parameters.clone());
         Ok(plain)
     }
 
@@ -297,17 +319,24 @@ impl Description {
         Ok([viscous, constant("Fc").times(&Term::name(dry))])
     }
 
-    /// Unknown constants of a link, unless the file says more of them.
+    /// Unknown constants of a link.
     fn add_constants(&mut self, number: usize, constants: &[(String, &str, f64)]) {
         for (name, unit, value) in constants {
-            let own = || ParameterDescription {
+            let own = ParameterDescription {
                 default: Decimal(value.to_string()),
                 unit: (*unit).to_string(),
                 range: Range::Any,
                 learn: true,
             };
-            self.parameters.entry(format!("{name}{number}")).or_insert_with(own);
+            self.parameters.insert(format!("{name}{number}"), own);
         }
+    }
+
+    /// `true` if a formula of the file holds a name.
+    fn uses(&self, name: &str) -> bool {
+        let formulas = [&self.lagrangian, &self.dissipation].into_iter().flatten();
+        let mut formulas = formulas.chain(self.definitions.values()).chain(self.constraints.values());
+        formulas.any(|text| text.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name))
     }
 
     /// A sum of terms as one: a definition if it takes one.
@@ -440,6 +469,17 @@ mod tests {
     }
 
     #[test]
+    fn constants_of_links_have_their_symbols() {
+        let arm = instance(r#"{"friction": true, "armature": true}"#, r#"[{}, {"prismatic": true}]"#, &[]);
+        let mut own: Vec<String> = arm.system.parameters.iter().map(|known| known.symbol.to_string()).collect();
+        let mut symbols: Vec<String> =
+            (1..=2).flat_map(|link| [&inertia_symbols(link)[..], &loss_symbols(link)].concat()).collect();
+        own.sort();
+        symbols.sort();
+        assert_eq!(own, symbols);
+    }
+
+    #[test]
     fn a_mistake_in_links_names_its_key() {
         let key = |text: &str| {
             let description: Description = serde_json::from_str(text).unwrap();
@@ -452,6 +492,8 @@ mod tests {
         assert_eq!(of(r#""links": [{}, {"alpha": "1/0"}]"#), "links[1].alpha");
         assert_eq!(of(r#""links": [{}], "metric": {}"#), "metric");
         assert_eq!(of(r#""links": [{}], "definitions": {"link1_s": "1"}"#), "definitions.link1_s");
+        assert_eq!(of(r#""links": [{}], "parameters": {"lzz1": 1}"#), "parameters.lzz1");
+        assert_eq!(of(r#""links": [{}], "parameters": {"k": 1}, "lagrangian": "-kk*q1^2""#), "parameters.k");
         let coordinates = r#""coordinates": [{"name": "a", "velocity_bounds": [-1, 1], "periodic": true}]"#;
         assert_eq!(of(&format!(r#""links": [{{}}, {{}}], {coordinates}"#)), "coordinates");
         assert_eq!(of(&format!(r#""links": [{}]"#, vec!["{}"; MAX_LINKS + 1].join(","))), "links");

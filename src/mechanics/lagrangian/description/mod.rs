@@ -14,6 +14,7 @@ use super::expression::{ExpressionError, Formula};
 use super::system::{Range, ShellAdvice};
 use crate::scalar::Real;
 use chain::{ChainDescription, LinkDescription};
+pub(crate) use chain::{inertia_symbols, loss_symbols};
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -55,6 +56,9 @@ pub struct Description {
     /// Formulas that vanish, by the names of the constraints: of coordinates, or linear in velocities.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constraints: BTreeMap<String, String>,
+    /// Where constraints of these names stand in the file, if that is known.
+    #[serde(skip)]
+    pub(crate) constraint_lines: ConstraintLines,
     /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metric: Option<BTreeMap<String, String>>,
@@ -191,6 +195,7 @@ impl Description {
             parameters: parameters.map(parameter).collect(),
             definitions: BTreeMap::new(),
             constraints,
+            constraint_lines: ConstraintLines::default(),
             metric: None,
             training: BTreeMap::new(),
             validation: BTreeMap::new(),
@@ -216,6 +221,16 @@ impl DescriptionError {
     }
     fn formula(key: impl Into<String>) -> impl FnOnce(ExpressionError) -> Self {
         |error| Self::new(key, error)
+    }
+}
+
+/// Lines of constraints in a file by their names. Descriptions are the same wherever these stand.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ConstraintLines(pub(crate) BTreeMap<String, usize>);
+
+impl PartialEq for ConstraintLines {
+    fn eq(&self, _: &Self) -> bool {
+        true
     }
 }
 

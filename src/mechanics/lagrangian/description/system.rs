@@ -258,7 +258,8 @@ impl Description {
         }
         let size = (self.coordinates.len(), self.parameters.len());
         let formulas = self.constraints.iter().map(|(name, text)| (name.as_str(), text.as_str()));
-        let compiled = ExpressionConstraints::compiled(size, formulas, compiler, scope);
+        let line = |name: &str| self.constraint_lines.0.get(name).copied().unwrap_or(usize::MAX);
+        let compiled = ExpressionConstraints::compiled(size, formulas, compiler, scope).map(|rows| rows.in_order(line));
         let place = |(name, error)| DescriptionError::new(format!("constraints.{name}"), error);
         compiled.map(Some).map_err(place)
     }

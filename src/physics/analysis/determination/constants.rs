@@ -117,7 +117,7 @@ impl Stretches {
         let tracks: Vec<RecordedTrajectory> = pieces.iter().map(cut).collect();
         let estimated = tracks.iter().zip(&pieces).map(|(track, (_, states, rows))| {
             let rows = rows.start * n..rows.end * n;
-            StateEstimate { track, q: &states.q[rows.clone()], v: &states.v[rows] }
+            StateEstimate { track, q: &states.q[rows.clone()], v: &states.v[rows], between: measured.training.between }
         });
         let estimated: Vec<StateEstimate<'_>> = estimated.collect();
         let segments = Segments::new(architecture, &estimated, &measured.noise(), STRETCH, STRETCH);

@@ -27,6 +27,9 @@
 //!
 //! Without known forces `L` has no unit: quantities are then over the mean `M` of the first coordinate.
 //!
+//! Groups of coordinates that do not act on each other have a factor each. Without a known force on one of its coordinates the factor of a group
+//! is open, but for that of the first coordinate's, which is the unit.
+//!
 //! Where a momentum is conserved, its coordinate's `M_ii` is open, and every other one if it is the unit: along a trajectory the momentum is one
 //! number, and how it changes with the velocity is only seen between trajectories, of which few pass most places. A network has room for many
 //! functions of it, the changes above have few.
@@ -89,6 +92,8 @@ impl Estimate {
 pub struct Determination {
     /// `true` if known forces fix the unit of `L`; if not, everything is over the mean of `M` of the first coordinate.
     pub absolute: bool,
+    /// Groups of coordinates that do not act on each other, and whether the unit of each is known.
+    pub groups: Vec<(Vec<usize>, bool)>,
     /// Mean over the states of the upper triangle of `M`, row after row.
     pub mass_matrix: Vec<Estimate>,
     /// Friction coefficient of every coordinate, `sum of v_i dD/dv_i` over `sum of v_i^2`; empty for a model without.
@@ -115,12 +120,21 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
     let floor = &posterior.floor;
     let mass_floor = |&(i, j): &(usize, usize)| (floor[i] * own[i] * floor[j] * own[j]).abs().sqrt();
     let conserved = conserved(model, &data)?;
+    let groups = data.groups(model).into_iter().map(|group| {
+        let known = if absolute { group.iter().any(|&i| data.is_forced(i)) } else { group.contains(&0) };
+        (group, known)
+    });
+    let groups: Vec<(Vec<usize>, bool)> = groups.collect();
+    let known = |i: usize| groups.iter().any(|(group, known)| *known && group.contains(&i));
     let mass_of = |(mass, pair): (&Linear, &(usize, usize))| {
         let &(i, j) = pair;
         // Without known forces the first element is the unit, and not open itself.
-        let open = if absolute { conserved[i] } else { i > 0 && (conserved[0] || conserved[i]) };
-        if open && i == j { Estimate::open(mass.value) } else { posterior.estimate(mass, mass_floor(pair)) }
+        let moves_on = if absolute { conserved[i] } else { i > 0 && (conserved[0] || conserved[i]) };
+        let open = (moves_on && i == j) || !known(i) || !known(j);
+        if open { Estimate::open(mass.value) } else { posterior.estimate(mass, mass_floor(pair)) }
     };
+    let energy = wanted.energy(&posterior, unit.as_ref());
+    let all_known = groups.iter().all(|(_, known)| *known);
     let result = Determination {
         absolute,
         mass_matrix: mass.iter().zip(&pairs).map(mass_of).collect(),
@@ -129,9 +143,14 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
             .iter()
             .map(over)
             .zip(floor)
-            .map(|(friction, floor)| posterior.estimate(&friction, floor * friction.value))
+            .enumerate()
+            .map(|(i, (friction, floor))| match known(i) {
+                true => posterior.estimate(&friction, floor * friction.value),
+                false => Estimate::open(friction.value),
+            })
             .collect(),
-        energy: wanted.energy(&posterior, unit.as_ref()),
+        energy: if all_known { energy } else { Estimate::open(energy.value) },
+        groups,
     };
     let all = result.mass_matrix.iter().chain(&result.friction).chain([&result.energy]);
     let finite = all.into_iter().all(|e| e.value.is_finite() && !e.low.is_nan() && !e.high.is_nan());

@@ -4,7 +4,7 @@
 use super::changes::{Changes, Row, Typical};
 use super::observed::Observed;
 use super::{Estimate, Linear};
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Request, Terms, acting_groups};
 use crate::linalg::{MatMut, MatRef, Workspace, dot, gemm, inverse, solve};
 use std::ops::Range;
 
@@ -15,6 +15,8 @@ pub(super) struct Data {
     pub v: Vec<f64>,
     /// The model's accelerations, by known forces too.
     pub a: Vec<f64>,
+    /// Known forces, empty without.
+    force: Vec<f64>,
     missed: Vec<f64>,
     /// Accelerations of less bias less the observed ones, or zeros.
     finer: Vec<f64>,
@@ -33,6 +35,7 @@ impl Data {
             q: vec![],
             v: vec![],
             a: vec![],
+            force: vec![],
             missed: vec![],
             finer: vec![],
             inverse: vec![],
@@ -63,6 +66,7 @@ impl Data {
                 data.q.extend_from_slice(q);
                 data.v.extend_from_slice(v);
                 data.a.extend(a);
+                data.force.extend_from_slice(observed.force.get(k * n..(k + 1) * n).unwrap_or_default());
                 data.missed.extend(missed);
                 data.finer.extend((0..n).map(|i| observed.finer.get(k * n + i).map_or(0.0, |finer| finer - seen[i])));
                 data.inverse.extend(inverted);
@@ -94,6 +98,35 @@ impl Data {
     /// [`Self::beyond`] for what the model misses.
     pub fn misfit(&self) -> Vec<f64> {
         self.beyond(&mean_squares(self.n, &self.missed))
+    }
+
+    /// Groups of coordinates that do not act on each other, as far as the model knows: an influence within what it misses beyond the error of
+    /// the data, or within a share [`COUPLED`] of the acceleration, is none.
+    pub fn groups(&self, model: &dyn EulerLagrange<f64>) -> Vec<Vec<usize>> {
+        let (n, stride) = (self.n, self.states().div_ceil(SHOWN).max(1));
+        let some = |x: &[f64]| -> Vec<f64> { x.chunks_exact(n).step_by(stride).flatten().copied().collect() };
+        let (q, v, force) = (some(&self.q), some(&self.v), some(&self.force));
+        let noise = mean_squares(n, &self.missed).into_iter().zip(&self.observed).map(
+            |(square, [size, error, independent])| {
+                let beyond = (square - error).max(0.0) + 2.0 * square * (2.0 / independent).sqrt();
+                beyond.max(COUPLED * COUPLED * size).sqrt()
+            },
+        );
+        let accelerations = |q: &[f64], v: &[f64]| {
+            let mut terms = Terms::default();
+            // Places between which nothing was seen may have none.
+            let _ = model.terms(q, v, Request::ACCELERATION, &mut terms);
+            if !force.is_empty() {
+                let _ = terms.add_force(n, v, &force, &mut Workspace::new());
+            }
+            terms.acceleration
+        };
+        acting_groups(n, (&q, &v), &accelerations, &noise.collect::<Vec<_>>())
+    }
+
+    /// Coordinates along which a force was known.
+    pub fn is_forced(&self, i: usize) -> bool {
+        self.force.iter().skip(i).step_by(self.n).any(|force| *force != 0.0)
     }
 
     pub fn typical(&self) -> Option<Typical> {
@@ -175,6 +208,11 @@ impl Data {
 const OPEN: f64 = 0.5;
 /// Fewest states of a group.
 const LEAST: usize = 5;
+/// Share of an acceleration up to which the influence of another coordinate may be an error of the network: networks of motion without any
+/// coupling show influences of up to 0.06 (`cargo bench --bench rates -- --part readings`).
+const COUPLED: f64 = 0.1;
+/// States at which couplings are looked for, at most.
+const SHOWN: usize = 500;
 
 /// Mean square of each of `n` columns.
 fn mean_squares(n: usize, values: &[f64]) -> Vec<f64> {

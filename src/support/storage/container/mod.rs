@@ -79,6 +79,11 @@ pub fn checksum<'a, S: Scalar>(numbers: impl IntoIterator<Item = &'a S>, precisi
     checksum.finalize()
 }
 
+/// CRC-32 (IEEE) of a text, eight hexadecimal digits.
+pub fn text_checksum(text: &str) -> String {
+    format!("{:08x}", crc32fast::hash(text.as_bytes()))
+}
+
 /// The bytes of a file; the description must have the fields `format` and `crate_version`.
 ///
 /// # Errors

@@ -1,15 +1,31 @@
 //! Progress and cancellation of the work on a finished model: it reports how far it is, and the flag of its [`Watch`] ends it.
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::network::NetworkLagrangian;
+use crate::network::file::Header;
 use crate::pipeline::{Event, PipelineError, Watch};
+use crate::training::{Epoch, StopReason};
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What was learned where the judgement of it was interrupted.
+#[derive(Debug)]
+pub struct Unjudged {
+    /// Header of the model.
+    pub header: Header,
+    /// The model.
+    pub network: NetworkLagrangian<f64>,
+    /// One row per epoch.
+    pub history: Vec<Epoch>,
+    /// Why learning ended.
+    pub stop: StopReason,
+}
 
 /// Evaluations between two reports.
 const OFTEN: u64 = 1024;
 
 /// Reports progress and honours the flag.
 #[derive(Debug)]
-pub(crate) struct Cancellation<'a> {
+pub(crate) struct Judging<'a> {
     watch: &'a Watch,
     /// `true` if the flag counts.
     counts: bool,
@@ -18,8 +34,8 @@ pub(crate) struct Cancellation<'a> {
     evaluations: AtomicU64,
 }
 
-impl<'a> Cancellation<'a> {
-    /// Cancellation of so many pieces of work. A flag that was raised before does not count: it ended the training.
+impl<'a> Judging<'a> {
+    /// Judging of so many pieces of work. A flag that was raised before does not count: it ended the training.
     pub fn new(watch: &'a Watch, pieces: usize) -> Self {
         let counts = !watch.is_interrupted();
         watch.say(Event::Judged { done: 0, total: pieces });
@@ -47,14 +63,14 @@ impl<'a> Cancellation<'a> {
 
     /// The same model; once the flag was raised it fails everywhere, which ends whatever integrates it.
     pub fn watched<'b>(&'b self, model: &'b dyn EulerLagrange<f64>) -> Watched<'b> {
-        Watched { model, cancellation: self }
+        Watched { model, judging: self }
     }
 }
 
-/// A model under [`Cancellation`].
+/// A model under [`Judging`].
 pub(crate) struct Watched<'a> {
     model: &'a dyn EulerLagrange<f64>,
-    cancellation: &'a Cancellation<'a>,
+    judging: &'a Judging<'a>,
 }
 
 impl EulerLagrange<f64> for Watched<'_> {
@@ -63,12 +79,12 @@ impl EulerLagrange<f64> for Watched<'_> {
     }
 
     fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
-        let Cancellation { watch, evaluations, .. } = self.cancellation;
+        let Judging { watch, evaluations, .. } = self.judging;
         let before = evaluations.fetch_add(1, Ordering::Relaxed);
         if before % OFTEN == 0 {
             watch.say(Event::Evaluations(before));
         }
-        if self.cancellation.is_interrupted() {
+        if self.judging.is_interrupted() {
             terms.clear();
             return Err(MechanicsError::Interrupted);
         }

@@ -1,0 +1,79 @@
+//! Motion that no law can be read off: coordinates that stand still, copies, steps, rows that belong to no motion, constraints.
+
+use super::error::FormulaError;
+use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
+use crate::recording::Recording;
+use crate::recording::smooth::{SmoothOptions, Smoothing};
+use crate::recording::survey::{Kind, find_suspicious, stillness};
+
+/// Size of an outlier or a jump, over the range of all but one sample in fifty, from which on it is no part of a motion.
+const WILD: f64 = 0.25;
+/// Samples that are looked at for ranges, about.
+const LOOKED_AT: usize = 1 << 16;
+
+/// Refuses a recording that holds no motion, or rows that are none.
+pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<(), FormulaError> {
+    if let Some((i, how)) = stillness(recording, smoothing).into_iter().next() {
+        let coordinate = recording.coordinates[i].clone();
+        return Err(FormulaError::Still { coordinate, how: how.to_string() });
+    }
+    (0..recording.n()).try_for_each(|i| wild(recording, i, smoothing.coordinates[i].noise.sigma))
+}
+
+/// Refuses rows far from the motion around them, and motion by steps.
+fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<(), FormulaError> {
+    let n = recording.n();
+    let stride = (recording.samples() / LOOKED_AT).max(1);
+    let of = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
+    let values = || (0..recording.tracks.len()).flat_map(of);
+    let mut some: Vec<f64> = values().step_by(stride).copied().collect();
+    some.sort_by(f64::total_cmp);
+    let at = |share: f64| some[((some.len() - 1) as f64 * share) as usize];
+    let range = at(0.99) - at(0.01);
+    let coordinate = || recording.coordinates[i].clone();
+    let steps = || {
+        let pairs = |track: usize| of(track).zip(of(track).skip(1)).map(|(a, b)| (b - a).abs());
+        (0..recording.tracks.len()).flat_map(pairs)
+    };
+    let (still, all) = steps().fold((0, 0), |(still, all), step| (still + usize::from(step == 0.0), all + 1));
+    if 2 * still > all && steps().fold(0.0, f64::max) > WILD * range {
+        return Err(FormulaError::Steps { coordinate: coordinate(), still, steps: all });
+    }
+    let mut found = Vec::new();
+    find_suspicious(recording, &|_, sample| sample as u64 + 1, (i, sigma), &mut found);
+    found.retain(|place| matches!(place.kind, Kind::Outlier | Kind::Jump) && place.size.abs() > WILD * range);
+    let Some(first) = found.iter().max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())) else { return Ok(()) };
+    let (track, sample) = first.place;
+    Err(FormulaError::Wild {
+        coordinate: coordinate(),
+        track,
+        sample,
+        trajectory: first.track.clone(),
+        time: recording.tracks[track].times[sample],
+        value: first.value,
+        jumps: first.kind == Kind::Jump,
+        size: first.size,
+        range,
+        places: found.len(),
+    })
+}
+
+/// What vanishes along a single trajectory, which may be a constraint or its orbit.
+///
+/// # Errors
+/// [`FormulaError::Constrained`] if several trajectories keep to it: of a Lagrangian of these coordinates they say too little.
+pub(super) fn constrained(recording: &Recording, noise: Option<&Vec<f64>>) -> Result<Option<String>, FormulaError> {
+    if recording.n() < 2 {
+        return Ok(None);
+    }
+    let options = SmoothOptions { noise: noise.cloned(), ..SmoothOptions::default() };
+    let samples = MotionSamples::of(recording, &options)?;
+    // A search that is too large, or too few samples, says nothing against a formula.
+    let Ok(found) = find_constraints(&samples, ConstraintSearch::default()) else { return Ok(None) };
+    let held = found.constraints.into_iter().filter(|c| c.kind == ConstraintKind::Holonomic).map(|c| c.formula);
+    let formulas: Vec<String> = held.collect();
+    if recording.tracks.len() == 1 {
+        return Ok(formulas.into_iter().next());
+    }
+    if formulas.is_empty() { Ok(None) } else { Err(FormulaError::Constrained { formulas }) }
+}

@@ -1,0 +1,184 @@
+//! Errors of constants that are fitted to forces, by a parametric bootstrap.
+//!
+//! Smoothed accelerations have errors that neighbours share and that are regressors themselves, so that least squares are biased and their own
+//! errors are too small by factors. The recording is therefore made anew: the motion by polynomials of a higher degree, and the forces that the
+//! fitted constants ask for along it, are the truth; noise of encoders and of forces is drawn anew, everything is smoothed and fitted again.
+//! The mean change of the constants is their bias, which is subtracted; the scatter is their error (Efron and Tibshirani, An Introduction to the
+//! Bootstrap, 1993, sections 6.5 and 10.2). Residuals of the copies say what the right form leaves at every sample.
+
+use super::covariance::Root;
+use super::follow::{Follower, LANES};
+use super::smoothed::{Met, States};
+use super::solve::Problem;
+use crate::linalg::dot;
+use crate::random::{RandomGenerator, RngStream};
+use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
+use crate::recording::{RecordedTrajectory, Recording};
+use rand_distr::{Distribution, StandardNormal};
+
+/// Copies of the recording.
+pub(super) const COPIES: usize = 20;
+/// Degree of the polynomials of the true motion above those that are smoothed with: windows of that degree are wider.
+const MORE_DEGREES: usize = 2;
+
+/// What copies of the recording say.
+pub(super) struct Copies {
+    /// Constants of every copy.
+    constants: Vec<Vec<f64>>,
+    /// Residuals of force of every copy, by place: `(samples, n)` of each trajectory, `NaN` where there are none.
+    residuals: Vec<Vec<Vec<f64>>>,
+}
+
+/// Fits copies of the recording; `None` if the motion cannot be smoothed by polynomials of a higher degree.
+///
+/// `usual` are the sizes of the residuals: the noise of a force is not larger.
+pub(super) fn copies(
+    problem: &Problem<'_>,
+    smoothing: &Smoothing,
+    (states, x, usual): (&States, &[f64], &[f64]),
+) -> Option<Copies> {
+    let recording = problem.course.recording;
+    let n = recording.n();
+    let given = || smoothing.coordinates.iter().map(|chosen| chosen.noise.sigma).collect();
+    let options =
+        SmoothOptions { degree: smoothing.degree + MORE_DEGREES, noise: Some(given()), ..SmoothOptions::default() };
+    let wider = Smoothing::choose(recording, &options).ok()?;
+    let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
+    let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma.min(usual[i])).collect();
+    let truth: Vec<Option<(Smoothed, Vec<f64>)>> = recording
+        .tracks
+        .iter()
+        .map(|track| {
+            let motion = wider.apply(track).ok()?;
+            let force = asked(problem, x, &motion);
+            Some((motion, force))
+        })
+        .collect();
+    let one = |copy: usize| {
+        let mut rng = RngStream::Copies.generator(copy as u64);
+        let again = |(track, truth): (&RecordedTrajectory, &Option<(Smoothed, Vec<f64>)>)| match truth {
+            Some((motion, force)) => drawn(track, motion, force, (smoothing, &of_force), &mut rng),
+            None => track.clone(),
+        };
+        let tracks = recording.tracks.iter().zip(&truth).map(again).collect();
+        let copied = Recording { tracks, ..recording.clone() };
+        let smooth = |(track, truth): (&RecordedTrajectory, &Option<_>)| {
+            truth.as_ref().and_then(|_| smoothing.apply(track).ok())
+        };
+        let smoothed: Vec<Option<Smoothed>> = copied.tracks.iter().zip(&truth).map(smooth).collect();
+        let mut course = problem.course.clone();
+        course.recording = &copied;
+        let problem = Problem { course, ..problem.clone() };
+        let mut own = States::new(&problem, &smoothed);
+        let weights = states.weight.iter().take(n).copied().collect::<Vec<_>>();
+        own.weight = (0..own.places.len() * n).map(|at| weights[at % n]).collect();
+        let mut constants = x.to_vec();
+        own.fit(&problem, &mut constants, Met::Forces);
+        let mut residuals: Vec<Vec<f64>> = recording.tracks.iter().map(|t| vec![f64::NAN; t.len() * n]).collect();
+        let found = own.force_residuals(&problem, &constants);
+        for ((track, sample), row) in own.places.iter().zip(found.chunks_exact(n)) {
+            residuals[*track][sample * n..(sample + 1) * n].copy_from_slice(row);
+        }
+        (constants, residuals)
+    };
+    let numbers: Vec<usize> = (0..COPIES).collect();
+    let share = COPIES.div_ceil(problem.threads.max(1));
+    let found: Vec<(Vec<f64>, Vec<Vec<f64>>)> = std::thread::scope(|scope| {
+        let one = &one;
+        let parts: Vec<_> = numbers
+            .chunks(share)
+            .map(|part| scope.spawn(move || part.iter().map(|&k| one(k)).collect::<Vec<_>>()))
+            .collect();
+        parts.into_iter().flat_map(|part| part.join().unwrap_or_default()).collect()
+    });
+    let (constants, residuals): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    (constants.len() == COPIES).then_some(Copies { constants, residuals })
+}
+
+/// The forces that a motion asks for, `(samples, n)`.
+fn asked(problem: &Problem<'_>, x: &[f64], motion: &Smoothed) -> Vec<f64> {
+    let (n, values) = (problem.course.equations.n, problem.parameters(x));
+    let mut follower = Follower::new(&problem.course);
+    let mut force = vec![0.0; motion.q.len()];
+    let mut scratch = vec![0.0; LANES * n];
+    for first in (0..force.len()).step_by(LANES * n) {
+        let range = first..(first + LANES * n).min(force.len());
+        follower.accelerate(
+            &values,
+            (&motion.q[range.clone()], &motion.v[range.clone()]),
+            &[],
+            &mut scratch[..range.len()],
+        );
+        follower.lacking_forces(&motion.a[range.clone()], &mut force[range]);
+    }
+    // Without known forces those are lacking that the motion asks for, with the other sign.
+    force.iter_mut().for_each(|f| *f = -*f);
+    force
+}
+
+/// A trajectory with new noise. A reading that repeats the one before, as encoders do, repeats it again.
+fn drawn(
+    track: &RecordedTrajectory,
+    motion: &Smoothed,
+    force: &[f64],
+    (smoothing, of_force): (&Smoothing, &[f64]),
+    rng: &mut RandomGenerator,
+) -> RecordedTrajectory {
+    let n = of_force.len();
+    let mut normal = || -> f64 { StandardNormal.sample(rng) };
+    let mut copy = track.clone();
+    for at in 0..track.q.len() {
+        let chosen = &smoothing.coordinates[at % n];
+        copy.q[at] = motion.q[at] + chosen.noise.sigma * normal();
+        if at >= n && track.q[at] == track.q[at - n] {
+            copy.q[at] = copy.q[at - n];
+        }
+        if let (Some(noise), Some(v)) = (chosen.velocity_noise, copy.v.get_mut(at)) {
+            *v = motion.v[at] + noise.sigma * normal();
+        }
+        if let Some(f) = copy.force.get_mut(at) {
+            *f = force[at] + of_force[at % n] * normal();
+        }
+    }
+    copy
+}
+
+impl Copies {
+    /// The bias of the constants that the root of the normal matrix tells, and their covariance in its directions.
+    pub fn bias(&self, root: &Root, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let (m, count, copies) = (x.len(), root.forward.len(), self.constants.len() as f64);
+        let change = |constants: &Vec<f64>| {
+            let change: Vec<f64> = constants.iter().zip(x).map(|(a, b)| a - b).collect();
+            root.forward.iter().map(|row| dot(row, &change)).collect::<Vec<f64>>()
+        };
+        let changes: Vec<Vec<f64>> = self.constants.iter().map(change).collect();
+        let mean: Vec<f64> = (0..count).map(|k| changes.iter().map(|c| c[k]).sum::<f64>() / copies).collect();
+        // That of a new draw about the mean of these few, whose variance is known from few as well.
+        let factor = (1.0 + 1.0 / copies) / (copies - 3.0);
+        // Few copies do not tell the correlations of many constants.
+        let kept = copies / (copies + count as f64);
+        let covariance = |at: usize| {
+            let (i, j) = (at / count, at % count);
+            let sum: f64 = changes.iter().map(|c| (c[i] - mean[i]) * (c[j] - mean[j])).sum();
+            factor * sum * if i == j { 1.0 } else { kept }
+        };
+        let bias = (0..m).map(|k| root.back.iter().zip(&mean).map(|(row, x)| x * row[k]).sum()).collect();
+        (bias, (0..count * count).map(covariance).collect())
+    }
+
+    /// Mean square of the residual of coordinate `i` at every place, `(places)`; 0 where no copy has one.
+    pub fn squares(&self, places: &[(usize, usize)], (n, i): (usize, usize)) -> Vec<f64> {
+        let at = |&(track, sample): &(usize, usize)| {
+            let own = self.residuals.iter().map(|copy| copy[track][sample * n + i]).filter(|r| r.is_finite());
+            let (sum, count) = own.fold((0.0, 0.0), |(sum, count), r| (sum + r * r, count + 1.0));
+            // The mean of one over a mean square of few numbers is larger than one over the square.
+            if count > 2.0 { sum / (count - 2.0) } else { 0.0 }
+        };
+        places.iter().map(at).collect()
+    }
+
+    /// Residuals of a copy at places, of coordinate `i`.
+    pub fn residuals(&self, copy: usize, places: &[(usize, usize)], (n, i): (usize, usize)) -> Vec<f64> {
+        places.iter().map(|&(track, sample)| self.residuals[copy][track][sample * n + i]).collect()
+    }
+}

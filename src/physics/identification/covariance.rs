@@ -1,0 +1,180 @@
+//! Covariance of the unknowns where residuals are correlated, or are weighed by their size.
+//!
+//! With scores `u_t`, the gradient of the sum of squares at a sample once starts are eliminated, the covariance is `S^-1 B S^-1`, `S` the normal
+//! matrix and `B` the long-run covariance of the scores: the mean of the outer products of their sums over all windows of one length, which is
+//! Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
+
+use super::determined::ROUNDING;
+use super::follow::{LANES, Segment};
+use super::linear::times;
+use super::quality::tail;
+use super::solve::{HUBER, Normal, Problem};
+use crate::linalg::{Workspace, dot, eigh};
+
+/// Eigenvalue of a segment's matrix of correlations from which on it tells its own constants.
+const TOLD: f64 = 1e-6;
+/// Share of the samples that a window of correlated residuals has at most.
+const MOST_WINDOW: f64 = 0.25;
+
+/// How residuals are weighed: all numbers are means over residuals in units of the noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weighing {
+    /// Variance of the scores over the normal matrix: the mean square residual if none is cut.
+    pub square: f64,
+    /// Weight over slope of the scores, 1 if no residual is cut.
+    pub bread: f64,
+}
+
+impl Weighing {
+    /// `E psi^2`, `E psi'` and the mean weight of residuals beyond three standard deviations that count linearly (Huber, Robust
+    /// Statistics, 1981, section 7.6); `taken` is the share of numbers that are not taken by starts and constants.
+    pub fn of(residuals: &[Vec<f64>], robust: bool, taken: f64) -> Self {
+        let all = || residuals.iter().flatten().copied().filter(|r| r.is_finite());
+        let cut = |r: f64| if robust && r.abs() > HUBER { HUBER } else { r.abs() };
+        let (mut square, mut slope, mut weight) = (0.0, 0.0, 0.0);
+        for r in all() {
+            square += cut(r).powi(2);
+            slope += f64::from(u8::from(cut(r) == r.abs()));
+            weight += if r == 0.0 { 1.0 } else { cut(r) / r.abs() };
+        }
+        Self { square: square / (weight * taken).max(f64::MIN_POSITIVE), bread: weight / slope.max(1.0) }
+    }
+}
+
+/// Scores of every segment, `(samples, m)`.
+pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
+    let (starts, m) = (2 * problem.sigma.len(), problem.unknowns());
+    let width = starts + m;
+    // How starts follow the unknowns, `(m, starts)`.
+    let follow = problem.all(x, segments).into_iter().map(|linear| {
+        let linear = linear?;
+        let inverse = problem.start_inverse(&linear, 0.0);
+        let column = |k: usize| (0..starts).map(|i| linear.matrix[i * width + starts + k]).collect::<Vec<f64>>();
+        Some((0..m).map(|k| times(starts, &inverse, &column(k))).collect::<Vec<_>>())
+    });
+    let follow: Vec<Option<Vec<Vec<f64>>>> = follow.collect();
+    let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * m]).collect();
+    let mut order: Vec<usize> = (0..segments.len()).collect();
+    order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
+    for batch in order.chunks(LANES) {
+        let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
+        problem.residuals(x, &lanes, true, |lane, sample, _, residual, row| {
+            let Some(follow) = &follow[batch[lane]] else { return };
+            let cut = if problem.robust { residual.clamp(-HUBER, HUBER) } else { residual };
+            let own = &mut found[batch[lane]][sample * m..(sample + 1) * m];
+            for ((score, follow), slope) in own.iter_mut().zip(follow).zip(&row[starts..]) {
+                *score += cut * (slope - dot(follow, &row[..starts]));
+            }
+        });
+    }
+    found
+}
+
+/// Long-run covariance of scores, `(m, m)`: those of segments that follow each other on a trajectory in a row, correlated over `lags` samples.
+pub(super) fn long_run(scores: &[Vec<f64>], segments: &[Segment], m: usize, lags: usize) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..segments.len()).collect();
+    order.sort_by_key(|&k| (segments[k].track, segments[k].first));
+    let samples: usize = segments.iter().map(|segment| segment.samples).sum();
+    let window = (lags + 1).min((MOST_WINDOW * samples as f64) as usize).max(1);
+    let mut covariance = vec![0.0; m * m];
+    for track in order.chunk_by(|&a, &b| segments[a].track == segments[b].track) {
+        let rows: Vec<&[f64]> = track.iter().flat_map(|&k| scores[k].chunks_exact(m)).collect();
+        let mut sum = vec![0.0; m];
+        for end in 0..rows.len() + window - 1 {
+            if let Some(row) = rows.get(end) {
+                sum.iter_mut().zip(*row).for_each(|(s, x)| *s += x);
+            }
+            if let Some(row) = end.checked_sub(window).and_then(|before| rows.get(before)) {
+                sum.iter_mut().zip(*row).for_each(|(s, x)| *s -= x);
+            }
+            for (line, a) in covariance.chunks_exact_mut(m).zip(&sum) {
+                line.iter_mut().zip(&sum).for_each(|(c, b)| *c += a * b);
+            }
+        }
+    }
+    // All scores together are 0: windows that are a large part of them vary less than those of independent numbers.
+    let part = window as f64 / samples as f64;
+    let factor = window as f64 * (1.0 - part + part * part / 3.0);
+    covariance.iter_mut().for_each(|c| *c /= factor);
+    covariance
+}
+
+/// Square root `R` of a normal matrix with `S = R' R`, and its inverse, along the directions that the motion tells: rows `(directions, m)`.
+pub(super) struct Root {
+    pub forward: Vec<Vec<f64>>,
+    pub back: Vec<Vec<f64>>,
+}
+
+impl Root {
+    pub fn of(m: usize, matrix: &[f64]) -> Self {
+        let scale: Vec<f64> = (0..m).map(|k| matrix[k * m + k].max(0.0).sqrt()).collect();
+        let over = |x: f64, by: f64| if by > 0.0 { x / by } else { 0.0 };
+        let scaled: Vec<f64> =
+            matrix.iter().enumerate().map(|(at, x)| over(*x, scale[at / m] * scale[at % m])).collect();
+        let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
+        // Finite by construction.
+        let _ = eigh(m, &scaled, &mut values, &mut vectors, &mut Workspace::new());
+        let told = || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > ROUNDING);
+        let each = |vector: &[f64], of: &dyn Fn(usize, f64) -> f64| {
+            vector.iter().enumerate().map(|(k, x)| of(k, *x)).collect::<Vec<f64>>()
+        };
+        Self {
+            forward: told().map(|(value, vector)| each(vector, &|k, x| x * value.sqrt() * scale[k])).collect(),
+            back: told().map(|(value, vector)| each(vector, &|k, x| over(x / value.sqrt(), scale[k]))).collect(),
+        }
+    }
+
+    /// The normal equations of independent residuals of unit size that know the unknowns as well as those do whose scores have this covariance.
+    ///
+    /// In the directions of the root a covariance of the unknowns is `W`; no eigenvalue counts below `least`.
+    pub fn informed(&self, normal: &Normal, covariance: &[f64], least: f64) -> Normal {
+        let (m, count) = (normal.right.len(), self.forward.len());
+        let (mut values, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
+        let _ = eigh(count, covariance, &mut values, &mut vectors, &mut Workspace::new());
+        let mut informed = Normal { matrix: vec![0.0; m * m], ..normal.clone() };
+        for (value, vector) in values.iter().zip(vectors.chunks_exact(count.max(1))) {
+            let row: Vec<f64> =
+                (0..m).map(|k| vector.iter().zip(&self.forward).map(|(x, row)| x * row[k]).sum()).collect();
+            let weight = value.max(least).recip();
+            for (line, a) in informed.matrix.chunks_exact_mut(m).zip(&row) {
+                line.iter_mut().zip(&row).for_each(|(sum, b)| *sum += weight * a * b);
+            }
+        }
+        for k in 0..m {
+            let ratio = informed.matrix[k * m + k] / normal.matrix[k * m + k];
+            informed.diagonal[k] *= if ratio.is_finite() { ratio } else { 1.0 };
+        }
+        informed
+    }
+
+    /// `B` in the directions of the root.
+    pub fn seen(&self, m: usize, covariance: &[f64]) -> Vec<f64> {
+        let images: Vec<Vec<f64>> = self.back.iter().map(|row| times(m, covariance, row)).collect();
+        self.back.iter().flat_map(|row| images.iter().map(|image| dot(row, image))).collect()
+    }
+}
+
+/// Probability that noise makes the constants of segments differ as much as they do: the score test of constants of each segment's own, whose
+/// sum of squares over that of the residuals has the F distribution.
+pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], weighing: Weighing) -> f64 {
+    let m = x.len();
+    let (mut sum, mut freedom, mut rest) = (0.0, 0.0, 0.0);
+    for (linear, segment) in problem.all(x, segments).iter().zip(segments) {
+        let normal = problem.normal(std::slice::from_ref(linear), std::slice::from_ref(segment));
+        rest += normal.count;
+        let scale = |k: usize| normal.matrix[k * m + k].max(f64::MIN_POSITIVE).sqrt();
+        let correlated: Vec<f64> =
+            normal.matrix.iter().enumerate().map(|(at, x)| x / (scale(at / m) * scale(at % m))).collect();
+        let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
+        if linear.is_none() || eigh(m, &correlated, &mut values, &mut vectors, &mut Workspace::new()).is_err() {
+            continue;
+        }
+        let right: Vec<f64> = normal.right.iter().enumerate().map(|(k, u)| u / scale(k)).collect();
+        for (value, vector) in values.iter().zip(vectors.chunks_exact(m)).filter(|(value, _)| **value > TOLD) {
+            sum += dot(vector, &right).powi(2) / value;
+            freedom += 1.0;
+        }
+    }
+    let freedom = freedom - m as f64;
+    if freedom < 1.0 { 1.0 } else { tail(sum / freedom / weighing.square, freedom, (rest - m as f64).max(1.0)) }
+}

@@ -1,0 +1,322 @@
+//! Which motion would determine what is open: the equations are examined at other states, faster, farther, and under forces.
+//!
+//! What counts are ranks and determinants of the effect of all open directions together, which do not depend on their basis. What is
+//! advised is the same wherever along the open directions the search has ended, or nothing particular.
+
+use super::determined::{Column, echelon};
+use super::follow::{Follower, LANES, Segment};
+use super::moves::Group;
+use super::solve::Problem;
+use crate::lagrangian::system::Bounds;
+use crate::linalg::{dot, singular};
+
+/// Singular value of the effect of directions, over the effects of their unknowns each for itself, that is rounding.
+const ROUNDING: f64 = 1e-6;
+/// States at which the effect of a direction is examined, at most.
+const MOST_STATES: usize = 256;
+/// A motion this many times as telling as the recorded one is worth a word.
+const WORTH: f64 = 2.0;
+/// Part of the effect at other states that the recorded ones are taken to have at least.
+const LEAST: f64 = 1e-6;
+/// Spread of a coordinate over that of the others in which it stands still.
+const STILL: f64 = 1e-9;
+
+const MORE: &str = "more motion of this kind, or less noise";
+
+/// Looks for motion that would tell open directions.
+pub(super) struct Examiner<'a> {
+    pub problem: &'a Problem<'a>,
+    pub segments: &'a [Segment],
+    pub coordinates: &'a [String],
+    pub bounds: Bounds,
+}
+
+/// States, `(states, n)`, and forces, empty for none.
+#[derive(Clone)]
+struct Probe {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    force: Vec<f64>,
+}
+
+/// Unknowns with changes of theirs.
+struct Place<'a> {
+    x: &'a [f64],
+    changes: Vec<Vec<f64>>,
+}
+
+/// Directions of constants by what would tell them.
+pub(super) struct ByForces {
+    /// Single constants that no force depends on.
+    pub silent: Vec<Vec<f64>>,
+    /// Held together by the equations.
+    pub always: Vec<Vec<f64>>,
+    /// Not told by this motion.
+    pub here: Vec<Vec<f64>>,
+}
+
+/// Spreads coordinate `i` of states evenly over a range.
+fn spread((values, n): (&mut [f64], usize), i: usize, [low, high]: [f64; 2]) {
+    for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
+        *x = low + (high - low) * ((k + 1) as f64 * 0.618_033_988_749_895 * (i + 1) as f64).fract();
+    }
+}
+
+/// Right singular vectors of columns by size: those above rounding, and the others.
+fn split(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    let Some(found) = singular(columns) else { return (Vec::new(), Vec::new()) };
+    let vectors = found.values.into_iter().zip(found.vectors);
+    let (seen, unseen): (Vec<_>, Vec<_>) = vectors.partition(|(value, _)| *value > ROUNDING);
+    [seen, unseen].map(|side| side.into_iter().map(|(_, vector)| vector).collect()).into()
+}
+
+/// Columns combined by the rows of a matrix.
+fn combined(columns: &[Vec<f64>], rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let sum = |row: &Vec<f64>| {
+        let mut sum = vec![0.0; columns[0].len()];
+        row.iter().zip(columns).for_each(|(factor, column)| {
+            sum.iter_mut().zip(column).for_each(|(sum, x)| *sum += factor * x);
+        });
+        sum
+    };
+    rows.iter().map(sum).collect()
+}
+
+impl Examiner<'_> {
+    fn n(&self) -> usize {
+        self.coordinates.len()
+    }
+
+    /// Recorded states: starts of segments, or of few segments the states along them.
+    fn recorded(&self, x: &[f64]) -> Probe {
+        let n = self.n();
+        let mut probe = Probe { q: Vec::new(), v: Vec::new(), force: Vec::new() };
+        if self.segments.len() >= LANES {
+            for segment in self.segments.iter().step_by(self.segments.len().div_ceil(MOST_STATES)) {
+                probe.q.extend(&segment.start[..n]);
+                probe.v.extend(&segment.start[n..]);
+            }
+            return probe;
+        }
+        let lanes: Vec<&Segment> = self.segments.iter().collect();
+        let all: usize = lanes.iter().map(|segment| segment.samples).sum();
+        let stride = all.div_ceil(MOST_STATES).max(1);
+        Follower::new(&self.problem.course).follow(&self.problem.parameters(x), &lanes, false, |_, sample, state| {
+            if sample % stride == 0 {
+                let over = |lane: usize| sample >= lanes[lane].samples;
+                for lane in (0..lanes.len()).filter(|lane| !over(*lane)) {
+                    probe.q.extend(&state.q[lane * n..(lane + 1) * n]);
+                    probe.v.extend(&state.v[lane * n..(lane + 1) * n]);
+                }
+            }
+        });
+        probe
+    }
+
+    /// Changes of accelerations along directions over `sizes`, a column each, and the effects of their unknowns each for itself, summed.
+    fn effects(&self, place: &Place<'_>, probe: &Probe, sizes: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+        let (n, m) = (self.n(), self.problem.chosen.len());
+        let values = self.problem.parameters(place.x);
+        let mut follower = Follower::new(&self.problem.course);
+        let mut a = vec![0.0; probe.q.len()];
+        follower.accelerate(&values, (&probe.q, &probe.v), &probe.force, &mut a);
+        let slopes = follower.slopes(&values, (&probe.q, &probe.v, &a));
+        let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
+        effects(&rows, &place.changes, |at| sizes[at % n])
+    }
+
+    /// Root mean square of the accelerations of every coordinate.
+    fn sizes(&self, x: &[f64], probe: &Probe) -> Vec<f64> {
+        let n = self.n();
+        let mut a = vec![0.0; probe.q.len()];
+        let values = self.problem.parameters(x);
+        Follower::new(&self.problem.course).accelerate(&values, (&probe.q, &probe.v), &[], &mut a);
+        let of = |i: usize| {
+            let own: Vec<f64> = a.iter().skip(i).step_by(n).copied().filter(|a| a.is_finite()).collect();
+            let square = dot(&own, &own) / own.len().max(1) as f64;
+            if square > 0.0 { square.sqrt() } else { 1.0 }
+        };
+        (0..n).map(of).collect()
+    }
+
+    /// Lowest and highest of a column, and three times as wide or to the bounds of the system.
+    fn wider(values: &[f64], (n, i): (usize, usize), bounds: (f64, f64)) -> ([f64; 2], [f64; 2]) {
+        let own = values.iter().skip(i).step_by(n).copied();
+        let (low, high) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (middle, half) = ((low + high) / 2.0, 1.5 * (high - low));
+        ([low, high], [(middle - half).min(bounds.0), (middle + half).max(bounds.1)])
+    }
+
+    /// Lowest and highest of every position and velocity, as recorded and wider.
+    fn ranges(&self, recorded: &Probe) -> [Vec<([f64; 2], [f64; 2])>; 2] {
+        let n = self.n();
+        let wider = |values: &[f64], bounds: &[(f64, f64)]| {
+            (0..n).map(|i| Self::wider(values, (n, i), bounds[i])).collect::<Vec<_>>()
+        };
+        [wider(&recorded.q, &self.bounds.positions), wider(&recorded.v, &self.bounds.velocities)]
+    }
+
+    /// States spread evenly over the wider ranges, whatever the recorded ones are.
+    fn wild(&self, recorded: &Probe) -> Probe {
+        let n = self.n();
+        let mut wild = recorded.clone();
+        let [wide_q, wide_v] = self.ranges(&wild);
+        for i in 0..n {
+            spread((&mut wild.q, n), i, wide_q[i].1);
+            spread((&mut wild.v, n), i, wide_v[i].1);
+        }
+        wild
+    }
+
+    /// Recorded states under forces of the size of those of inertia.
+    fn driven(&self, x: &[f64], (recorded, sizes): (&Probe, &[f64])) -> Probe {
+        let n = self.n();
+        let mut driven = recorded.clone();
+        let mut follower = Follower::new(&self.problem.course);
+        let mut a = vec![0.0; driven.q.len()];
+        follower.accelerate(&self.problem.parameters(x), (&driven.q, &driven.v), &[], &mut a);
+        let push = |(at, mass): (usize, &f64)| mass.abs() * sizes[at % n];
+        let rows = follower.mass().chunks_exact(n).map(|row| row.iter().enumerate().map(push).sum::<f64>());
+        driven.force = rows.enumerate().map(|(k, size)| if k % 3 == 0 { -size } else { size }).collect();
+        driven
+    }
+
+    /// What would determine a group of open directions.
+    pub fn cure(&self, x: &[f64], group: &Group<'_>) -> String {
+        if group.inside.iter().any(|k| *k >= self.problem.chosen.len()) {
+            return "a sensor that is calibrated: its constants and those of the system do the same to this motion"
+                .into();
+        }
+        let own = Place { x, changes: group.columns.iter().map(|column| column.change.clone()).collect() };
+        let told = self.cure_at(&own);
+        let elsewhere = |moved: &Vec<f64>| self.cure_at(&Place { x: moved, changes: group.changes_at(x, moved) });
+        if group.moved.iter().all(|moved| elsewhere(moved) == told) { told } else { MORE.into() }
+    }
+
+    fn cure_at(&self, place: &Place<'_>) -> String {
+        let (count, recorded) = (place.changes.len(), self.recorded(place.x));
+        let sizes = self.sizes(place.x, &recorded);
+        let (free, apart) = self.effects(place, &self.wild(&recorded), &sizes);
+        let unit = |columns: Vec<Vec<f64>>| scaled(columns, &apart);
+        let free = unit(free);
+        let (under, under_apart) = self.effects(place, &self.driven(place.x, (&recorded, &sizes)), &sizes);
+        let both: Vec<Vec<f64>> =
+            free.iter().zip(scaled(under, &under_apart)).map(|(a, b)| [&a[..], &b[..]].concat()).collect();
+        let (by_motion, _) = split(&free);
+        let (by_either, _) = split(&both);
+        let never = count - by_either.len();
+        let by_force = by_either.len().saturating_sub(by_motion.len());
+        let forced = self.problem.course.recording.tracks.iter().any(|track| !track.force.is_empty());
+        let mut cures = Vec::new();
+        if by_force > 0 {
+            cures.push(match forced {
+                true => MORE.to_string(),
+                false => "motion under a known force (--force), without which no motion depends on it".to_string(),
+            });
+        }
+        if !by_motion.is_empty() {
+            let seen = |probe: &Probe| combined(&unit(self.effects(place, probe, &sizes).0), &by_motion);
+            cures.push(self.farther(&recorded, seen).unwrap_or_else(|| MORE.to_string()));
+        }
+        match (never, cures.is_empty()) {
+            (0, _) => {}
+            (_, true) => {
+                return "none: whatever the motion, the equations hold them in these combinations alone; give one of them its value".into();
+            }
+            (1, _) => cures.push("the value of one of them, which no motion tells".to_string()),
+            (never, _) => cures.push(format!("the values of {never} of them, which no motion tells")),
+        }
+        cures.dedup();
+        cures.join("; ")
+    }
+
+    /// The coordinate that is to go farther or faster so that directions are told best.
+    fn farther(&self, recorded: &Probe, effects: impl Fn(&Probe) -> Vec<Vec<f64>>) -> Option<String> {
+        let n = self.n();
+        let [wide_q, wide_v] = self.ranges(recorded);
+        // The mean of the logarithms of singular values differs by the same number in every basis of the directions.
+        let tells = |probe: &Probe| {
+            let columns = effects(probe);
+            let values = singular(&columns).map(|found| found.values).unwrap_or_default();
+            let sum: f64 = values.iter().map(|value| value.max(LEAST).ln()).sum();
+            sum / columns.len() as f64
+        };
+        let mut best = (WORTH.ln() + tells(recorded), None);
+        let range = |[low, high]: [f64; 2]| format!("{low:.3} .. {high:.3}");
+        for (i, name) in self.coordinates.iter().enumerate() {
+            let mut far = recorded.clone();
+            spread((&mut far.q, n), i, wide_q[i].1);
+            let (now, then) = (range(wide_q[i].0), range(wide_q[i].1));
+            let farther = (far, format!("motion in which {name} goes farther, over {then}, not {now}"));
+            let mut fast = recorded.clone();
+            spread((&mut fast.v, n), i, wide_v[i].1);
+            let (now, then) = (range(wide_v[i].0), range(wide_v[i].1));
+            let faster = (fast, format!("motion in which {name} is faster, with {name}_dot over {then}, not {now}"));
+            for (probe, text) in [farther, faster] {
+                let effect = tells(&probe);
+                if effect > best.0 {
+                    best = (effect, Some(text));
+                }
+            }
+        }
+        best.1
+    }
+
+    /// Open directions of equations that are linear in the constants, by what would tell them.
+    pub fn by_forces(&self, x: &[f64], (changes, size): (&[Vec<f64>], &[f64])) -> ByForces {
+        let (n, m) = (self.n(), self.problem.chosen.len());
+        let probe = self.wild(&self.recorded(x));
+        let mut a = probe.v.clone();
+        a.iter_mut().enumerate().for_each(|(at, a)| *a *= if at % 3 == 0 { -1.7 } else { 1.3 });
+        let mut follower = Follower::new(&self.problem.course);
+        let slopes = follower.force_slopes(&self.problem.parameters(x), (&probe.q, &probe.v, &a));
+        let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
+        let (columns, apart) = effects(&rows, changes, |_| 1.0);
+        let (seen, unseen) = split(&scaled(columns, &apart));
+        let basis = |rows: &[Vec<f64>]| {
+            let own: Vec<Vec<f64>> = if changes.is_empty() { Vec::new() } else { combined(changes, rows) };
+            let exact = |(x, size): (f64, &f64)| if (x / size).abs() > ROUNDING { x } else { 0.0 };
+            let of = |column: Column| column.change.into_iter().zip(size).map(exact).collect::<Vec<f64>>();
+            echelon(own, size).into_iter().map(of).collect::<Vec<_>>()
+        };
+        let single = |change: &Vec<f64>| change.iter().filter(|x| **x != 0.0).count() == 1;
+        let (silent, always) = basis(&unseen).into_iter().partition(single);
+        ByForces { silent, always, here: basis(&seen) }
+    }
+
+    /// Coordinates that do not move.
+    pub fn still(&self) -> Vec<String> {
+        let recording = self.problem.course.recording;
+        let n = self.n();
+        let deviation = |i: usize| {
+            let own = recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n));
+            crate::recording::deviation(own)
+        };
+        let all: Vec<f64> = (0..n).map(deviation).collect();
+        let most = all.iter().copied().fold(0.0, f64::max);
+        (0..n).filter(|&i| all[i] <= STILL * most).map(|i| self.coordinates[i].clone()).collect()
+    }
+}
+
+/// Effects of changes by the slopes of equations, a column each, and those of their unknowns each for itself, the root of the sum of squares.
+fn effects(rows: &[&[f64]], changes: &[Vec<f64>], size: impl Fn(usize) -> f64) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let finite = |row: &&[f64]| row.iter().all(|x| x.is_finite());
+    let of = |change: &Vec<f64>| {
+        let (mut column, mut apart) = (Vec::with_capacity(rows.len()), 0.0);
+        for (at, row) in rows.iter().enumerate().filter(|(_, row)| finite(row)) {
+            let parts = || row.iter().zip(change).map(|(slope, change)| slope * change / size(at));
+            column.push(parts().sum::<f64>());
+            apart += parts().map(f64::abs).sum::<f64>().powi(2);
+        }
+        (column, apart.sqrt())
+    };
+    changes.iter().map(of).unzip()
+}
+
+/// Columns over their sizes; nothing of a column without size.
+fn scaled(columns: Vec<Vec<f64>>, sizes: &[f64]) -> Vec<Vec<f64>> {
+    let over = |(column, size): (Vec<f64>, &f64)| {
+        column.into_iter().map(|x| if *size > 0.0 { x / size } else { 0.0 }).collect()
+    };
+    columns.into_iter().zip(sizes).map(over).collect()
+}

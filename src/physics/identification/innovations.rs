@@ -1,0 +1,222 @@
+//! Residuals that do not follow from the earlier ones, by a Kalman filter along each segment.
+//!
+//! An error of a known force moves the motion from there on, so that the residuals of positions are correlated however long the segment is.
+//! In terms of the segment's start the filter is simple: with `P = d(q, v)/d(start)` at a sample, an error `e` of the force over an interval
+//! `h` is the change `P^-1 (0, M^-1 e h)` of the start. The deviation of the start is thus a random walk that every measured position sees by its
+//! row of `P`, and the filter passes residuals and all their slopes through the same linear map, which whitens them: least squares on
+//! what comes out are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 7.3).
+
+use super::follow::{LANES, Segment};
+use super::linear::inverses;
+use super::solve::Problem;
+use crate::linalg::{self, Workspace, dot};
+use crate::recording::smooth::noise;
+
+/// Standard deviation of an unknown start, in units of what a single position tells of it.
+const UNKNOWN: f64 = 100.0;
+/// Variance of an innovation over that of the noise up to which it tells of the noise: others tell of the start.
+const MOST_VARIANCE: f64 = 100.0;
+/// Innovations beyond so many standard deviations are those of outliers, which do not move the filter of an unknown start.
+const OUTLIER: f64 = 5.5;
+
+/// What moves the motion beside the equations.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Disturbances {
+    /// Standard deviation of the noise of every known force; empty for forces that are exact.
+    pub force: Vec<f64>,
+    /// `true` if the filter does not know the starts: innovations of the right form are then independent, those that tell of the start `NaN`.
+    pub unknown_start: bool,
+}
+
+/// The filter of one segment.
+pub(super) struct Filter {
+    unknown_start: bool,
+    /// Variance of the start, `(2n, 2n)`.
+    variance: Vec<f64>,
+    /// Expected deviation of the start, of residuals and of each of their slopes: `(1 + width, 2n)`.
+    expected: Vec<Vec<f64>>,
+    /// Sum of the logarithms of the variances of innovations over those of the noise.
+    pub log_variance: f64,
+}
+
+impl Filter {
+    /// Passes a residual with its slopes, the first `2n` of them by the start; the innovation.
+    pub fn pass(&mut self, residual: f64, row: &mut [f64]) -> f64 {
+        let size = self.expected[0].len();
+        let slopes = row[..size].to_vec();
+        let gain: Vec<f64> = self.variance.chunks_exact(size).map(|line| dot(line, &slopes)).collect();
+        let variance = 1.0 + dot(&gain, &slopes);
+        let root = variance.sqrt();
+        let innovation = (residual - dot(&slopes, &self.expected[0])) / root;
+        if self.unknown_start && innovation.abs() > OUTLIER && variance < MOST_VARIANCE {
+            return f64::NAN;
+        }
+        self.log_variance += variance.ln();
+        for (value, expected) in row.iter_mut().zip(&mut self.expected[1..]) {
+            let own = (*value - dot(&slopes, expected)) / root;
+            expected.iter_mut().zip(&gain).for_each(|(e, g)| *e += g * own / root);
+            *value = own;
+        }
+        self.expected[0].iter_mut().zip(&gain).for_each(|(e, g)| *e += g * innovation / root);
+        for (line, g) in self.variance.chunks_exact_mut(size).zip(&gain) {
+            line.iter_mut().zip(&gain).for_each(|(x, other)| *x -= g * other / variance);
+        }
+        if self.unknown_start && variance > MOST_VARIANCE { f64::NAN } else { innovation }
+    }
+
+    /// Lets errors of forces change the start, each by one row of `(n, 2n)`.
+    pub fn disturb(&mut self, impulses: &[f64]) {
+        let size = self.expected[0].len();
+        for impulse in impulses.chunks_exact(size) {
+            for (line, a) in self.variance.chunks_exact_mut(size).zip(impulse) {
+                line.iter_mut().zip(impulse).for_each(|(x, b)| *x += a * b);
+            }
+        }
+    }
+}
+
+/// Noise of forces over that of neighbouring samples up to which it is looked for: more would not be noise of theirs.
+const MOST_FORCE_NOISE: f64 = 1.5;
+/// Factors of that noise that are tried, `4^-k`.
+const FACTORS: i32 = 7;
+/// Decrease of minus twice the logarithm of the likelihood from which on forces have noise: 1 in 1,000 by chance.
+const PLAIN: f64 = 10.0;
+
+impl Problem<'_> {
+    /// Estimates the noise of the known forces by the likelihood of the innovations, up to what their neighbouring samples show; `true` if that
+    /// changes it.
+    ///
+    /// Noise of the positions is taken out of the likelihood: its variance is the mean square innovation.
+    pub(super) fn estimate_force_noise(&mut self, x: &[f64], segments: &[Segment]) -> bool {
+        let recording = self.course.recording;
+        let forced = recording.tracks.iter().filter(|track| !track.force.is_empty());
+        let signals = forced.map(|track| (track.times.as_slice(), track.force.as_slice()));
+        let shown: Vec<f64> =
+            (0..self.course.equations.n).map(|i| noise(signals.clone(), self.sigma.len(), i).sigma).collect();
+        let stride = segments.len().div_ceil(LANES).max(1);
+        let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
+        probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
+        let mut tried = self.clone();
+        let mut cost = |factor: f64| {
+            tried.disturbances.force =
+                if factor > 0.0 { shown.iter().map(|s| factor * s).collect() } else { Vec::new() };
+            let (mut square, mut count) = (0.0, 0.0);
+            let logarithms = tried.residuals(x, &probes, false, |_, _, _, r, _| {
+                square += r * r;
+                count += 1.0;
+            });
+            let mean = square / f64::max(count, 1.0);
+            let cost = count * f64::ln(mean) + logarithms;
+            (if cost.is_finite() { cost } else { f64::INFINITY }, mean.sqrt())
+        };
+        let exact = cost(0.0).0;
+        let mut best = (exact, 0.0, 1.0);
+        let mut attempt = |best: &mut (f64, f64, f64), factor: f64| {
+            let (cost, size) = cost(factor);
+            if cost < best.0 && factor * size <= MOST_FORCE_NOISE {
+                *best = (cost, factor, size);
+            }
+        };
+        (0..FACTORS).for_each(|k| attempt(&mut best, 0.25_f64.powi(k)));
+        for step in [2.0, 2.0_f64.sqrt(), 2.0_f64.powf(0.25)] {
+            let middle = best.1;
+            [middle * step, middle / step]
+                .into_iter()
+                .filter(|factor| *factor > 0.0)
+                .for_each(|factor| attempt(&mut best, factor));
+        }
+        let before = std::mem::take(&mut self.disturbances.force);
+        if best.0 < exact - PLAIN {
+            self.disturbances.force = shown.iter().map(|s| best.1 * best.2 * s).collect();
+        }
+        tracing::debug!(force = ?self.disturbances.force, "noise of forces");
+        before != self.disturbances.force
+    }
+
+    /// Filters of so many segments with rows of `width` slopes; none where residuals are independent.
+    pub(super) fn filters(&self, lanes: usize, width: usize) -> Vec<Filter> {
+        let n = self.course.equations.n;
+        let Disturbances { force, unknown_start } = &self.disturbances;
+        if force.is_empty() && !unknown_start {
+            return Vec::new();
+        }
+        let mut variance = vec![0.0; 4 * n * n];
+        for k in (0..2 * n).filter(|_| *unknown_start) {
+            let time = if k < n { 1.0 } else { self.course.step };
+            variance[k * (2 * n + 1)] = (UNKNOWN * self.sigma[k % n] / time).powi(2);
+        }
+        let expected = vec![vec![0.0; 2 * n]; 1 + width];
+        let filter = || Filter {
+            unknown_start: *unknown_start,
+            variance: variance.clone(),
+            expected: expected.clone(),
+            log_variance: 0.0,
+        };
+        (0..lanes).map(|_| filter()).collect()
+    }
+
+    /// Changes of the starts by the errors of the forces over one interval, `(lanes, n, 2n)`; `slopes` are those of states by starts,
+    /// `(lanes, 2n, 2n)`, `mass` is `(lanes, n, n)`. Empty for exact forces.
+    pub(super) fn impulses(&self, slopes: &[f64], mass: &[f64], step: f64) -> Vec<f64> {
+        let (n, force) = (self.course.equations.n, &self.disturbances.force);
+        let size = 2 * n;
+        let mut inverse_mass = vec![0.0; mass.len()];
+        // Lanes that fail are NaN: their segments fail with them.
+        let _ = linalg::inverse(n, mass, &mut inverse_mass, &mut Workspace::new());
+        let back = inverses(size, slopes);
+        let mut impulses = vec![0.0; slopes.len() / 2];
+        for ((into, back), mass) in impulses
+            .chunks_exact_mut(n * size)
+            .zip(back.chunks_exact(size * size))
+            .zip(inverse_mass.chunks_exact(n * n))
+        {
+            for (j, into) in into.chunks_exact_mut(size).enumerate() {
+                let kick = &mass[j * n..(j + 1) * n];
+                into.iter_mut()
+                    .zip(back.chunks_exact(size))
+                    .for_each(|(x, line)| *x = force[j] * step * dot(&line[n..], kick));
+            }
+        }
+        impulses
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn innovations_of_disturbed_motion_are_independent() {
+        const STEPS: usize = 6;
+        let slopes = |t: usize| [1.0, 0.4 * t as f64];
+        let impulse = |t: usize| [0.3 - 0.1 * t as f64, 0.5];
+        // Variance of what is seen: noise, and the changes of the start up to the earlier of two samples.
+        let of = |t: usize, s: usize| {
+            let both = (0..t.min(s)).map(|k| dot(&slopes(t), &impulse(k)) * dot(&slopes(s), &impulse(k)));
+            f64::from(u8::from(t == s)) + both.sum::<f64>()
+        };
+        let mut filter = Filter {
+            unknown_start: false,
+            variance: vec![0.0; 4],
+            expected: vec![vec![0.0; 2]; 3 + STEPS],
+            log_variance: 0.0,
+        };
+        // What the filter makes of a residual at one sample alone, in columns behind the slopes.
+        let map: Vec<Vec<f64>> = (0..STEPS)
+            .map(|t| {
+                let mut row = slopes(t).to_vec();
+                row.extend((0..STEPS).map(|k| f64::from(u8::from(k == t))));
+                filter.pass(0.0, &mut row);
+                filter.disturb(&impulse(t));
+                row[2..].to_vec()
+            })
+            .collect();
+        for (t, a) in map.iter().enumerate() {
+            for (s, b) in map.iter().enumerate() {
+                let pairs = (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j)));
+                let variance: f64 = pairs.map(|(i, j)| a[i] * of(i, j) * b[j]).sum();
+                assert!((variance - f64::from(u8::from(t == s))).abs() < 1e-12, "{t} {s} {variance}");
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Finite moves along open directions: what stays as it is has a name, and unknowns that stay open return to their start.
+
+use super::descent::mute;
+use super::determined::{Column, Determined};
+use super::invariants::{Invariant, Kind, products, sums};
+use super::linear::{inverse_with, times};
+use super::solve::{Normal, Problem};
+use crate::linalg::dot;
+
+/// Factors by which a pivot is moved.
+const FACTORS: [f64; 2] = [2.0, 0.5];
+/// Steps of a fit with the pivots held, and halvings of each.
+const STEPS: usize = 12;
+const HALVINGS: usize = 5;
+/// Newton decrement in units of the noise variance at which such a fit ends: a tenth of a standard error.
+const SETTLED: f64 = 1e-2;
+/// Increase of the sum of squares in units of the noise variance up to which a moved motion is as good: three standard deviations.
+const AS_GOOD: f64 = 9.0;
+/// Part of the diagonal that keeps normal equations regular.
+const RIDGE: f64 = 1e-11;
+
+/// Moves from fitted unknowns.
+pub(super) struct Moves<'a> {
+    pub problem: &'a Problem<'a>,
+    pub determined: &'a Determined,
+    /// Variance of the residuals.
+    pub variance: f64,
+    /// The normal equations at other unknowns, starts fitted.
+    pub normal_at: &'a dyn Fn(&[f64]) -> Option<Normal>,
+}
+
+/// A group of open directions and what they leave as it is.
+pub(super) struct Group<'a> {
+    pub columns: Vec<&'a Column>,
+    /// Unknowns that have part.
+    pub inside: Vec<usize>,
+    pub kind: Kind,
+    pub invariants: Vec<Invariant>,
+    /// Moved unknowns that meet the motion as well.
+    pub moved: Vec<Vec<f64>>,
+}
+
+impl<'a> Group<'a> {
+    /// Directions without names.
+    pub fn without_names(columns: Vec<&'a Column>) -> Self {
+        let m = columns.first().map_or(0, |column| column.change.len());
+        let inside = (0..m).filter(|&k| columns.iter().any(|column| column.change[k] != 0.0)).collect();
+        Self { columns, inside, kind: Kind::Product, invariants: Vec::new(), moved: Vec::new() }
+    }
+
+    /// `true` if as many functions are named as are determined.
+    pub fn is_named(&self) -> bool {
+        self.invariants.len() + self.columns.len() == self.inside.len()
+    }
+
+    /// The directions at a point that was reached along them.
+    pub fn changes_at(&self, x: &[f64], moved: &[f64]) -> Vec<Vec<f64>> {
+        let turned = |column: &&Column| {
+            let parts = column.change.iter().zip(x.iter().zip(moved));
+            let part = |(change, (x, moved)): (&f64, (&f64, &f64))| match self.kind {
+                Kind::Product if *x != 0.0 => change * moved / x,
+                _ => *change,
+            };
+            parts.map(part).collect()
+        };
+        self.columns.iter().map(turned).collect()
+    }
+}
+
+impl<'a> Moves<'a> {
+    /// Fits unknowns with pivots and silent ones held; the sum of squares in units of the variance.
+    pub fn refit(&self, mut x: Vec<f64>) -> Option<(Vec<f64>, f64)> {
+        let m = x.len();
+        let held = |k: usize| {
+            self.determined.silent.contains(&k) || self.determined.open.iter().any(|column| column.pivot == k)
+        };
+        let held: Vec<bool> = (0..m).map(held).collect();
+        let followed = |x: &[f64]| (self.normal_at)(x).filter(|n| n.failed == 0 && n.square.is_finite());
+        let mut best = followed(&x)?;
+        for _ in 0..STEPS {
+            let (mut matrix, mut right) = (best.matrix.clone(), best.right.clone());
+            mute(&held, &mut matrix, &mut right);
+            let mut change = times(m, &inverse_with(m, &matrix, RIDGE)?, &right);
+            if dot(&change, &right) < SETTLED * self.variance {
+                break;
+            }
+            let mut better = None;
+            for _ in 0..HALVINGS {
+                let moved = self.problem.moved(&x, &change, &best);
+                better = followed(&moved).filter(|tried| tried.square < best.square).map(|tried| (moved, tried));
+                if better.is_some() {
+                    break;
+                }
+                change.iter_mut().for_each(|x| *x /= 2.0);
+            }
+            let Some(better) = better else { break };
+            (x, best) = better;
+        }
+        Some((x, best.square / self.variance))
+    }
+
+    /// Groups of open directions with the names that finite moves confirm.
+    pub fn groups(&self, x: &[f64]) -> Vec<Group<'a>> {
+        let base = if self.determined.open.is_empty() { None } else { self.refit(x.to_vec()) };
+        let of = |places: Vec<usize>| {
+            let mut best = Group::without_names(places.iter().map(|&at| &self.determined.open[at]).collect());
+            let Some((x, square)) = &base else { return best };
+            for kind in [Kind::Product, Kind::Sum] {
+                if best.is_named() {
+                    break;
+                }
+                let (invariants, moved) = self.confirmed((x, *square), &best, kind);
+                if invariants.len() > best.invariants.len() {
+                    best = Group { kind, invariants, moved, ..best };
+                }
+            }
+            best
+        };
+        self.determined.groups().into_iter().map(of).collect()
+    }
+
+    /// Names of one kind whose values stay within their errors when pivots are moved and the others fitted again.
+    fn confirmed(&self, (x, square): (&[f64], f64), group: &Group<'_>, kind: Kind) -> (Vec<Invariant>, Vec<Vec<f64>>) {
+        let mut left = match kind {
+            Kind::Product => products(&group.columns, x, &group.inside),
+            Kind::Sum => sums(&group.columns, &group.inside, x.len()),
+        };
+        let mut points = Vec::new();
+        for moves in moves_of(&group.columns) {
+            if left.is_empty() {
+                break;
+            }
+            let moved = self.refit(along(x, &moves, kind));
+            let Some((moved, _)) = moved.filter(|(_, after)| after - square < AS_GOOD) else {
+                left.clear();
+                break;
+            };
+            let stays = |known: &Invariant| {
+                let error = self.determined.error_of(&known.gradient(x));
+                (known.value(&moved) - known.value(x)).abs() <= error
+            };
+            left.retain(stays);
+            points.push(moved);
+        }
+        (left, points)
+    }
+
+    /// Unknowns as near to their start as what is known allows, with the sums and products that are.
+    pub fn least_change(&self, x: &[f64], start: &[f64], groups: &[Group<'_>]) -> Vec<f64> {
+        if self.determined.silent.is_empty() && self.determined.open.is_empty() {
+            return x.to_vec();
+        }
+        let mut near = x.to_vec();
+        self.determined.silent.iter().for_each(|&k| near[k] = start[k]);
+        for group in groups.iter().filter(|group| group.is_named()) {
+            match group.kind {
+                Kind::Product => nearest_product(&mut near, start, group),
+                Kind::Sum => {
+                    let columns: Vec<&[f64]> = group.columns.iter().map(|column| &column.change[..]).collect();
+                    nearest(&mut near, start, &columns, &self.determined.size);
+                }
+            }
+        }
+        self.refit(near).map_or_else(|| x.to_vec(), |(x, _)| x)
+    }
+}
+
+/// Every direction alone, either way, and of several all together, alternately forth and back: what holds along each need not hold along
+/// all.
+fn moves_of<'a>(columns: &[&'a Column]) -> Vec<Vec<(&'a Column, f64)>> {
+    let alone = columns.iter().flat_map(|column| FACTORS.map(|factor| vec![(*column, factor)]));
+    let all =
+        |first: usize| columns.iter().enumerate().map(|(at, column)| (*column, FACTORS[(at + first) % 2])).collect();
+    alone.chain((0..2).filter(|_| columns.len() > 1).map(all)).collect()
+}
+
+/// Unknowns moved along directions until the pivot of each has changed by a factor.
+fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
+    let mut moved = x.to_vec();
+    for (column, factor) in moves {
+        let (pivot, own) = (x[column.pivot], column.change[column.pivot]);
+        for ((moved, &x), &change) in moved.iter_mut().zip(x).zip(&column.change) {
+            match kind {
+                Kind::Product if x != 0.0 => *moved *= factor.powf(change / x * pivot / own),
+                Kind::Product => {}
+                Kind::Sum => *moved += (factor - 1.0) * change,
+            }
+        }
+    }
+    moved
+}
+
+/// Moves `x` along directions to the least change from `start` in units of `size`.
+pub(super) fn nearest(x: &mut [f64], start: &[f64], columns: &[&[f64]], size: &[f64]) {
+    let count = columns.len();
+    let scaled: Vec<Vec<f64>> =
+        columns.iter().map(|column| column.iter().zip(size).map(|(x, size)| x / size).collect()).collect();
+    let missing: Vec<f64> = x.iter().zip(start).zip(size).map(|((x, start), size)| (start - x) / size).collect();
+    let gram: Vec<f64> = (0..count * count).map(|at| dot(&scaled[at / count], &scaled[at % count])).collect();
+    let right: Vec<f64> = scaled.iter().map(|column| dot(column, &missing)).collect();
+    let Some(inverse) = inverse_with(count, &gram, RIDGE) else { return };
+    for (amount, column) in times(count, &inverse, &right).into_iter().zip(columns) {
+        x.iter_mut().zip(*column).for_each(|(x, change)| *x += amount * change);
+    }
+}
+
+/// The same along products of powers, in logarithms.
+fn nearest_product(x: &mut [f64], start: &[f64], group: &Group<'_>) {
+    let exponents = |column: &Column| {
+        let relative = |(change, x): (&f64, &f64)| if *change == 0.0 { 0.0 } else { change / x };
+        column.change.iter().zip(x.iter()).map(relative).collect::<Vec<f64>>()
+    };
+    let columns: Vec<Vec<f64>> = group.columns.iter().map(|column| exponents(column)).collect();
+    let ratio = |(x, start): (&f64, &f64)| if start / x > 0.0 { (start / x).ln() } else { 0.0 };
+    let wanted: Vec<f64> = x.iter().zip(start).map(ratio).collect();
+    let mut logarithms = vec![0.0; x.len()];
+    let columns: Vec<&[f64]> = columns.iter().map(|column| &column[..]).collect();
+    nearest(&mut logarithms, &wanted, &columns, &vec![1.0; x.len()]);
+    x.iter_mut().zip(logarithms).for_each(|(x, logarithm)| *x *= logarithm.exp());
+}

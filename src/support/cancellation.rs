@@ -1,0 +1,157 @@
+//! Long searches: a flag ends them, and they report how far they are.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Time between two reports at least: often enough for a person to see that the search goes on.
+const EVERY: Duration = Duration::from_millis(200);
+
+/// How far a search is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct SearchProgress {
+    /// What is done at present, such as `short segments`.
+    pub stage: &'static str,
+    /// Iterations of this stage.
+    pub iteration: usize,
+    /// Root mean square residual in units of noise, once there is one.
+    pub residual: Option<f64>,
+    /// Pieces of work that are done, such as batches of segments.
+    pub pieces: u64,
+}
+
+impl fmt::Display for SearchProgress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.stage)?;
+        if self.iteration > 0 {
+            write!(f, ", iteration {}", self.iteration)?;
+        }
+        self.residual.map_or(Ok(()), |residual| write!(f, ", residual {residual:.3} of the noise"))?;
+        if self.pieces > 0 { write!(f, ", batch {}", self.pieces) } else { Ok(()) }
+    }
+}
+
+/// The flag was raised: there is no result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Cancelled;
+
+struct Reports {
+    to: Box<dyn Fn(SearchProgress) + Send + Sync>,
+    now: Mutex<(SearchProgress, Option<Instant>)>,
+}
+
+/// The flag that ends a search and the receiver of its reports; clones share both. One that is made by `default` ends nothing.
+///
+/// ```
+/// use lnn::cancellation::Cancellation;
+///
+/// let cancellation = Cancellation::default();
+/// assert!(cancellation.go_on());
+/// cancellation.cancel();
+/// assert!(!cancellation.go_on() && cancellation.check().is_err());
+/// ```
+#[derive(Clone, Default)]
+pub struct Cancellation {
+    flag: Arc<AtomicBool>,
+    reports: Option<Arc<Reports>>,
+}
+
+impl Cancellation {
+    /// Ended by a flag.
+    pub fn by(flag: &Arc<AtomicBool>) -> Self {
+        Self { flag: Arc::clone(flag), reports: None }
+    }
+
+    /// The same with a receiver of reports, which is called from several threads, at most five times a second.
+    #[must_use]
+    pub fn reporting(self, to: impl Fn(SearchProgress) + Send + Sync + 'static) -> Self {
+        let reports = Reports { to: Box::new(to), now: Mutex::default() };
+        Self { reports: Some(Arc::new(reports)), ..self }
+    }
+
+    /// The flag.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.flag
+    }
+
+    /// Raises the flag.
+    pub fn cancel(&self) {
+        self.flag.store(true, Ordering::SeqCst);
+    }
+
+    /// `true` once the flag is raised.
+    pub fn is_cancelled(&self) -> bool {
+        self.flag.load(Ordering::SeqCst)
+    }
+
+    /// Goes on unless the flag was raised.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn check(&self) -> Result<(), Cancelled> {
+        if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// A stage of the search begins.
+    pub fn stage(&self, stage: &'static str) {
+        self.report(|now| *now = SearchProgress { stage, pieces: now.pieces, ..SearchProgress::default() });
+    }
+
+    /// An iteration of the stage begins at a residual in units of noise; `false` once the flag is raised, when the loop is to end.
+    pub fn iterate(&self, residual: f64) -> bool {
+        self.report(|now| (now.iteration, now.residual) = (now.iteration + 1, Some(residual)));
+        !self.is_cancelled()
+    }
+
+    /// A piece of work begins; `false` once the flag is raised, when the loop is to end.
+    pub fn go_on(&self) -> bool {
+        self.report(|now| now.pieces += 1);
+        !self.is_cancelled()
+    }
+
+    fn report(&self, change: impl FnOnce(&mut SearchProgress)) {
+        let Some(reports) = &self.reports else { return };
+        let mut now = reports.now.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut now.0);
+        if now.1.is_none_or(|last| last.elapsed() >= EVERY) {
+            now.1 = Some(Instant::now());
+            (reports.to)(now.0);
+        }
+    }
+}
+
+/// Searches for the same are equal, whoever may end them.
+impl PartialEq for Cancellation {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for Cancellation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Cancellation").field("flag", &self.flag).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_search_reports_at_once_and_then_now_and_then() {
+        let seen: Arc<Mutex<Vec<SearchProgress>>> = Arc::default();
+        let to = Arc::clone(&seen);
+        let cancellation = Cancellation::default().reporting(move |progress| to.lock().unwrap().push(progress));
+        cancellation.stage("first");
+        (0..1000).for_each(|_| assert!(cancellation.clone().go_on()));
+        std::thread::sleep(EVERY);
+        assert!(cancellation.iterate(1.5));
+        let seen = seen.lock().unwrap();
+        assert!((2..20).contains(&seen.len()), "{seen:?}");
+        let last = SearchProgress { stage: "first", iteration: 1, residual: Some(1.5), pieces: 1000 };
+        assert_eq!((seen[0].stage, seen[seen.len() - 1]), ("first", last));
+    }
+}
