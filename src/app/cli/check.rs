@@ -288,6 +288,7 @@ mod tests {
         let frozen = Warning {
             track: "run 1".into(),
             row: 7,
+            place: (0, 6),
             coordinate: "x".into(),
             kind: Kind::Frozen,
             value: 0.25,

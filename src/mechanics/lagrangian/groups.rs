@@ -38,7 +38,8 @@ pub(crate) fn acting_groups<S: Scalar>(
         })
         .collect();
     // What cannot be evaluated may act.
-    components(n, |j, i| changes[j * n + i] > noise[i] || changes[j * n + i].is_nan())
+    let acts = |&(j, i): &(usize, usize)| changes[j * n + i] > noise[i] || changes[j * n + i].is_nan();
+    components(n, pairs(n).filter(acts))
 }
 
 /// Root mean square of the finite ones of some numbers, `NaN` without any.
@@ -69,11 +70,16 @@ pub(crate) fn groups<S: Scalar>(model: &dyn EulerLagrange<S>, (q, v): (&[S], &[S
     let noise: Vec<f64> = (0..n).map(|i| rounding * root_mean_square(own.iter().copied().skip(i).step_by(n))).collect();
     let acting = acting_groups(n, (q, v), &|q, v| evaluate(q, v).1, &noise);
     let group = |i: usize| acting.iter().position(|group| group.contains(&i));
-    let joined = |i: usize, j: usize| {
+    let joined = |&(i, j): &(usize, usize)| {
         let apart = |m: &[f64]| m[i * n + j].abs() <= rounding * (m[i * n + i] * m[j * n + j]).abs().sqrt();
         group(i) == group(j) || !masses.chunks_exact(n * n).all(apart)
     };
-    components(n, joined)
+    components(n, pairs(n).filter(joined))
+}
+
+/// All pairs of indices below `n`.
+fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n * n).map(move |at| (at / n, at % n))
 }
 
 /// For every group the factor `s` of the smallest sum of `|s a - b|^2 / |b|^2` over matrices `(states, n, n)`; 1 where there is none.

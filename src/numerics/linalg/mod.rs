@@ -20,7 +20,6 @@
 
 mod batch;
 mod compiled;
-#[cfg(feature = "rollout")]
 mod components;
 mod condition;
 mod eigen;
@@ -36,8 +35,6 @@ mod solve;
 pub use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
-#[cfg(feature = "rollout")]
-pub(crate) use components::components;
 #[doc(hidden)]
 pub use components::components;
 #[doc(hidden)]

@@ -1,9 +1,10 @@
 //! Finite moves along open directions: what stays as it is has a name, and unknowns that stay open return to their start.
 
+use super::descent::mute;
 use super::determined::{Column, Determined};
 use super::invariants::{Invariant, Kind, products, sums};
 use super::linear::{inverse_with, times};
-use super::solve::{Normal, Problem, mute};
+use super::solve::{Normal, Problem};
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
@@ -89,7 +90,7 @@ impl<'a> Moves<'a> {
             }
             let mut better = None;
             for _ in 0..HALVINGS {
-                let moved = self.problem.moved(&x, &change);
+                let moved = self.problem.moved(&x, &change, &best);
                 better = followed(&moved).filter(|tried| tried.square < best.square).map(|tried| (moved, tried));
                 if better.is_some() {
                     break;

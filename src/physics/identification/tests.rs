@@ -15,7 +15,7 @@ fn given(pairs: &Pairs<'_>) -> Vec<(String, String)> {
 }
 
 /// Motion of a model from some starts, `(2, n)` each, with noise of every coordinate.
-fn recorded(
+pub(super) fn recorded(
     instance: &SystemInstance<f64>,
     starts: &[&[f64]],
     (t_end, dt): (f64, f64),
@@ -24,25 +24,30 @@ fn recorded(
 ) -> Recording {
     let n = instance.coordinates;
     let model = instance.build().unwrap();
-    let mut rng = RngStream::Trajectories.generator(seed);
     let track = |start: &&[f64]| {
         let motion = model.rollout(&start[..n], &start[n..], t_end, dt).unwrap();
-        let mut q = motion.q;
-        for (k, q) in q.iter_mut().enumerate() {
-            let draw: f64 = StandardNormal.sample(&mut rng);
-            *q += noise[k % n] * draw;
-        }
-        RecordedTrajectory { name: "run".into(), times: motion.t, q, v: vec![], a: vec![], force: vec![] }
+        RecordedTrajectory { name: "run".into(), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] }
     };
     let coordinates = instance.system.coordinates(n);
-    Recording {
+    let mut recording = Recording {
         coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
         periodic: coordinates.iter().map(|c| c.periodic).collect(),
         tracks: starts.iter().map(track).collect(),
+    };
+    self::noise(&mut recording, noise, seed);
+    recording
+}
+
+/// Adds noise to every coordinate.
+pub(super) fn noise(recording: &mut Recording, sigma: &[f64], seed: u64) {
+    let (n, mut rng) = (sigma.len(), RngStream::Trajectories.generator(seed));
+    for (k, q) in recording.tracks.iter_mut().flat_map(|track| track.q.iter_mut().enumerate()) {
+        let draw: f64 = StandardNormal.sample(&mut rng);
+        *q += sigma[k % n] * draw;
     }
 }
 
-fn described(text: &str, pairs: &Pairs<'_>) -> SystemInstance<f64> {
+pub(super) fn described(text: &str, pairs: &Pairs<'_>) -> SystemInstance<f64> {
     let description: Description = serde_json::from_str(text).unwrap();
     configure_system(Cow::Owned(description.system().unwrap()), &given(pairs)).unwrap()
 }
