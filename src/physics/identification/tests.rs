@@ -132,6 +132,29 @@ fn what_a_larger_motion_would_tell_is_said() {
     assert!(found.undetermined.is_empty(), "{found:?}");
 }
 
+/// What is known is `offset + gain r`, which is neither a sum nor a product.
+#[test]
+fn what_has_no_name_is_told_in_numbers() {
+    let spring = |pairs: &Pairs<'_>| {
+        let text = r#"{"name": "spring", "lagrangian": "x_dot^2/2 - k*(x - r)^2/2",
+            "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-4, 4]}],
+            "parameters": {"k": {"default": 3, "range": "positive"}, "r": 0.2}}"#;
+        described(text, pairs)
+    };
+    let recording = recorded(&spring(&[("k", 4.0), ("r", 0.35)]), &[&[1.0, 0.0]], (8.0, 0.02), &[1e-3], 4);
+    let x = || vec!["x".to_string()];
+    let options = IdentifyOptions { offsets: x(), gains: x(), ..Default::default() };
+    let found = identify(&spring(&[]), &recording, &options).unwrap();
+    let [open] = &found.undetermined[..] else { panic!("{:?}", found.undetermined) };
+    assert!(open.known.is_empty() && open.constants.len() == 3 && open.directions.len() == 2, "{open:?}");
+    let k = &found.constants[0];
+    assert!((k.value - 4.0).abs() < 4.0 * k.standard_error.unwrap(), "{k:?}");
+    // With one sensor constant there is a name.
+    let found = identify(&spring(&[]), &recording, &IdentifyOptions { offsets: x(), ..Default::default() }).unwrap();
+    let known = &found.undetermined[0].known[0];
+    assert!(!known.product && (known.value - 0.35).abs() < 4.0 * known.standard_error, "{known:?}");
+}
+
 #[test]
 fn a_wrong_form_leaves_what_is_no_noise() {
     let form = |friction: &str| {
