@@ -5,6 +5,7 @@
 //! gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
 mod constraints;
+mod convergence;
 mod determined;
 mod formula;
 mod identify;
@@ -64,7 +65,10 @@ impl Part {
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
-            Self::Identify => Ok([identify::rates(seeds)?, determined::determined(seeds)?].concat()),
+            Self::Identify => {
+                let parts = [identify::rates, convergence::convergence, determined::determined];
+                Ok(parts.into_iter().map(|rates| rates(seeds)).collect::<Outcome<Vec<_>>>()?.concat())
+            }
             Self::Formula => formula::rates(seeds),
             Self::Constraints => constraints::rates(seeds),
             Self::Readings => readings::rates(seeds),

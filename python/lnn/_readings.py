@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import as_json, doubles_list, names, real, thread_count, whole
-from ._recorded import recorded
+from ._recorded import errors_beside, recorded
 from ._mechanics import System
 from ._results import Bodies, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
@@ -124,6 +124,7 @@ def identify(
     gains: Sequence[str] = (),
     delays: Sequence[str] = (),
     noise: Sequence[float] | None = None,
+    error: Any = None,
     targets: str | None = None,
     between: str | None = None,
     segment: float | None = None,
@@ -146,6 +147,9 @@ def identify(
         Coordinates whose sensor has an unknown offset, an unknown gain, or is late by an unknown time.
     noise : sequence of float, optional
         Standard deviation of the noise of every coordinate in SI units; estimated by default.
+    error : optional
+        Standard deviations of the positions, sample by sample: an array like the data, or a list of them; of files and DataFrames the names of
+        their columns. Residuals are weighed by them.
     targets : str, optional
         What is met, ``"motion"`` or ``"forces"``; the forces of a chain of links, else the motion by default.
     between : str, optional
@@ -170,15 +174,19 @@ def identify(
     if angles is None:
         turning = [name in system.angles for name in system.coordinates]
         angles = [name for name, angle in zip(coordinates, turning) if angle]
-    more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
+    if noise is not None and error is not None:
+        raise ValueError("error: expected either errors sample by sample or the noise of every coordinate, found both")
+    beside, errors = errors_beside(data, error, trajectory)
+    more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": {**(columns or {}), **beside}}
     motion = recorded(data, coordinates, angles, **more)
     named = {"constants": constants, "offsets": offsets, "gains": gains, "delays": delays}
     choices: dict[str, Any] = {key: names(key, given) for key, given in named.items()}
     choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
     choices["segment"] = None if segment is None else real("segment", segment, positive=True)
-    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads)}
+    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors}
     found = json.loads(_lnn.identify(motion, system._subject, as_json(choices)))
     found["constants"] = {constant["symbol"]: IdentifiedConstant(**constant) for constant in found["constants"]}
+    found["obstacles"] = tuple(found["obstacles"])
     found["sensors"] = tuple(SensorConstant(**sensor) for sensor in found["sensors"])
     unknowns = len(found["constants"]) + len(found["sensors"])
     found["correlations"] = np.array(found["correlations"], float).reshape(unknowns, unknowns)

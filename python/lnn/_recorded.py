@@ -71,6 +71,21 @@ def recorded(
     return files, tracks, as_json({"coordinates": list(coordinates), "angles": list(angles), "columns": meaning})
 
 
+def errors_beside(data: Any, error: Any, trajectory: str | None) -> tuple[dict[str, Any], list[list[float]]]:
+    """Standard deviations of positions: their columns in files, or numbers of every trajectory in memory."""
+    if error is None:
+        return {}, []
+    if _is_path(data) or (isinstance(data, (list, tuple)) and data and all(map(_is_path, data))):
+        return {"errors": [str(name) for name in error]}, []
+    if hasattr(data, "columns") and hasattr(data, "loc"):
+        groups = [data] if trajectory is None else [group for _, group in data.groupby(trajectory, sort=False)]
+        given = [group[list(error)].to_numpy(float) for group in groups]
+    else:
+        several = isinstance(data, (list, tuple)) and len(data) > 0 and np.ndim(data[0]) == 2
+        given = list(error) if several else [error]
+    return {}, [np.ravel(doubles("error", x)).tolist() for x in given]
+
+
 def _is_path(x: Any) -> bool:
     return isinstance(x, (str, os.PathLike))
 

@@ -368,6 +368,8 @@ class IdentifiedConstant:
     unit : str
     start : float
         Value at which the search started.
+    at_bound : bool
+        Whether it lies at the bound of its range, beyond which the data would be met better: it has no symmetric error.
     """
 
     symbol: str
@@ -375,6 +377,7 @@ class IdentifiedConstant:
     standard_error: float | None
     unit: str
     start: float
+    at_bound: bool
 
 
 @dataclass(frozen=True)
@@ -535,6 +538,12 @@ class Identified:
         By coordinate.
     over_noise : float
         Residuals over the noise, root mean square, all coordinates together.
+    obstacles : tuple of str
+        What is to be known before all else: coordinates that stand still.
+    converged : bool
+        Whether the search arrived; if not, the constants are where it stopped.
+    decrement : float
+        The decrease of the sum of squares that was left to gain, over the variance of the noise.
     explained : bool
         Whether the form explains the motion.
     verdict : dict
@@ -559,6 +568,9 @@ class Identified:
     bodies: Bodies | None
     residuals: dict[str, Residual]
     over_noise: float
+    obstacles: tuple[str, ...]
+    converged: bool
+    decrement: float
     explained: bool
     verdict: dict
     outliers: tuple[Outlier, ...]

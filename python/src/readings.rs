@@ -52,10 +52,13 @@ pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str)
     // The other choices have their types from Python.
     let mut options: IdentifyOptions =
         serde_json::from_str(choices).map_err(|error| value(format_args!("targets, between: {error}")))?;
-    let (source, instance) = (Source::of(motion)?, system.system_instance()?);
+    let (source, instance) = (Source::whole(motion)?, system.system_instance()?);
     whole(py, None, |watch| {
         options.cancellation = watch.cancellation();
-        let loaded = source.read()?;
+        let mut loaded = source.read()?;
+        if options.errors.is_empty() {
+            options.errors = std::mem::take(&mut loaded.errors);
+        }
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?;
         let outliers: Vec<_> = found
             .outliers

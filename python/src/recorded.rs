@@ -35,24 +35,41 @@ impl Source {
     ///
     /// # Errors
     /// `ValueError` for columns or trajectories that are none.
-    pub fn of((files, tracks, meaning): Motion) -> PyResult<Self> {
+    pub fn of(motion: Motion) -> PyResult<Self> {
+        Self::read_off(motion, false)
+    }
+
+    /// The same of trajectories that stay whole, see [`Columns::whole`].
+    ///
+    /// # Errors
+    /// As of [`of`](Self::of).
+    pub fn whole(motion: Motion) -> PyResult<Self> {
+        Self::read_off(motion, true)
+    }
+
+    fn read_off((files, tracks, meaning): Motion, whole: bool) -> PyResult<Self> {
         let Meaning { coordinates, angles, columns: more } = serde_json::from_str(&meaning).map_err(value)?;
         if files.is_empty() {
             let periodic = coordinates.iter().map(|name| angles.contains(name)).collect();
             let track = |(name, times, q, v, a, force)| RecordedTrajectory { name, times, q, v, a, force };
             let tracks: Vec<_> = tracks.into_iter().map(track).collect();
             for track in &tracks {
-                track.validate(coordinates.len()).map_err(value)?;
+                match whole {
+                    true => track.validate_repeated(coordinates.len()),
+                    false => track.validate(coordinates.len()),
+                }
+                .map_err(value)?;
             }
             return Ok(Self::Memory(Recording { coordinates, periodic, tracks }));
         }
-        let mut columns = Columns { coords: coordinates, periodic: angles, ..Columns::default() };
+        let mut columns = Columns { coords: coordinates, periodic: angles, whole, ..Columns::default() };
         for (key, given) in more {
             let bad = |_| value(format_args!("{key}: expected another value, found {given}"));
             let given = given.clone();
             match key.as_str() {
                 "velocities" => columns.velocity = serde_json::from_value(given).map_err(bad)?,
                 "accelerations" => columns.acceleration = serde_json::from_value(given).map_err(bad)?,
+                "errors" => columns.error = serde_json::from_value(given).map_err(bad)?,
                 "forces" => columns.force = serde_json::from_value(given).map_err(bad)?,
                 "time" => columns.time = serde_json::from_value(given).map_err(bad)?,
                 "trajectory" => columns.trajectory = serde_json::from_value(given).map_err(bad)?,

@@ -2,7 +2,7 @@
 
 use crate::cli::files::OutputFile;
 use crate::cli::number::{positive, seconds, thread_count, threads};
-use crate::cli::recording_args::RecordingArgs;
+use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::source::parameter;
 use crate::cli::watch::search;
 use crate::cli::{CliError, parse_system, system_arg};
@@ -11,7 +11,7 @@ use crate::identification::{
 };
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{number, pluralize, rounded};
-use crate::recording::{LoadedRecording, Targets};
+use crate::recording::{Columns, LoadedRecording, Targets};
 use crate::report::text_table;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -46,6 +46,9 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
+    /// Columns of the standard deviations of the positions, row by row, one per coordinate and in its unit; residuals are weighed by them.
+    #[arg(long, value_name = "COLUMN,..", value_delimiter = ',', conflicts_with = "noise")]
+    error: Vec<String>,
     /// What the constants are fitted to: the motion, or the known forces [default: the forces of a chain of links, else the motion].
     #[arg(long, value_enum, value_name = "WHAT")]
     targets: Option<Met>,
@@ -123,6 +126,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         gains: args.gain.clone(),
         delays: args.delay.clone(),
         noise: args.noise.clone(),
+        errors: reading.errors.clone(),
         targets: args.targets.map(Targets::from),
         between: args.between,
         segment: args.segment,
@@ -158,7 +162,8 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
         let angles = recording.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
         recording.periodic = angles.map(|(column, _)| column.clone()).collect();
     }
-    recording.read()
+    let columns = Columns { error: args.error.clone(), whole: true, ..recording.meaning() };
+    read_files(&recording.data, &columns)
 }
 
 /// What the user chose, or what the data are.
@@ -208,7 +213,7 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
         .iter()
         .map(|c| {
             let value =
-                json!({ "value": c.value, "standard_error": c.standard_error, "unit": c.unit, "start": c.start });
+                json!({ "value": c.value, "standard_error": c.standard_error, "unit": c.unit, "start": c.start, "at_bound": c.at_bound });
             (c.symbol.clone(), value)
         })
         .collect();
@@ -227,6 +232,9 @@ fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, Cl
     let whole = json!({
         "constants": constants,
         "sensors": found.sensors,
+        "obstacles": found.obstacles,
+        "converged": found.converged,
+        "decrement": found.decrement,
         "undetermined": found.undetermined,
         "combinations": found.combinations,
         "bodies": found.bodies,
@@ -289,18 +297,22 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     };
     // Where sums are known, constants that they alone tell have no row of their own.
     let alone = |c: &&Constant| found.combinations.is_empty() || c.standard_error.is_some();
-    let rows = found
-        .constants
-        .iter()
-        .filter(alone)
-        .map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
+    let rows = found.constants.iter().filter(alone).map(|c| {
+        let mut row = row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start);
+        if c.at_bound {
+            row[2] = "at its bound".to_string();
+        }
+        row
+    });
     let perfect = |kind: &str| if kind == "gain" { 1.0 } else { 0.0 };
     let sensors = found.sensors.iter().map(|s| {
         let unit = if s.kind == "delay" { "s" } else { "" };
         row(sensor(s), (s.value, s.standard_error), unit, perfect(s.kind))
     });
     let headers = ["constant", "value", "standard error", "unit", "start"];
-    let mut text = text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
+    let said: String =
+        found.obstacles.iter().map(|obstacle| format!("{obstacle}; nothing can be learned of it\n")).collect();
+    let mut text = said + &text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
     let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1);
     let known = sums.chain(found.undetermined.iter().flat_map(|open| &open.known)).map(|known| {
         let [value, error] = with_error(known.value, Some(known.standard_error));
@@ -340,6 +352,9 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     let headers = [what, "residual", "noise", "spread", "of neighbours", ""];
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
     text += &format!("{}\n", found.verdict);
+    if !found.converged {
+        text += &format!("{} times the variance of the noise is left to gain\n", number(found.decrement));
+    }
     text += &pluralize(found.samples, "sample", "samples");
     if found.segments > 0 {
         let segments = pluralize(found.segments, "segment", "segments");

@@ -46,7 +46,7 @@ pub struct RecordingArgs {
 
 /// Dashes for a contradiction that begins with an option's name without them.
 fn option(problem: &str) -> &'static str {
-    let options = ["velocity:", "acceleration:", "force:", "periodic:", "units:", "rate:", "columns:"];
+    let options = ["velocity:", "acceleration:", "force:", "error:", "periodic:", "units:", "rate:", "columns:"];
     if options.iter().any(|name| problem.starts_with(name)) { "--" } else { "" }
 }
 
@@ -69,6 +69,7 @@ impl RecordingArgs {
             periodic: self.periodic.clone(),
             units: self.units.clone(),
             names: (!self.columns.is_empty()).then(|| self.columns.clone()),
+            ..Columns::default()
         }
     }
 
@@ -102,6 +103,7 @@ fn help(columns: &Columns, problem: &Problem) -> &'static str {
         Problem::Missing { what: "velocity", .. } => ": --velocity names it",
         Problem::Missing { what: "acceleration", .. } => ": --acceleration names it",
         Problem::Missing { what: "force", .. } => ": --force names it",
+        Problem::Missing { what: "error", .. } => ": --error names it",
         Problem::Width { .. } | Problem::Header { .. } => ": see --columns",
         Problem::Order { .. } if columns.trajectory.is_none() => ": --trajectory COLUMN",
         _ => "",

@@ -198,13 +198,25 @@ impl FitColumns {
             self.clone();
         let units = units.iter().filter_map(|text| unit(text)).collect();
         let names = (!columns.is_empty()).then_some(columns);
-        Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, names }
+        Columns {
+            coords,
+            velocity,
+            acceleration,
+            force,
+            time,
+            rate,
+            trajectory,
+            periodic,
+            units,
+            names,
+            ..Columns::default()
+        }
     }
 }
 
 impl From<&Columns> for FitColumns {
     fn from(columns: &Columns) -> Self {
-        let Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, names } =
+        let Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, names, .. } =
             columns.clone();
         Self {
             files: Vec::new(),

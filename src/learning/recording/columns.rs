@@ -16,6 +16,8 @@ pub struct Columns {
     pub acceleration: Vec<String>,
     /// Known external generalized forces, one per coordinate; empty if there are none.
     pub force: Vec<String>,
+    /// Standard deviations of the positions, sample by sample, one per coordinate and in its unit; empty if there are none.
+    pub error: Vec<String>,
     /// Time; without it and without a rate, the column called `t` or `time`.
     pub time: Option<String>,
     /// Samples per second of data without times.
@@ -28,6 +30,9 @@ pub struct Columns {
     pub units: Vec<(String, String)>,
     /// Names of all columns of files without a header, by position.
     pub names: Option<Vec<String>>,
+    /// Whether trajectories stay whole, for those who follow them by equations of motion: no gap cuts one, none is too short, and rows at the
+    /// same time are repeated measurements of one state.
+    pub whole: bool,
 }
 
 /// Why a description of columns makes no sense, whatever the data.
@@ -49,6 +54,7 @@ impl Columns {
             ("velocity", self.velocity.as_slice()),
             ("acceleration", self.acceleration.as_slice()),
             ("force", self.force.as_slice()),
+            ("error", self.error.as_slice()),
             ("time", self.time.as_slice()),
             ("trajectory", self.trajectory.as_slice()),
         ]
@@ -69,7 +75,7 @@ impl Columns {
     /// Checks what can be checked without the data.
     ///
     /// # Errors
-    /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations or forces than of coordinates, a
+    /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations, forces or errors than of coordinates, a
     /// column used twice, an angle that is no coordinate, an unknown unit, a unit of a column that is not used, time and
     /// rate both given, a rate that is not positive.
     pub(crate) fn validate(&self) -> Result<(), ColumnsError> {
@@ -77,9 +83,12 @@ impl Columns {
         if self.coords.is_empty() {
             return wrong("expected the columns of the coordinates".to_string());
         }
-        for (what, names) in
-            [("velocity", &self.velocity), ("acceleration", &self.acceleration), ("force", &self.force)]
-        {
+        for (what, names) in [
+            ("velocity", &self.velocity),
+            ("acceleration", &self.acceleration),
+            ("force", &self.force),
+            ("error", &self.error),
+        ] {
             if !names.is_empty() && names.len() != self.coords.len() {
                 let (n, found) = (self.coords.len(), names.len());
                 return wrong(format!(

@@ -94,6 +94,8 @@ pub struct LoadedRecording {
     pub dropped: Vec<Dropped>,
     /// Short gaps, across which trajectories go on.
     pub bridged: Bridged,
+    /// Standard deviations of the positions of every trajectory, `(samples, n)` each; empty if they are in no columns.
+    pub errors: Vec<Vec<f64>>,
     /// Number of the take of every trajectory: those that gaps cut out of one have the same.
     pub takes: Vec<usize>,
 }
@@ -103,8 +105,9 @@ impl From<Recording> for LoadedRecording {
     fn from(recording: Recording) -> Self {
         let rows = vec![Rows::default(); recording.tracks.len()];
         let takes = (0..recording.tracks.len()).collect();
-        let (cuts, dropped, bridged) = (Vec::new(), Vec::new(), Bridged::default());
-        Self { recording, rows, files: 0, time: None, duplicates: 0, cuts, dropped, bridged, takes }
+        let (cuts, dropped, errors) = (Vec::new(), Vec::new(), Vec::new());
+        let bridged = Bridged::default();
+        Self { recording, rows, files: 0, time: None, duplicates: 0, cuts, dropped, bridged, errors, takes }
     }
 }
 

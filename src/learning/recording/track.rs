@@ -84,6 +84,19 @@ impl RecordedTrajectory {
     /// The first [`TrajectoryError`].
     #[doc(hidden)]
     pub fn validate(&self, n: usize) -> Result<(), TrajectoryError> {
+        self.validate_repeated(n)?;
+        match self.times.windows(2).position(|pair| pair[1] <= pair[0]) {
+            Some(at) => Err(TrajectoryError::Order { track: self.name.clone(), sample: at + 1 }),
+            None => Ok(()),
+        }
+    }
+
+    /// [`validate`](Self::validate) of a trajectory whose times may stand still: rows at the same time are repeated measurements.
+    ///
+    /// # Errors
+    /// The first [`TrajectoryError`].
+    #[doc(hidden)]
+    pub fn validate_repeated(&self, n: usize) -> Result<(), TrajectoryError> {
         let track = || self.name.clone();
         let expected = self.len() * n;
         for (what, values, optional) in [
@@ -102,7 +115,7 @@ impl RecordedTrajectory {
         if let Some(sample) = self.times.iter().position(|t| !t.is_finite()) {
             return Err(TrajectoryError::NotFinite { track: track(), what: "time", sample });
         }
-        match self.times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        match self.times.windows(2).position(|pair| pair[1] < pair[0]) {
             Some(at) => Err(TrajectoryError::Order { track: track(), sample: at + 1 }),
             None => Ok(()),
         }

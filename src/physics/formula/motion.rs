@@ -135,6 +135,8 @@ impl Motion<'_> {
             sensors: Vec::new(),
             sigma: data.sigma.clone(),
             sigma_of: data.sigma_of.clone(),
+            errors: &[],
+            gaps: Vec::new(),
             spread: data.spread.clone(),
             robust: true,
             disturbances: Disturbances::default(),
@@ -158,7 +160,7 @@ impl Motion<'_> {
                         sum.count += count;
                         continue;
                     }
-                    let normal = problem.normal(&[found], std::slice::from_ref(segment), 0.0);
+                    let normal = problem.normal(&[found], std::slice::from_ref(segment));
                     let (matrix, right) = (normal.matrix, normal.right);
                     let part = BlockSum { matrix, right, square: normal.square, count: normal.count, inflation: 1.0 };
                     sum.add(1.0, &part);

@@ -11,7 +11,7 @@ use super::follow::{Follower, LANES, Segment};
 use super::found::{Identified, Outlier, Residual};
 use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
 use super::smoothed::{Met, States};
-use super::solve::Problem;
+use super::solve::{Normal, Problem};
 use super::stages::Fitted;
 use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
@@ -45,23 +45,24 @@ pub(super) fn identify(
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let mut sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
+    let mut search = Normal::default();
     for _ in 0..ROUNDS {
         states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
         problem.cancellation.check()?;
-        if !states.fit(problem, &mut x, Met::Forces) {
-            return Err(IdentifyError::Singular);
-        }
+        search = states.fit(problem, &mut x, Met::Forces).ok_or(IdentifyError::Singular)?;
         let residuals = [states.force_residuals(problem, &x)];
         let left: Vec<f64> = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
         let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
         sigma = left;
         tracing::debug!(?sigma, "residuals of force");
+        search.converged &= settled;
         if settled {
             break;
         }
     }
     states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
-    let normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;
+    let mut normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;
+    (normal.converged, normal.decrement, normal.held) = (search.converged, search.decrement, search.held);
     let residuals = states.force_residuals(problem, &x);
     let copies = bootstrap::copies(problem, smoothing, (states, &x, &sigma));
     let expected: Vec<Vec<f64>> = match &copies {
@@ -103,7 +104,7 @@ pub(super) fn identify(
     let together: Vec<f64> = (0..count * n).map(|at| scaled[at % n][at / n]).collect();
     let (outliers, outlier_count) = outliers((&[whole], &[together]), n, far);
     let verdict = Evidence {
-        converged: true,
+        converged: normal.converged,
         residuals: &by_coordinate,
         sizes: by_coordinate.iter().map(|r| r.rms).collect(),
         exact: least.clone(),
@@ -118,7 +119,7 @@ pub(super) fn identify(
             let root = Root::of(x.len(), &normal.matrix);
             let (bias, mut covariance) = copies.bias(&root, &x);
             let away: Vec<f64> = bias.iter().map(|bias| -bias).collect();
-            x = problem.moved(&x, &away);
+            x = problem.moved(&x, &away, &normal);
             // Residuals that are larger than those of the copies come with errors that are.
             covariance.iter_mut().for_each(|c| *c *= over_noise.max(1.0).powi(2));
             let inflation = mean_eigenvalue(&covariance, root.forward.len());
@@ -126,10 +127,12 @@ pub(super) fn identify(
         }
         None => (normal, 1.0),
     };
-    let fitted = Fitted { x, segments, normal, substeps: 0 };
+    let fitted = Fitted { x, segments, normal: normal.with_held(), substeps: 0 };
     let normal_at = |x: &[f64]| states.normal(problem, x, Met::Forces);
     problem.cancellation.check()?;
     Ok(Identified {
+        converged: fitted.normal.converged,
+        decrement: fitted.normal.decrement,
         explained: verdict.explains(),
         verdict,
         residuals: by_coordinate,

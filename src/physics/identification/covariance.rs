@@ -160,7 +160,7 @@ pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], 
     let m = x.len();
     let (mut sum, mut freedom, mut rest) = (0.0, 0.0, 0.0);
     for (linear, segment) in problem.all(x, segments).iter().zip(segments) {
-        let normal = problem.normal(std::slice::from_ref(linear), std::slice::from_ref(segment), 0.0);
+        let normal = problem.normal(std::slice::from_ref(linear), std::slice::from_ref(segment));
         rest += normal.count;
         let scale = |k: usize| normal.matrix[k * m + k].max(f64::MIN_POSITIVE).sqrt();
         let correlated: Vec<f64> =

@@ -274,7 +274,7 @@ impl Examiner<'_> {
         let (columns, apart) = effects(&rows, changes, |_| 1.0);
         let (seen, unseen) = split(&scaled(columns, &apart));
         let basis = |rows: &[Vec<f64>]| {
-            let own: Vec<Vec<f64>> = if changes.is_empty() { Vec::new() } else { combined(changes, rows) };
+            let own = if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &apart), rows) };
             let exact = |(x, size): (f64, &f64)| if (x / size).abs() > ROUNDING { x } else { 0.0 };
             let of = |column: Column| column.change.into_iter().zip(size).map(exact).collect::<Vec<f64>>();
             echelon(own, size).into_iter().map(of).collect::<Vec<_>>()
@@ -313,10 +313,9 @@ fn effects(rows: &[&[f64]], changes: &[Vec<f64>], size: impl Fn(usize) -> f64) -
     changes.iter().map(of).unzip()
 }
 
-/// Columns over their sizes; nothing of a column without size.
+/// Columns over their sizes, where these are not 0.
 fn scaled(columns: Vec<Vec<f64>>, sizes: &[f64]) -> Vec<Vec<f64>> {
-    let over = |(column, size): (Vec<f64>, &f64)| {
-        column.into_iter().map(|x| if *size > 0.0 { x / size } else { 0.0 }).collect()
-    };
+    let over =
+        |(column, size): (Vec<f64>, &f64)| column.into_iter().map(|x| if *size > 0.0 { x / size } else { x }).collect();
     columns.into_iter().zip(sizes).map(over).collect()
 }

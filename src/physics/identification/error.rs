@@ -78,10 +78,20 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
+    /// A standard deviation of a position that is none, or another number of them than of positions.
+    #[error("errors of {track}: expected a finite number above 0 for each of {expected} positions, found {found}")]
+    Errors {
+        /// The trajectory.
+        track: String,
+        /// Its positions.
+        expected: usize,
+        /// What was found.
+        found: String,
+    },
     /// Too few samples.
-    #[error("the longest trajectory has {found} samples, {needed} at least are needed")]
+    #[error("the trajectories of three samples or more have {found} samples, at least {needed} are needed")]
     Short {
-        /// Samples of the longest trajectory.
+        /// Samples of the trajectories that have three or more.
         found: usize,
         /// Samples needed.
         needed: usize,

@@ -225,9 +225,7 @@ impl<'a> Follower<'a> {
                 now.v_slopes[(lane * n + i) * columns + n + i] = 1.0;
             }
         }
-        let widths = [n, n * columns];
-        let mut stage = now.clone();
-        let mut rates: [State; 4] = std::array::from_fn(|_| now.clone());
+        let mut scratch = Scratch::like(&now);
         let longest = segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
         let track = |segment: &Segment| -> &RecordedTrajectory { &course.recording.tracks[segment.track] };
         let forced = segments.iter().any(|segment| !track(segment).force.is_empty());
@@ -244,37 +242,113 @@ impl<'a> Follower<'a> {
             // Across a gap there are as many steps as its length asks for.
             let steps = ((course.substeps as f64 * most / course.step - 0.5).ceil() as usize).max(course.substeps);
             let h: Vec<f64> = intervals.iter().map(|interval| interval / steps as f64).collect();
-            let half: Vec<f64> = h.iter().map(|h| h / 2.0).collect();
-            let parts: [Vec<f64>; 4] =
-                [1.0, 2.0, 2.0, 1.0].map(|part| h.iter().map(|h| h * part / 6.0).collect::<Vec<f64>>());
             for step in 0..steps {
-                for k in 0..4 {
-                    if forced {
-                        let share = [0.0, 0.5, 0.5, 1.0][k];
-                        let x = (step as f64 + share) / steps as f64;
-                        for (lane, segment) in segments.iter().enumerate() {
-                            let into = &mut self.force[lane * n..(lane + 1) * n];
-                            let at = segment.first + sample.min(segment.samples - 1);
-                            forces(track(segment), course.between, (at, x), into);
-                        }
+                self.advance((values, columns), (&h, &mut now), &mut scratch, |share, force| {
+                    let x = (step as f64 + share) / steps as f64;
+                    for (segment, into) in segments.iter().zip(force.chunks_exact_mut(n)) {
+                        let at = segment.first + sample.min(segment.samples - 1);
+                        forces(track(segment), course.between, (at, x), into);
                     }
-                    let (before, rest) = rates.split_at_mut(k);
-                    match k {
-                        0 => self.rate(values, &now, columns, &mut rest[0]),
-                        _ => {
-                            let h = if k == 3 { &h } else { &half };
-                            stage.moved(&now, (h, widths), &before[k - 1]);
-                            self.rate(values, &stage, columns, &mut rest[0]);
-                        }
-                    }
-                }
-                for (rate, part) in rates.iter().zip(&parts) {
-                    std::mem::swap(&mut stage, &mut now);
-                    now.moved(&stage, (part, widths), rate);
-                }
+                });
             }
             visit(self, sample, &now);
         }
+    }
+
+    /// A step of Runge and Kutta's method by `h` of each lane; `push` fills in the known forces at a share of the step.
+    fn advance(
+        &mut self,
+        (values, columns): (&[f64], usize),
+        (h, now): (&[f64], &mut State),
+        Scratch { stage, rates }: &mut Scratch,
+        push: impl Fn(f64, &mut [f64]),
+    ) {
+        let n = self.course.equations.n;
+        let widths = [n, n * columns];
+        let part = |part: f64| h.iter().map(|h| h * part).collect::<Vec<f64>>();
+        let half = part(0.5);
+        for k in 0..4 {
+            if !self.force.is_empty() {
+                push([0.0, 0.5, 0.5, 1.0][k], &mut self.force);
+            }
+            let (before, rest) = rates.split_at_mut(k);
+            match k {
+                0 => self.rate(values, now, columns, &mut rest[0]),
+                _ => {
+                    stage.moved(now, (if k == 3 { h } else { &half }, widths), &before[k - 1]);
+                    self.rate(values, stage, columns, &mut rest[0]);
+                }
+            }
+        }
+        for (rate, weight) in rates.iter().zip([1.0, 2.0, 2.0, 1.0]) {
+            std::mem::swap(stage, now);
+            now.moved(stage, (&part(weight / 6.0), widths), rate);
+        }
+    }
+
+    /// The states of segments at a sample, followed on by a time that may be negative, with their derivatives: from sample to sample, so that
+    /// known forces are what they were in each interval.
+    pub fn shifted(
+        &mut self,
+        values: &[f64],
+        (segments, sample): (&[&Segment], usize),
+        (state, by): (&State, f64),
+        late: &mut State,
+    ) {
+        late.clone_from(state);
+        let course = self.course;
+        let n = course.equations.n;
+        let columns = state.q_slopes.len() / state.q.len().max(1);
+        let mut scratch = Scratch::like(state);
+        let tracks: Vec<&RecordedTrajectory> =
+            segments.iter().map(|segment| &course.recording.tracks[segment.track]).collect();
+        let of = |(segment, track): (&&Segment, &&RecordedTrajectory)| match sample < segment.samples {
+            true => (track.times[segment.first + sample], by),
+            false => (track.times[segment.first], 0.0),
+        };
+        let mut places: Vec<(f64, f64)> = segments.iter().zip(&tracks).map(of).collect();
+        while places.iter().any(|(_, left)| left.abs() > 0.0) {
+            // The interval of each lane, and the way to go in it.
+            let way = |((now, left), track): (&(f64, f64), &&RecordedTrajectory)| {
+                let (times, last) = (&track.times, track.len() - 1);
+                let end = times.partition_point(|t| if *left < 0.0 { t < now } else { t <= now }).clamp(1, last.max(1));
+                let border = times[if *left < 0.0 { end - 1 } else { end.min(last) }];
+                let outside = if *left < 0.0 { end == 1 } else { end >= last };
+                let whole = outside || left.abs() <= (border - now).abs();
+                (end, if whole { *left } else { border - now }, if whole { now + left } else { border })
+            };
+            let ways: Vec<(usize, f64, f64)> = places.iter().zip(&tracks).map(way).collect();
+            let most = ways.iter().fold(0.0, |most: f64, way| most.max(way.1.abs()));
+            let steps = (course.substeps as f64 * most / course.step).ceil().max(1.0);
+            let h: Vec<f64> = ways.iter().map(|way| way.1 / steps).collect();
+            for step in 0..steps as usize {
+                self.advance((values, columns), (&h, late), &mut scratch, |share, force| {
+                    for (lane, into) in force.chunks_exact_mut(n).enumerate() {
+                        let (track, end) = (tracks[lane], ways[lane].0.min(tracks[lane].len() - 1));
+                        let before = track.times[end.saturating_sub(1)];
+                        let now = places[lane].0 + (step as f64 + share) * h[lane];
+                        let length = track.times[end] - before;
+                        let x = if length > 0.0 { (now - before) / length } else { 0.0 };
+                        forces(track, course.between, (end, x), into);
+                    }
+                });
+            }
+            for (place, (_, gone, now)) in places.iter_mut().zip(ways) {
+                *place = (now, if gone == place.1 { 0.0 } else { place.1 - gone });
+            }
+        }
+    }
+}
+
+/// States between, for steps.
+struct Scratch {
+    stage: State,
+    rates: [State; 4],
+}
+
+impl Scratch {
+    fn like(state: &State) -> Self {
+        Self { stage: state.clone(), rates: std::array::from_fn(|_| state.clone()) }
     }
 }
 

@@ -16,6 +16,8 @@ pub struct Constant {
     pub unit: String,
     /// The value it started with.
     pub start: f64,
+    /// `true` if it lies at the bound of its range, beyond which the data would be met better: its error is no symmetric one.
+    pub at_bound: bool,
 }
 
 /// A constant of the sensor of a coordinate: measured positions are `gain (q(t - delay)) + offset`.
@@ -117,7 +119,7 @@ pub struct Outlier {
     pub size: f64,
 }
 
-/// Constants with their errors, and how far they can be trusted.
+/// Constants with their errors, and how far these can be trusted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Identified {
     /// The constants that were unknown, in the order of the system.
@@ -136,6 +138,12 @@ pub struct Identified {
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
     pub over_noise: f64,
+    /// What is to be known before all else: coordinates that stand still.
+    pub obstacles: Vec<String>,
+    /// `true` if the search arrived; if not, the constants are where it stopped.
+    pub converged: bool,
+    /// The decrease of the sum of squares that was left to gain at the end, over the variance of the noise: the Newton decrement.
+    pub decrement: f64,
     /// Whether the form explains what was measured, and if not, why.
     pub verdict: Verdict,
     /// `true` if it does: [`Verdict::explains`].

@@ -28,8 +28,10 @@
 mod bodies;
 mod bootstrap;
 mod by_forces;
+mod choices;
 mod covariance;
 mod cure;
+mod descent;
 mod determined;
 mod error;
 mod follow;
@@ -38,7 +40,10 @@ mod innovations;
 mod invariants;
 pub(crate) mod linear;
 mod moves;
+mod pieces;
 mod quality;
+#[cfg(test)]
+mod search_tests;
 mod smoothed;
 mod solve;
 mod stages;
@@ -77,6 +82,10 @@ pub struct IdentifyOptions {
     pub delays: Vec<String>,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,
+    /// Standard deviations of the positions of every trajectory, `(samples, n)` each, in the units of the coordinates; residuals are weighed
+    /// by them. Empty if they are not known.
+    #[serde(default)]
+    pub errors: Vec<Vec<f64>>,
     /// What is met, [`Targets::Motion`] or [`Targets::Forces`]; of a chain of links under known forces these, else the motion, if not given.
     pub targets: Option<Targets>,
     /// Known forces between the samples; what meets the motion best if not given.

@@ -1,9 +1,11 @@
 //! Finite moves along open directions: what stays as it is has a name, and unknowns that stay open return to their start.
 
+use super::descent::mute;
 use super::determined::{Column, Determined};
 use super::invariants::{Invariant, Kind, products, sums};
 use super::linear::{inverse_with, times};
-use super::solve::{Normal, Problem, mute};
+use super::solve::{Normal, Problem};
+use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
 /// Factors by which a pivot is moved.
@@ -77,6 +79,9 @@ impl<'a> Moves<'a> {
         let followed = |x: &[f64]| (self.normal_at)(x).filter(|n| n.failed == 0 && n.square.is_finite());
         let mut best = followed(&x)?;
         for _ in 0..STEPS {
+            if self.problem.cancellation.is_cancelled() {
+                return None;
+            }
             let (mut matrix, mut right) = (best.matrix.clone(), best.right.clone());
             mute(&held, &mut matrix, &mut right);
             let mut change = times(m, &inverse_with(m, &matrix, RIDGE)?, &right);
@@ -85,7 +90,7 @@ impl<'a> Moves<'a> {
             }
             let mut better = None;
             for _ in 0..HALVINGS {
-                let moved = self.problem.moved(&x, &change);
+                let moved = self.problem.moved(&x, &change, &best);
                 better = followed(&moved).filter(|tried| tried.square < best.square).map(|tried| (moved, tried));
                 if better.is_some() {
                     break;
@@ -160,7 +165,16 @@ impl<'a> Moves<'a> {
                 }
             }
         }
-        self.refit(near).map_or_else(|| x.to_vec(), |(x, _)| x)
+        let near = Some(near).filter(|near| self.is_in_range(near)).and_then(|near| self.refit(near));
+        near.map_or_else(|| x.to_vec(), |(x, _)| x)
+    }
+
+    fn is_in_range(&self, x: &[f64]) -> bool {
+        self.problem.chosen.iter().zip(x).all(|(&k, &x)| match self.problem.ranges[k] {
+            Range::Positive => x > 0.0,
+            Range::AtLeastZero => x >= 0.0,
+            Range::Any => true,
+        })
     }
 }
 

@@ -1,9 +1,8 @@
 //! Constants by least squares on smoothed motion: on its accelerations, where the fit through the motion begins, or on known forces.
 
+use super::descent::{LEAST_DAMPING, MOST_DAMPING};
 use super::follow::{Follower, LANES, forces};
-use super::linear::{inverse_with, times};
-use super::solve::{Normal, Problem, mute, without_effect};
-use crate::linalg::dot;
+use super::solve::{Normal, Problem};
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
 
@@ -12,10 +11,6 @@ const MOST_STATES: usize = 12_000;
 /// Errors beyond so many standard deviations count linearly.
 const HUBER: f64 = 3.0;
 const ITERATIONS: usize = 60;
-/// Relative decrease of the sum of squares that is none.
-const CONVERGED: f64 = 1e-8;
-/// Part of the diagonal that keeps normal equations regular.
-const RIDGE: f64 = 1e-11;
 /// Effect of a constant on accelerations, over these and squared, that is rounding alone.
 const NO_EFFECT: f64 = 1e-20;
 
@@ -158,46 +153,29 @@ impl States {
         all
     }
 
-    /// Moves constants to where smoothed motion is met best; `false` if no residual is finite.
-    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> bool {
-        let m = problem.chosen.len();
-        let Some(mut best) = self.normal(problem, x, met) else { return false };
+    /// Moves constants to where smoothed motion is met best; the normal equations there, `None` if no residual is finite.
+    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> Option<Normal> {
+        let mut best = self.normal(problem, x, met)?;
         let given = if met == Met::Forces { &self.force } else { &self.a };
         let size: f64 = given.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
         // Forces are often linear in the constants.
         let mut damping = if met == Met::Forces { 1e-9 } else { 1e-3 };
         for _ in 0..ITERATIONS {
-            if !problem.cancellation.iterate((best.square / best.count.max(1.0)).sqrt()) {
+            let muted = problem.too_weak(x, &best, NO_EFFECT * size);
+            problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
+            let residual = (best.square / best.count.max(1.0)).sqrt();
+            if best.converged || damping > MOST_DAMPING || !problem.cancellation.iterate(residual) {
                 break;
             }
-            let mut right = best.right.clone();
-            let mut damped: Vec<f64> =
-                (0..m * m).map(|at| best.matrix[at] * if at / m == at % m { 1.0 + damping } else { 1.0 }).collect();
-            mute(&without_effect(&x[..m], &best.matrix, NO_EFFECT * size), &mut damped, &mut right);
-            let Some(inverse) = inverse_with(m, &damped, RIDGE) else { break };
-            let mut change = times(m, &inverse, &right);
-            if dot(&change, &right) < CONVERGED * best.square {
-                break;
-            }
-            change.resize(x.len(), 0.0);
-            let moved = problem.moved(x, &change);
+            let moved = problem.moved(x, &problem.step(x, &best, &muted, damping).change, &best);
             match self.normal(problem, &moved, met) {
                 Some(tried) if tried.square < best.square => {
-                    let done = best.square - tried.square < CONVERGED * best.square;
                     (*x, best) = (moved, tried);
-                    damping = f64::max(damping / 10.0, 1e-10);
-                    if done {
-                        break;
-                    }
+                    damping = f64::max(damping / 10.0, LEAST_DAMPING);
                 }
-                _ => {
-                    damping *= 10.0;
-                    if damping > 1e9 {
-                        break;
-                    }
-                }
+                _ => damping *= 10.0,
             }
         }
-        true
+        Some(best)
     }
 }

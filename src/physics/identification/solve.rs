@@ -2,31 +2,24 @@
 //!
 //! Every segment has a start of its own, which is eliminated from the normal equations.
 
+use super::descent::{FAILED, RIDGE};
 use super::follow::{Course, Follower, LANES, Segment, State};
 use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
 use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
+use std::f64::consts::TAU;
 
 /// Residuals beyond so many standard deviations count linearly where that is asked for.
 pub(super) const HUBER: f64 = 3.0;
-/// Part of the diagonal that keeps normal equations regular.
-const RIDGE: f64 = 1e-11;
-/// Part of the effect of an unknown, squared, that other starts do not have; integrators are no better.
-const LIKE_STARTS: f64 = 1e-8;
-/// Effect of an unknown on the motion, over the motion itself and squared, that is rounding alone.
-const NO_EFFECT: f64 = 1e-22;
-/// Sum of squares, of each residual, of a segment that cannot be followed.
-const FAILED: f64 = 1e8;
-/// Damping beyond which nothing gets better.
-const MOST_DAMPING: f64 = 1e9;
 /// Rounds in which starts follow other unknowns.
 const SETTLING: usize = 6;
-/// Relative decrease of the sum of squares that is none.
-const CONVERGED: f64 = 1e-9;
 
-/// A constant of a sensor: measured positions are `gain (q - delay v) + offset`.
+/// Part of normal equations of a constant that is as good as given.
+const GIVEN: f64 = 1e100;
+
+/// A constant of a sensor: measured positions are `gain q(t - delay) + offset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SensorKind {
     Offset,
@@ -62,6 +55,10 @@ pub(crate) struct Problem<'a> {
     pub sigma: Vec<f64>,
     /// The same by trajectory where these differ; empty if they do not.
     pub sigma_of: Vec<Vec<f64>>,
+    /// The same of every sample where they are known, `(samples, n)` by trajectory; empty if they are not.
+    pub errors: &'a [Vec<f64>],
+    /// First samples behind long gaps, by trajectory: which turn an angle is in there is not known.
+    pub gaps: Vec<Vec<usize>>,
     /// Spread of every coordinate over all samples.
     pub spread: Vec<f64>,
     pub robust: bool,
@@ -82,7 +79,7 @@ pub(crate) struct Linear {
 }
 
 /// Normal equations of constants and sensors, starts eliminated.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Normal {
     pub matrix: Vec<f64>,
     pub right: Vec<f64>,
@@ -94,13 +91,31 @@ pub(crate) struct Normal {
     /// Residuals less the numbers that starts take.
     pub count: f64,
     pub failed: usize,
+    /// Newton decrement of the starts, for each of their numbers.
+    pub of_starts: f64,
+    /// Newton decrement over the variance of the noise: the decrease of the sum of squares that is left to gain.
+    pub decrement: f64,
+    /// `true` if that is far below 1.
+    pub converged: bool,
+    /// Constants at the bound of their range, beyond which the motion would be met better.
+    pub held: Vec<bool>,
 }
 
 impl Normal {
     /// Of `m` unknowns before the first residual.
     pub fn empty(m: usize) -> Self {
         let [right, diagonal] = [(); 2].map(|()| vec![0.0; m]);
-        Self { matrix: vec![0.0; m * m], right, diagonal, parts: Vec::new(), square: 0.0, count: 0.0, failed: 0 }
+        Self { matrix: vec![0.0; m * m], right, diagonal, held: vec![false; m], ..Self::default() }
+    }
+
+    /// The same with the constants at their bounds taken for known to far below their least value.
+    pub fn with_held(mut self) -> Self {
+        let m = self.right.len();
+        for k in (0..m).filter(|&k| self.held[k]) {
+            (0..m).for_each(|l| (self.matrix[k * m + l], self.matrix[l * m + k]) = (0.0, 0.0));
+            (self.matrix[k * m + k], self.diagonal[k], self.right[k]) = (GIVEN, GIVEN, 0.0);
+        }
+        self
     }
 }
 
@@ -132,8 +147,18 @@ impl Problem<'_> {
         found
     }
 
-    fn has_delay(&self) -> bool {
-        self.sensors.iter().any(|sensor| sensor.kind == SensorKind::Delay)
+    /// Standard deviation of the noise of a measured position.
+    pub fn sigma_at(&self, track: usize, sample: usize, i: usize) -> f64 {
+        match self.errors.get(track) {
+            Some(errors) => errors[sample * self.n() + i],
+            None => self.sigma_of.get(track).unwrap_or(&self.sigma)[i],
+        }
+    }
+
+    /// `true` for a sample of a segment with a long gap before it.
+    fn is_beyond_gap(&self, segment: &Segment, sample: usize) -> bool {
+        let next = |gaps: &Vec<usize>| gaps.get(gaps.partition_point(|gap| *gap <= segment.first)).copied();
+        self.gaps.get(segment.track).and_then(next).is_some_and(|gap| gap <= sample)
     }
 
     /// Calls `visit(segment, sample, coordinate, residual, row)` along segments: residuals of positions in units of noise, and their
@@ -154,32 +179,42 @@ impl Problem<'_> {
         let sensors: Vec<[f64; 3]> = (0..n).map(|i| self.sensor(x, i)).collect();
         let mut row = vec![0.0; if derivatives { columns + self.sensors.len() } else { 0 }];
         let mut a = vec![0.0; segments.len() * n];
-        let (delayed, noisy) = (self.has_delay(), !self.disturbances.force.is_empty());
+        let noisy = !self.disturbances.force.is_empty();
+        let mut delayed: Vec<(f64, State)> = Vec::new();
+        for [_, _, delay] in &sensors {
+            if *delay != 0.0 && delayed.iter().all(|(known, _)| known != delay) {
+                delayed.push((*delay, State::default()));
+            }
+        }
         let read = |follower: &mut Follower<'_>, sample: usize, state: &State| {
-            if delayed || noisy {
-                follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
+            for (delay, late) in &mut delayed {
+                follower.shifted(&values, (segments, sample), (state, -*delay), late);
             }
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
-                let own = self.sigma_of.get(segment.track).unwrap_or(&self.sigma);
-                let measured = &self.course.recording.tracks[segment.track].q[(segment.first + sample) * n..][..n];
+                let place = segment.first + sample;
+                let turned = self.is_beyond_gap(segment, place);
+                let measured = &self.course.recording.tracks[segment.track].q[place * n..][..n];
                 for i in 0..n {
                     let at = lane * n + i;
                     let [offset, gain, delay] = sensors[i];
-                    let (q, v) = (state.q[at], state.v[at]);
-                    let seen = q - delay * (v - delay * a[at] / 2.0);
-                    let sigma = own[i];
-                    let residual = (measured[i] - gain * seen - offset) / sigma;
+                    let late = delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
+                    let seen = late.q[at];
+                    let sigma = self.sigma_at(segment.track, place, i);
+                    let mut missed = measured[i] - gain * seen - offset;
+                    if turned && self.course.recording.periodic[i] {
+                        missed -= TAU * (missed / TAU).round();
+                    }
+                    let residual = missed / sigma;
                     if derivatives {
                         let slopes = at * columns..(at + 1) * columns;
-                        let both = state.q_slopes[slopes.clone()].iter().zip(&state.v_slopes[slopes]);
                         let factor = gain / sigma;
-                        row.iter_mut().zip(both).for_each(|(r, (q, v))| *r = factor * (q - delay * v));
+                        row.iter_mut().zip(&late.q_slopes[slopes]).for_each(|(r, q)| *r = factor * q);
                         for (sensor, r) in self.sensors.iter().zip(&mut row[columns..]) {
                             *r = match (sensor.coordinate == i, sensor.kind) {
                                 (false, _) => 0.0,
                                 (_, SensorKind::Offset) => sigma.recip(),
                                 (_, SensorKind::Gain) => seen / sigma,
-                                (_, SensorKind::Delay) => -gain * (v - delay * a[at]) / sigma,
+                                (_, SensorKind::Delay) => -gain * late.v[at] / sigma,
                             };
                         }
                     }
@@ -191,6 +226,7 @@ impl Problem<'_> {
                 }
             }
             if noisy {
+                follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
                 let impulses = self.impulses(&state.by_starts(n, columns), follower.mass(), self.course.step);
                 filters.iter_mut().zip(impulses.chunks_exact(2 * n * n)).for_each(|(filter, own)| filter.disturb(own));
             }
@@ -289,8 +325,8 @@ impl Problem<'_> {
         ends
     }
 
-    /// The normal equations without the starts, damped by a part of their diagonal.
-    pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment], damping: f64) -> Normal {
+    /// The normal equations without the starts.
+    pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment]) -> Normal {
         let (n, m) = (self.n(), self.unknowns());
         let (starts, width) = (2 * n, 2 * n + m);
         let mut normal = Normal::empty(m);
@@ -303,7 +339,8 @@ impl Problem<'_> {
             };
             normal.square += linear.square;
             normal.count += linear.count;
-            let inverse = self.start_inverse(linear, damping);
+            let inverse = self.start_inverse(linear, 0.0);
+            normal.of_starts += dot(&times(starts, &inverse, &linear.right[..starts]), &linear.right[..starts]);
             let mixed = |i: usize, k: usize| linear.matrix[i * width + starts + k];
             let mut solved = vec![0.0; starts * m];
             for i in 0..starts {
@@ -318,17 +355,17 @@ impl Problem<'_> {
                 part[k] -= (0..starts).map(|i| solved[i * m + k] * linear.right[i]).sum::<f64>();
                 for l in 0..m {
                     let own = linear.matrix[(starts + k) * width + starts + l];
-                    let own = if k == l { own * (1.0 + damping) } else { own };
                     normal.matrix[k * m + l] += own - (0..starts).map(|i| mixed(i, k) * solved[i * m + l]).sum::<f64>();
                 }
             }
             normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
             normal.parts.push(part);
         }
+        normal.of_starts /= (starts * segments.len().max(1)) as f64;
         normal
     }
 
-    /// Inverse of the part of the start.
+    /// Inverse of the part of the start, damped by a part of its diagonal.
     pub(super) fn start_inverse(&self, linear: &Linear, damping: f64) -> Vec<f64> {
         let starts = 2 * self.n();
         let width = starts + self.unknowns();
@@ -340,154 +377,10 @@ impl Problem<'_> {
         inverse_with(starts, &own, RIDGE).unwrap_or_else(|| vec![0.0; starts * starts])
     }
 
-    /// The step of a start, given that of the unknowns.
-    fn start_step(&self, linear: &Linear, change: &[f64], damping: f64) -> Vec<f64> {
-        let starts = 2 * self.n();
-        let width = starts + self.unknowns();
-        let right: Vec<f64> = (0..starts)
-            .map(|i| linear.right[i] - dot(&linear.matrix[i * width + starts..(i + 1) * width], change))
-            .collect();
-        times(starts, &self.start_inverse(linear, damping), &right)
-    }
-
-    /// Moves the starts alone, each segment for itself; the sum of squares.
-    pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> f64 {
-        let still = vec![0.0; self.unknowns()];
-        let mut best = self.all(x, segments);
-        let mut starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
-        let mut damping = vec![1e-6; segments.len()];
-        for _ in 0..iterations {
-            for (k, segment) in segments.iter_mut().enumerate() {
-                segment.start.clone_from(&starts[k]);
-                if let Some(linear) = &best[k] {
-                    let step = self.start_step(linear, &still, damping[k]);
-                    segment.start.iter_mut().zip(step).for_each(|(s, d)| *s += d);
-                }
-            }
-            let tried = self.all(x, segments);
-            let mut gained = 0.0;
-            for (k, tried) in tried.into_iter().enumerate() {
-                let square = |linear: &Option<Linear>| linear.as_ref().map_or(f64::INFINITY, |linear| linear.square);
-                let (before, after) = (square(&best[k]), square(&tried));
-                if after < before {
-                    gained += if before.is_finite() { before - after } else { after };
-                    (best[k], damping[k]) = (tried, damping[k] / 10.0);
-                    starts[k].clone_from(&segments[k].start);
-                } else {
-                    damping[k] = (damping[k] * 100.0).max(1e-4);
-                }
-            }
-            let total: f64 = best.iter().flatten().map(|linear| linear.square).sum();
-            if gained < 1e-4 * total || self.cancellation.is_cancelled() {
-                break;
-            }
-        }
-        segments.iter_mut().zip(starts).for_each(|(segment, start)| segment.start = start);
-        best.iter().zip(segments).map(|(b, s)| b.as_ref().map_or(FAILED * s.samples as f64, |b| b.square)).sum()
-    }
-
     /// Undamped normal equations at other unknowns, the starts of the segments fitted to them.
     pub fn normal_at(&self, x: &[f64], segments: &[Segment]) -> Normal {
         let mut segments = segments.to_vec();
         self.settle(x, &mut segments, SETTLING);
-        self.normal(&self.all(x, &segments), &segments, 0.0)
-    }
-
-    /// A change of the unknowns, applied to them; constants that must be positive stay so.
-    pub fn moved(&self, x: &[f64], change: &[f64]) -> Vec<f64> {
-        let moved = |(k, (&x, &d)): (usize, (&f64, &f64))| match self.chosen.get(k).map(|&at| self.ranges[at]) {
-            Some(Range::Positive) if x > 0.0 => x * (d / x).clamp(-2.0, 2.0).exp(),
-            Some(Range::Positive | Range::AtLeastZero) => (x + d).max(0.0),
-            _ => x + d,
-        };
-        x.iter().zip(change).enumerate().map(moved).collect()
-    }
-
-    /// Sum of squares of the whole motion in units of noise, of as many numbers.
-    fn size(&self, numbers: f64) -> f64 {
-        let square = |(spread, sigma): (&f64, &f64)| (spread / sigma).powi(2);
-        numbers * self.spread.iter().zip(&self.sigma).map(square).sum::<f64>() / self.n() as f64
-    }
-
-    /// A change of an unknown that is large: its value, of a sensor's offset the spread of the motion, of its delay ten samples; 0 of a
-    /// constant that may be 0.
-    pub fn scale(&self, unknown: usize, x: f64) -> f64 {
-        match unknown.checked_sub(self.chosen.len()).map(|k| self.sensors[k]) {
-            None => x.abs(),
-            Some(Sensor { kind: SensorKind::Offset, coordinate }) => self.spread[coordinate],
-            Some(Sensor { kind: SensorKind::Gain, .. }) => 1.0,
-            Some(Sensor { kind: SensorKind::Delay, .. }) => 10.0 * self.course.step,
-        }
-    }
-
-    /// Unknowns that the motion shows nothing of: their effect is rounding, or what other starts do as well.
-    pub fn without_effect(&self, x: &[f64], normal: &Normal) -> Vec<bool> {
-        let m = x.len();
-        let scales: Vec<f64> = (0..m).map(|k| self.scale(k, x[k])).collect();
-        let mut muted = without_effect(&scales, &normal.matrix, NO_EFFECT * self.size(normal.count));
-        for (k, muted) in muted.iter_mut().enumerate() {
-            *muted |= normal.matrix[k * m + k] <= LIKE_STARTS * normal.diagonal[k];
-        }
-        muted
-    }
-
-    /// Fits unknowns and starts; the normal equations at the end, undamped.
-    pub fn fit(&self, x: &mut Vec<f64>, segments: &mut [Segment], iterations: usize) -> Normal {
-        let m = self.unknowns();
-        let mut best = self.all(x, segments);
-        let mut square = self.normal(&best, segments, 0.0).square;
-        let mut damping = 1e-4;
-        for _ in 0..iterations {
-            let mut normal = self.normal(&best, segments, damping);
-            if !self.cancellation.iterate((square / normal.count.max(1.0)).sqrt()) {
-                break;
-            }
-            let muted = self.without_effect(x, &normal);
-            mute(&muted, &mut normal.matrix, &mut normal.right);
-            let Some(inverse) = inverse_with(m, &normal.matrix, RIDGE) else { break };
-            let change = times(m, &inverse, &normal.right);
-            let moved = self.moved(x, &change);
-            let real: Vec<f64> = moved.iter().zip(x.iter()).map(|(after, before)| after - before).collect();
-            let starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
-            for (segment, linear) in segments.iter_mut().zip(&best) {
-                let Some(linear) = linear else { continue };
-                let step = self.start_step(linear, &real, damping);
-                segment.start.iter_mut().zip(step).for_each(|(s, d)| *s += d);
-            }
-            let tried = self.all(&moved, segments);
-            let after = self.normal(&tried, segments, 0.0).square;
-            if after < square {
-                let done = square - after < CONVERGED * square;
-                (*x, best, square) = (moved, tried, after);
-                damping = f64::max(damping / 10.0, 1e-10);
-                if done {
-                    break;
-                }
-            } else {
-                segments.iter_mut().zip(starts).for_each(|(segment, start)| segment.start = start);
-                let expected = dot(&change, &normal.right);
-                damping = f64::max(damping * 10.0, 1e-6);
-                if damping > MOST_DAMPING || expected < CONVERGED * square {
-                    break;
-                }
-            }
-        }
-        self.normal(&best, segments, 0.0)
-    }
-}
-
-/// Unknowns whose part of normal equations, for a change of their size, is below `least`.
-pub(super) fn without_effect(scales: &[f64], matrix: &[f64], least: f64) -> Vec<bool> {
-    let m = scales.len();
-    let square = |scale: f64| if scale == 0.0 { 1.0 } else { scale * scale };
-    (0..m).map(|k| matrix[k * m + k] * square(scales[k]) <= least).collect()
-}
-
-/// Leaves unknowns out of normal equations: they stay where they are.
-pub(super) fn mute(muted: &[bool], matrix: &mut [f64], right: &mut [f64]) {
-    let m = right.len();
-    for (k, _) in muted.iter().enumerate().filter(|(_, muted)| **muted) {
-        (0..m).for_each(|l| (matrix[k * m + l], matrix[l * m + k]) = (0.0, 0.0));
-        (matrix[k * m + k], right[k]) = (1.0, 0.0);
+        self.normal(&self.all(x, &segments), &segments)
     }
 }

@@ -1,25 +1,22 @@
 //! From smoothed accelerations to longer and longer segments of motion.
 
+use super::choices::{check_errors, chosen, met, sensors};
 use super::covariance::{Root, Weighing, agreement, long_run, scores};
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual};
 use super::innovations::Disturbances;
+use super::pieces::{LEAST_SEGMENT, Pieces};
 use super::quality::{
     CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
 };
 use super::smoothed::{Met, States};
-use super::solve::{Normal, Problem, Sensor, SensorKind};
+use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
-use super::{Between, IdentifyError, IdentifyOptions, by_forces};
+use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
-use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
-use crate::recording::{Recording, Targets, deviation, rms};
+use crate::recording::{Recording, deviation, rms};
 
-/// Samples in a row that are needed.
-const LEAST_SAMPLES: usize = 12;
-/// Samples of the first, short segments at least.
-const LEAST_SEGMENT: usize = 6;
 /// Times in which the motion changes that a first segment lasts.
 const PACES: f64 = 2.5;
 /// Samples that are followed at most.
@@ -38,6 +35,12 @@ const MANY: usize = 8;
 /// Residual over the spread of a coordinate up to which it is that of the integration, a few times [`LEAST_NOISE`].
 const EXACT: f64 = 5.0 * LEAST_NOISE;
 const ITERATIONS: usize = 40;
+/// Samples of a trajectory that tell its own noise.
+const MANY_SAMPLES: usize = 40;
+/// Logarithm of the noise of a trajectory over that of all from which on it has a noise of its own.
+const UNLIKE: f64 = 0.25;
+/// Of the last fit, whose constants are the result: one that is not done by then has not converged.
+const LAST_ITERATIONS: usize = 200;
 
 /// Constants, sensors and starts with the normal equations there.
 #[derive(Clone)]
@@ -52,6 +55,12 @@ impl Fitted {
     /// Mean square of the residuals.
     fn mean_square(&self) -> f64 {
         self.normal.square / self.normal.count.max(1.0)
+    }
+
+    /// `true` for a fit that arrived at the noise with every constant inside of its range: a better one is not to be expected.
+    fn is_plain(&self) -> bool {
+        let inside = !self.normal.held.contains(&true);
+        self.normal.converged && inside && self.mean_square() < EXPLAINED * EXPLAINED
     }
 
     /// Variance of the unknowns over that of independent noise of the given size: the mean square of the residuals, or what the
@@ -97,7 +106,8 @@ pub fn identify(
     if recording.n() != n {
         return Err(IdentifyError::Coordinates { expected: n, found: recording.n() });
     }
-    recording.tracks.iter().try_for_each(|track| track.validate(n))?;
+    recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;
+    check_errors(recording, &options.errors)?;
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
     let met = met(instance, recording, options)?;
@@ -105,31 +115,28 @@ pub fn identify(
     stop.stage("equations of motion");
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
-    let longest = recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0);
-    if longest < LEAST_SAMPLES {
-        return Err(IdentifyError::Short { found: longest, needed: LEAST_SAMPLES });
-    }
     stop.check()?;
     stop.stage("smoothed motion");
-    let smoothing =
-        Smoothing::choose(recording, &SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() })?;
-    let smooth = |track: &crate::recording::RecordedTrajectory| {
-        (track.len() >= LEAST_SAMPLES).then(|| smoothing.apply(track)).transpose()
-    };
-    let smoothed = recording.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+    let pieces = Pieces::new(recording, options)?;
     let spread: Vec<f64> = (0..n).map(|i| spread_of(recording, i)).collect();
-    let noise: Vec<f64> = (0..n).map(|i| smoothing.coordinates[i].noise.sigma.max(LEAST_NOISE * spread[i])).collect();
+    let least: Vec<f64> = spread.iter().map(|spread| LEAST_NOISE * spread).collect();
+    let known = options.noise.is_some() || !options.errors.is_empty();
+    let noise = |i: usize| match options.errors.is_empty() {
+        true => pieces.noise[i].max(least[i]),
+        false => rms(options.errors.iter().flat_map(|errors| errors.iter().skip(i).step_by(n)).copied()),
+    };
+    let mut noise: Vec<f64> = (0..n).map(noise).collect();
     let forced = recording.tracks.iter().any(|track| !track.force.is_empty());
     let course = Course {
         recording,
         equations: &equations,
         chosen: chosen.len(),
         between: options.between.unwrap_or(Between::Linear),
-        step: smoothing.step,
+        step: pieces.step,
         substeps: 1,
     };
     let start: Vec<f64> = chosen.iter().map(|&k| instance.parameters[k]).collect();
-    let mut x: Vec<f64> = start.iter().copied().chain(sensors.iter().map(|sensor| sensor.perfect())).collect();
+    let given: Vec<f64> = start.iter().copied().chain(sensors.iter().map(|sensor| sensor.perfect())).collect();
     let mut problem = Problem {
         course,
         values: instance.parameters.clone(),
@@ -138,28 +145,34 @@ pub fn identify(
         sensors,
         sigma: noise.clone(),
         sigma_of: Vec::new(),
+        errors: &options.errors,
+        gaps: pieces.gaps(),
         spread,
         robust: options.robust,
         disturbances: Disturbances::default(),
         threads: options.threads.max(1),
         cancellation: options.cancellation.clone(),
     };
-
     stop.check()?;
-    let mut states = States::new(&problem, &smoothed);
+    let mut x = given.clone();
+    let on_pieces = Problem { course: Course { recording: &pieces.long, ..problem.course.clone() }, ..problem.clone() };
+    let mut states = States::new(&on_pieces, &pieces.smoothed);
     if met == Met::Forces {
-        let segments = cut(recording, &smoothed, LEAST_SEGMENT, n);
         stop.stage("forces");
-        return by_forces::identify(instance, &problem, (&smoothing, &mut states), (x, segments));
+        let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
+        let mut found = by_forces::identify(instance, &on_pieces, (smoothing, &mut states), (x, pieces.cut_long()))?;
+        for outlier in &mut found.outliers {
+            (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
+        }
+        return Ok(Identified { obstacles: pieces.still, ..found });
     }
-    if states.len(n) > 0 && !states.fit(&problem, &mut x, met) {
+    if states.len(n) > 0 && states.fit(&on_pieces, &mut x, met).is_none() {
         return Err(IdentifyError::Singular);
     }
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
-    let samples = first_samples(&states, (n, smoothing.step), options.segment)?;
-    let segments = cut(recording, &smoothed, samples, n);
+    let samples = first_samples(&states, (n, pieces.step), options.segment)?;
     stop.stage("short segments");
-    let mut fitted = first(&mut problem, x, segments)?;
+    let mut fitted = first(&mut problem, [x, given.clone()], pieces.cut(samples))?;
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
@@ -167,101 +180,41 @@ pub fn identify(
         fitted = best_between(&mut problem, fitted);
     }
     if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
-        refit(&problem, &mut fitted);
+        refit(&problem, &mut fitted, ITERATIONS);
     }
-    if options.noise.is_none() {
+    if !known {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
-        refit(&problem, &mut fitted);
+        refit(&problem, &mut fitted, ITERATIONS);
     }
     stop.stage("longer segments");
     fitted = grown(&mut problem, fitted, options.segment);
     if forced {
         problem.estimate_force_noise(&fitted.x, &fitted.segments);
     }
-    if options.noise.is_none() {
+    if !known {
         weigh(&mut problem, &fitted);
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
     }
-    refit(&problem, &mut fitted);
+    refit(&problem, &mut fitted, LAST_ITERATIONS);
+    fitted = released(&problem, fitted, &given);
+    if !problem.sigma_of.is_empty() {
+        let own = |i: usize| {
+            let squares = recording.tracks.iter().zip(&pieces.noise_of);
+            squares.map(|(track, noise)| track.len() as f64 * noise[i].powi(2)).sum::<f64>()
+        };
+        noise = (0..n).map(|i| (own(i) / recording.samples() as f64).sqrt().max(least[i])).collect();
+    }
     stop.check()?;
     stop.stage("what is determined");
-    let found = result(instance, &problem, &fitted, (&start, &noise), options);
+    let mut found = result(instance, &problem, &fitted, (&start, &noise), known);
     stop.check()?;
-    Ok(found)
-}
-
-/// What is met.
-fn met(instance: &SystemInstance<f64>, recording: &Recording, options: &IdentifyOptions) -> Result<Met, IdentifyError> {
-    let driven = recording.is_driven();
-    // A joint that nothing drives has a known force of 0.
-    let mut forces = recording.tracks.iter().flat_map(|track| &track.force);
-    let pushed = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
-    // Both belong to motion that is followed.
-    let follows = options.segment.is_some()
-        || [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
-    let refused = |expected: &str, found: &str| {
-        let (expected, found) = (expected.to_string(), found.to_string());
-        Err(IdentifyError::Option { what: "targets", expected, found })
-    };
-    match options.targets {
-        Some(Targets::Motion) => Ok(Met::Accelerations),
-        Some(Targets::Forces) if !pushed => refused("motion, of a recording without known forces", "forces"),
-        Some(Targets::Forces) if follows => {
-            refused("motion, beside unknown constants of sensors or a length of segments", "forces")
-        }
-        Some(Targets::Forces) => Ok(Met::Forces),
-        Some(Targets::Measured) => refused("motion or forces", "measured"),
-        Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),
-        None if instance.system.is_chain() && driven && !follows => Ok(Met::Forces),
-        None => Ok(Met::Accelerations),
+    if pieces.still.len() == n {
+        // Of coordinates that all stand still no form is seen to be right.
+        let coordinate = recording.coordinates[0].clone();
+        (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
     }
-}
-
-/// Parameters that are unknown.
-fn chosen(instance: &SystemInstance<f64>, options: &IdentifyOptions) -> Result<Vec<usize>, IdentifyError> {
-    let parameters = &instance.system.parameters;
-    let mut chosen = Vec::new();
-    for symbol in &options.constants {
-        let known = || parameters.iter().map(|parameter| parameter.symbol.to_string()).collect();
-        let found = parameters.iter().position(|parameter| parameter.symbol == *symbol);
-        let at = found.ok_or_else(|| IdentifyError::Constant { symbol: symbol.clone(), known: known() })?;
-        if chosen.contains(&at) {
-            return Err(IdentifyError::Repeated { what: "constants", name: symbol.clone() });
-        }
-        chosen.push(at);
-    }
-    if chosen.is_empty() {
-        let learned: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k].learn).collect();
-        chosen = if learned.is_empty() { (0..parameters.len()).collect() } else { learned };
-    }
-    chosen.sort_unstable();
-    match chosen.is_empty() {
-        true => Err(IdentifyError::Nothing { system: instance.system.name.to_string() }),
-        false => Ok(chosen),
-    }
-}
-
-/// Sensors with unknown constants.
-fn sensors(recording: &Recording, options: &IdentifyOptions) -> Result<Vec<Sensor>, IdentifyError> {
-    let mut sensors = Vec::new();
-    let all = [
-        ("offsets", SensorKind::Offset, &options.offsets),
-        ("gains", SensorKind::Gain, &options.gains),
-        ("delays", SensorKind::Delay, &options.delays),
-    ];
-    for (what, kind, names) in all {
-        for name in names {
-            let missing = || IdentifyError::Sensor { what, name: name.clone(), known: recording.coordinates.clone() };
-            let coordinate = recording.coordinates.iter().position(|known| known == name).ok_or_else(missing)?;
-            let sensor = Sensor { kind, coordinate };
-            if sensors.contains(&sensor) {
-                return Err(IdentifyError::Repeated { what, name: name.clone() });
-            }
-            sensors.push(sensor);
-        }
-    }
-    Ok(sensors)
+    Ok(Identified { obstacles: pieces.still, ..found })
 }
 
 /// Standard deviation of a coordinate over all samples; 1 for one that rests.
@@ -287,22 +240,6 @@ fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) 
     Ok(samples.min(wanted))
 }
 
-/// Segments of about so many samples that start where smoothing says.
-fn cut(recording: &Recording, smoothed: &[Option<Smoothed>], samples: usize, n: usize) -> Vec<Segment> {
-    let mut segments = Vec::new();
-    for (track, (recorded, smoothed)) in recording.tracks.iter().zip(smoothed).enumerate() {
-        let Some(smoothed) = smoothed else { continue };
-        let length = recorded.len();
-        let count = ((length + samples / 2) / samples).max(1);
-        for k in 0..count {
-            let (first, end) = (k * length / count, (k + 1) * length / count);
-            let [q, v] = [&smoothed.q, &smoothed.v].map(|values| &values[first * n..(first + 1) * n]);
-            segments.push(Segment { track, first, samples: end - first, start: [q, v].concat() });
-        }
-    }
-    thinned(segments)
-}
-
 /// Segments of as many samples as are followed: runs of segments that follow each other, so that they can be joined later.
 pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
     const RUN: usize = 16;
@@ -316,30 +253,63 @@ pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
     segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }
 
-/// The fit of the first segments; those that cannot be followed are left out.
-fn first(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
+/// The fit of the first segments from either of two starts, the better one; segments that cannot be followed are left out. The second
+/// start is tried where the first one does not arrive at the noise.
+fn first(problem: &mut Problem<'_>, starts: [Vec<f64>; 2], segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
+    let mut best: Option<Fitted> = None;
+    for x in starts {
+        if best.as_ref().is_some_and(Fitted::is_plain) {
+            break;
+        }
+        let tried = first_from(problem, x, segments.clone());
+        problem.cancellation.check()?;
+        let Some(tried) = tried else { continue };
+        if best.as_ref().is_none_or(|best| tried.normal.square < best.normal.square) {
+            best = Some(tried);
+        }
+    }
+    let best = best.ok_or(IdentifyError::Lost)?;
+    problem.course.substeps = best.substeps;
+    log(&best, "first");
+    Ok(best)
+}
+
+/// The fit of the first segments from given values.
+fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Option<Fitted> {
+    problem.course.substeps = 1;
     choose_steps(problem, &x, &segments);
     let followed = problem.all(&x, &segments);
-    problem.cancellation.check()?;
     let mut kept = followed.iter().map(Option::is_some);
     segments.retain(|_| kept.next().unwrap_or(false));
     if segments.is_empty() {
-        return Err(IdentifyError::Lost);
+        return None;
     }
     problem.settle(&x, &mut segments, 6);
-    let mut x = x;
-    let normal = problem.fit(&mut x, &mut segments, ITERATIONS);
-    let mut fitted = Fitted { x, segments, normal, substeps: problem.course.substeps };
+    let mut fitted = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
+    refit(problem, &mut fitted, ITERATIONS);
     if choose_steps(problem, &fitted.x, &fitted.segments) {
-        refit(problem, &mut fitted);
+        refit(problem, &mut fitted, ITERATIONS);
     }
-    log(&fitted, "first");
-    Ok(fitted)
+    Some(fitted)
 }
 
-fn refit(problem: &Problem<'_>, fitted: &mut Fitted) {
+/// The better one of a fit with constants at their bounds and of that from the values these were given.
+fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
+    if !fitted.normal.held.contains(&true) {
+        return fitted;
+    }
+    let mut tried = fitted.clone();
+    for (k, x) in tried.x.iter_mut().enumerate().filter(|(k, _)| fitted.normal.held[*k]) {
+        *x = given[k];
+    }
+    refit(problem, &mut tried, LAST_ITERATIONS);
+    let better = tried.normal.square < fitted.normal.square && tried.normal.converged >= fitted.normal.converged;
+    if better { tried } else { fitted }
+}
+
+fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
     fitted.substeps = problem.course.substeps;
-    fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, ITERATIONS);
+    fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
 }
 
 fn log(fitted: &Fitted, what: &str) {
@@ -382,7 +352,7 @@ fn best_between(problem: &mut Problem<'_>, fitted: Fitted) -> Fitted {
         problem.course.between = between;
         let mut tried = best.1.clone();
         problem.settle(&tried.x, &mut tried.segments, 3);
-        refit(problem, &mut tried);
+        refit(problem, &mut tried, ITERATIONS);
         tracing::debug!(?between, square = tried.mean_square(), "forces");
         if tried.normal.square < best.1.normal.square {
             best = (between, tried);
@@ -392,25 +362,44 @@ fn best_between(problem: &mut Problem<'_>, fitted: Fitted) -> Fitted {
     best.1
 }
 
-/// Weighs coordinates by the residuals that are left.
+/// Weighs coordinates by the residuals that are left, and those of every trajectory by its own where trajectories plainly differ.
 fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
-    let n = problem.sigma.len();
+    let (n, tracks) = (problem.sigma.len(), problem.course.recording.tracks.len());
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
     let taken = fitted.normal.count / residuals.iter().map(|r| r.len() as f64).sum::<f64>();
-    for i in 0..n {
-        let own = || residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n)).filter(|r| r.is_finite());
-        let square = own().map(|r| r * r).sum::<f64>() / own().count().max(1) as f64 / taken;
-        if problem.robust {
-            // The median of the size of normal numbers is 0.6745 of their deviation.
-            let mut sizes: Vec<f64> = own().map(|r| r.abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let usual = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0) / 0.6745;
-            problem.sigma[i] *= f64::max(usual / taken.sqrt(), 1e-3);
-        } else {
-            problem.sigma[i] *= f64::max(square.sqrt(), 1e-3);
+    // Residuals in the units of the coordinates, `(tracks, n)`.
+    let mut own = vec![Vec::new(); tracks * n];
+    for (segment, residuals) in fitted.segments.iter().zip(&residuals) {
+        for (k, r) in residuals.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+            own[segment.track * n + k % n].push(r * problem.sigma_at(segment.track, segment.first + k / n, k % n));
         }
-        problem.sigma[i] = problem.sigma[i].max(LEAST_NOISE * problem.spread[i]);
     }
+    let mut of = vec![vec![0.0; n]; tracks];
+    let mut unlike = false;
+    for i in 0..n {
+        let least = LEAST_NOISE * problem.spread[i];
+        let size = |values: Vec<f64>| (deviation_of(values, problem.robust) / taken.sqrt()).max(least);
+        let whole = size(own.iter().skip(i).step_by(n).flatten().copied().collect());
+        problem.sigma[i] = whole.max(1e-3 * problem.sigma[i]);
+        for (track, of) in of.iter_mut().enumerate() {
+            let values = &own[track * n + i];
+            let count = values.len() as f64;
+            of[i] = if values.len() < MANY_SAMPLES { whole } else { size(values.clone()) };
+            // The logarithm of a standard deviation scatters by the root of half a count.
+            unlike |= (of[i] / whole).ln().abs() > UNLIKE.max(5.0 / (2.0 * count).sqrt());
+        }
+    }
+    problem.sigma_of = if unlike { of } else { Vec::new() };
+}
+
+/// Root mean square, or what the median of the size says of normal numbers, which is 0.6745 of it.
+fn deviation_of(mut values: Vec<f64>, robust: bool) -> f64 {
+    if !robust {
+        return rms(values.into_iter());
+    }
+    values.iter_mut().for_each(|x| *x = x.abs());
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0) / 0.6745
 }
 
 /// Pairs of segments that follow each other as one.
@@ -460,7 +449,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
         }
         let mut shorter = Fitted { segments, ..fitted.clone() };
         problem.settle(&shorter.x, &mut shorter.segments, 3);
-        refit(problem, &mut shorter);
+        refit(problem, &mut shorter, ITERATIONS);
         log(&shorter, "shorter");
         if shorter.normal.failed > 0 || shorter.spread() > fitted.spread() - GAIN {
             break;
@@ -482,7 +471,7 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         let mut longer = Fitted { segments, ..fitted.clone() };
         choose_steps(problem, &longer.x, &longer.segments);
         problem.settle(&longer.x, &mut longer.segments, 6);
-        refit(problem, &mut longer);
+        refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");
         let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square();
         if wanted.is_none() && !(met && longer.spread() < fitted.spread() - GAIN) {
@@ -508,7 +497,7 @@ fn result(
     problem: &Problem<'_>,
     fitted: &Fitted,
     (start, noise): (&[f64], &[f64]),
-    options: &IdentifyOptions,
+    known: bool,
 ) -> Identified {
     let n = problem.sigma.len();
     let recording = problem.course.recording;
@@ -540,9 +529,9 @@ fn result(
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
     let lags = follow.iter().filter(|of| !is_white(of)).map(|of| 2 * of.length).max();
     let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
-    let (normal, inflation) = informed(problem, fitted, (weighing, lags), options.noise.is_some());
+    let (normal, inflation) = informed(problem, fitted, (weighing, lags), known);
     let verdict = Evidence {
-        converged: true,
+        converged: fitted.normal.converged,
         sizes: (0..n).map(size).collect(),
         exact: (0..n).map(|i| EXACT * problem.spread[i]).collect(),
         residuals: &by_coordinate,
@@ -552,6 +541,8 @@ fn result(
     }
     .verdict();
     Identified {
+        converged: fitted.normal.converged,
+        decrement: fitted.normal.decrement,
         explained: verdict.explains(),
         verdict,
         over_noise: over_noise(&by_coordinate),
@@ -568,7 +559,8 @@ fn result(
         ..unknowns(
             instance,
             problem,
-            &Fitted { normal, ..fitted.clone() },
+            // A constant at its bound is known as if it had been given.
+            &Fitted { normal: normal.with_held(), ..fitted.clone() },
             (start, 1.0),
             (Met::Accelerations, &normal_at),
         )

@@ -15,7 +15,7 @@ fn given(pairs: &Pairs<'_>) -> Vec<(String, String)> {
 }
 
 /// Motion of a model from some starts, `(2, n)` each, with noise of every coordinate.
-fn recorded(
+pub(super) fn recorded(
     instance: &SystemInstance<f64>,
     starts: &[&[f64]],
     (t_end, dt): (f64, f64),
@@ -24,25 +24,30 @@ fn recorded(
 ) -> Recording {
     let n = instance.coordinates;
     let model = instance.build().unwrap();
-    let mut rng = RngStream::Trajectories.generator(seed);
     let track = |start: &&[f64]| {
         let motion = model.rollout(&start[..n], &start[n..], t_end, dt).unwrap();
-        let mut q = motion.q;
-        for (k, q) in q.iter_mut().enumerate() {
-            let draw: f64 = StandardNormal.sample(&mut rng);
-            *q += noise[k % n] * draw;
-        }
-        RecordedTrajectory { name: "run".into(), times: motion.t, q, v: vec![], a: vec![], force: vec![] }
+        RecordedTrajectory { name: "run".into(), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] }
     };
     let coordinates = instance.system.coordinates(n);
-    Recording {
+    let mut recording = Recording {
         coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
         periodic: coordinates.iter().map(|c| c.periodic).collect(),
         tracks: starts.iter().map(track).collect(),
+    };
+    self::noise(&mut recording, noise, seed);
+    recording
+}
+
+/// Adds noise to every coordinate.
+pub(super) fn noise(recording: &mut Recording, sigma: &[f64], seed: u64) {
+    let (n, mut rng) = (sigma.len(), RngStream::Trajectories.generator(seed));
+    for (k, q) in recording.tracks.iter_mut().flat_map(|track| track.q.iter_mut().enumerate()) {
+        let draw: f64 = StandardNormal.sample(&mut rng);
+        *q += sigma[k % n] * draw;
     }
 }
 
-fn described(text: &str, pairs: &Pairs<'_>) -> SystemInstance<f64> {
+pub(super) fn described(text: &str, pairs: &Pairs<'_>) -> SystemInstance<f64> {
     let description: Description = serde_json::from_str(text).unwrap();
     configure_system(Cow::Owned(description.system().unwrap()), &given(pairs)).unwrap()
 }
@@ -125,6 +130,29 @@ fn what_a_larger_motion_would_tell_is_said() {
     let large = recorded(&spring(&[]), &[&[1.5, 0.0]], (20.0, 0.05), &[1e-4], 2);
     let found = identify(&spring(&[]), &large, &IdentifyOptions::default()).unwrap();
     assert!(found.undetermined.is_empty(), "{found:?}");
+}
+
+/// What is known is `offset + gain r`, which is neither a sum nor a product.
+#[test]
+fn what_has_no_name_is_told_in_numbers() {
+    let spring = |pairs: &Pairs<'_>| {
+        let text = r#"{"name": "spring", "lagrangian": "x_dot^2/2 - k*(x - r)^2/2",
+            "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-4, 4]}],
+            "parameters": {"k": {"default": 3, "range": "positive"}, "r": 0.2}}"#;
+        described(text, pairs)
+    };
+    let recording = recorded(&spring(&[("k", 4.0), ("r", 0.35)]), &[&[1.0, 0.0]], (8.0, 0.02), &[1e-3], 4);
+    let x = || vec!["x".to_string()];
+    let options = IdentifyOptions { offsets: x(), gains: x(), ..Default::default() };
+    let found = identify(&spring(&[]), &recording, &options).unwrap();
+    let [open] = &found.undetermined[..] else { panic!("{:?}", found.undetermined) };
+    assert!(open.known.is_empty() && open.constants.len() == 3 && open.directions.len() == 2, "{open:?}");
+    let k = &found.constants[0];
+    assert!((k.value - 4.0).abs() < 4.0 * k.standard_error.unwrap(), "{k:?}");
+    // With one sensor constant there is a name.
+    let found = identify(&spring(&[]), &recording, &IdentifyOptions { offsets: x(), ..Default::default() }).unwrap();
+    let known = &found.undetermined[0].known[0];
+    assert!(!known.product && (known.value - 0.35).abs() < 4.0 * known.standard_error, "{known:?}");
 }
 
 #[test]

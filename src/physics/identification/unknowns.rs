@@ -72,9 +72,10 @@ pub(super) fn unknowns(
     let constants = start.iter().enumerate().map(|(k, &start)| Constant {
         symbol: names.all[k].to_string(),
         value: x[k],
-        standard_error: errors[k],
+        standard_error: errors[k].filter(|_| !fitted.normal.held[k]),
         unit: names.units[k].to_string(),
         start,
+        at_bound: fitted.normal.held[k],
     });
     let sensors = problem.sensors.iter().zip(start.len()..).map(|(sensor, k)| SensorConstant {
         kind: kind(sensor.kind),

@@ -79,6 +79,49 @@ fn rows_and_open_directions_are_named() {
     assert!(shown.code == Some(0) && shown.stdout.contains("301"), "{}", shown.stdout);
 }
 
+/// A pendulum seen in two parts of an hour apart, every state by two instruments, each with its error in degrees.
+#[test]
+fn gaps_repeated_times_and_errors_of_rows_are_taken_as_they_are() {
+    let folder = Folder::new();
+    let (start, system) =
+        (["--state", "1.2,0", "--t-end", "40", "--dt", "0.05"], ["--system", "n-pendulum", "--param", "n=1"]);
+    let made = lnn(&[&["rollout"], &system[..], &start, &["--param", "l=0.7", "--out", "-"]].concat());
+    assert_eq!(made.code, Some(0), "{}", made.stderr);
+    let rows: Vec<Vec<f64>> =
+        made.stdout.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    let write = |name: &str, rows: &[String]| {
+        let path = folder.path(name);
+        fs::write(&path, format!("t,theta,sigma\n{}\n", rows.join("\n"))).unwrap();
+        text(&path)
+    };
+    let seen = rows.iter().enumerate().filter(|(k, _)| k % 400 < 60).flat_map(|(k, row)| {
+        let off = |size: f64, phase: f64| row[1].to_degrees() + size * (7.7 * k as f64 * k as f64 + phase).sin();
+        [format!("{},{},0.1", row[0], off(0.14, 0.0)), format!("{},{},2", row[0], off(2.8, 1.0))]
+    });
+    let seen: Vec<String> = seen.collect();
+    let path = write("seen.csv", &seen);
+    let run = |path: &str| {
+        let columns = ["--units", "theta=deg", "--error", "sigma", "--constants", "l", "--json"];
+        lnn(&[&["identify", path], &system[..], &columns].concat())
+    };
+    let found = run(&path);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let found: Value = serde_json::from_str(&found.stdout).unwrap();
+    let [value, error] = ["value", "standard_error"].map(|key| found["constants"]["l"][key].as_f64().unwrap());
+    assert!((value - 0.7).abs() < 5.0 * error && error < 2e-4, "{value} {error}");
+    assert_eq!((&found["converged"], &found["samples"]), (&Value::Bool(true), &Value::from(seen.len())), "{found}");
+    // An error that is none is named by its row.
+    for wrong in ["0", "-1"] {
+        let mut rows = seen.clone();
+        rows[4] = format!("{},{wrong}", rows[4].rsplit_once(',').unwrap().0);
+        let refused = run(&write("wrong.csv", &rows));
+        refused.refused(1, &["row 6", "sigma", "above 0"]);
+    }
+    // Who does not follow the motion goes on refusing repeated times.
+    let checked = lnn(&["check", &path, "--coords", "theta"]);
+    assert!(checked.code == Some(1) && checked.stderr.contains("row 3"), "{}", checked.stderr);
+}
+
 #[test]
 fn what_free_pendula_tell_is_the_same_from_every_start() {
     let truth = [("m1", 1.0), ("m2", 1.0), ("l1", 1.0), ("l2", 1.0), ("c1", 0.08), ("c2", 0.05), ("g", 9.81)];
@@ -119,6 +162,8 @@ fn a_listed_system_serves_and_what_is_wrong_is_named() {
         (&[SYSTEM, "--gain", "theta3"], 2, "--gain"),
         (&[SYSTEM, "--coords", "theta1"], 2, "--coords"),
         (&[SYSTEM, "--noise", "0.1"], 2, "--noise"),
+        (&[SYSTEM, "--error", "sigma"], 2, "--error"),
+        (&[SYSTEM, "--error", "s1,s2"], 1, "s1"),
         (&[SYSTEM, "--param", "m9=1"], 2, "--param"),
         (&[SYSTEM, "--segment", "0"], 2, "--segment"),
         (&["particle-on-ellipse", "--coords", "theta1,theta2"], 2, "--system"),

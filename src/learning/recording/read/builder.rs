@@ -18,6 +18,8 @@ pub struct TrackBuilder {
     pub rows: Rows,
     /// The measured track, its name empty.
     pub track: RecordedTrajectory,
+    /// Standard deviations of its positions, `(samples, n)`; empty if there are none.
+    pub error: Vec<f64>,
     /// The row before, as it stands in the file.
     last: Vec<f64>,
     last_row: u64,
@@ -69,14 +71,16 @@ impl<'a> Builder<'a> {
                 self.duplicates += 1;
                 return Ok(());
             }
-            let hint = match (values[0] == open.last[0], label.is_none()) {
-                (true, _) => " with other values",
-                (false, true) => " (another trajectory? give it a file or a column of its own)",
-                (false, false) => "",
-            };
-            let column = self.selection.values[0].name.clone();
-            let (before_row, before) = (open.last_row, open.last[0]);
-            return Err(Problem::Order { row, column, before_row, before, found: values[0], hint });
+            if !(self.columns.whole && values[0] == open.last[0]) {
+                let hint = match (values[0] == open.last[0], label.is_none()) {
+                    (true, _) => " with other values",
+                    (false, true) => " (another trajectory? give it a file or a column of its own)",
+                    (false, false) => "",
+                };
+                let column = self.selection.values[0].name.clone();
+                let (before_row, before) = (open.last_row, open.last[0]);
+                return Err(Problem::Order { row, column, before_row, before, found: values[0], hint });
+            }
         }
         open.last.clear();
         open.last.extend_from_slice(values);
@@ -118,6 +122,13 @@ impl<'a> Builder<'a> {
                 part.push(value?);
             }
         }
+        for (name, error) in self.columns.error.iter().zip(scaled) {
+            let error = error?;
+            if error <= 0.0 {
+                return Err(Problem::Error { row, column: name.clone(), found: error });
+            }
+            open.error.push(error);
+        }
         Ok(())
     }
 
@@ -149,7 +160,8 @@ impl<'a> Builder<'a> {
             force: room(force.len()),
             ..empty()
         };
-        self.tracks.push(TrackBuilder { label, rows: Rows::default(), track, last: Vec::new(), last_row: 0 });
+        let (rows, error, last) = (Rows::default(), Vec::new(), Vec::new());
+        self.tracks.push(TrackBuilder { label, rows, track, error, last, last_row: 0 });
         Ok(())
     }
 }

@@ -142,6 +142,16 @@ pub enum Problem {
         /// A possible reason.
         hint: &'static str,
     },
+    /// A standard deviation that is none.
+    #[error("row {row}, column {column}: expected a standard deviation above 0, found {found}")]
+    Error {
+        /// The row.
+        row: u64,
+        /// The column.
+        column: String,
+        /// What stands there.
+        found: f64,
+    },
     /// A header and nothing below.
     #[error("no rows of numbers")]
     NoRows,

@@ -35,7 +35,8 @@ const MAX_BYTES: u64 = 1 << 36;
 /// by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order),
 /// anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks, with or without a header and with
 /// comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Numbers are converted to SI; angles are
-/// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted.
+/// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps
+/// trajectories whole across all gaps.
 ///
 /// # Errors
 /// [`DataError`], naming the file and, where there is one, row and column.
@@ -67,9 +68,9 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
     let name = path.display().to_string();
     let mut most = 0;
     for track in builder.tracks {
-        most = most.max(pieces::add(&name, track, reading));
+        most = most.max(pieces::add(&name, track, columns.whole, reading));
     }
-    if most < LEAST { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
+    if most < LEAST && !columns.whole { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
 }
 
 /// Tells the format and reads the rows.

@@ -14,9 +14,9 @@ const UNSURE: f64 = 1.5;
 /// Adds the stretches of a trajectory between long gaps, those of few samples left out; gives the samples of the longest.
 ///
 /// A trajectory goes on across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
-/// is a guess, and where gaps are longer, it is cut.
-pub fn add(file: &str, builder: TrackBuilder, reading: &mut LoadedRecording) -> usize {
-    let TrackBuilder { label, rows, mut track, .. } = builder;
+/// is a guess, and where gaps are longer, it is cut unless it is to stay whole.
+pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedRecording) -> usize {
+    let TrackBuilder { label, rows, mut track, error, .. } = builder;
     let clock = Clock::of(&track.times);
     let mut bounds = vec![0];
     let mut turned = Vec::new();
@@ -33,7 +33,7 @@ pub fn add(file: &str, builder: TrackBuilder, reading: &mut LoadedRecording) -> 
             reading.bridged.rows += missing;
             reading.bridged.longest = reading.bridged.longest.max(missing);
             turned.push((k + 1, turns));
-        } else {
+        } else if !whole {
             let (before, after) = (rows.row(k), rows.row(k + 1));
             reading.cuts.push(Cut { file: file.to_string(), before, after, seconds, steps: seconds / clock.step });
             bounds.push(k + 1);
@@ -52,7 +52,7 @@ pub fn add(file: &str, builder: TrackBuilder, reading: &mut LoadedRecording) -> 
         let (start, end) = (pair[0], pair[1]);
         let (samples, first, last) = (end - start, rows.row(start), rows.row(end.saturating_sub(1)));
         most = most.max(samples);
-        if samples < LEAST {
+        if samples < LEAST && !whole {
             reading.dropped.push(Dropped { file: file.to_string(), first, last, samples });
             continue;
         }
@@ -71,6 +71,9 @@ pub fn add(file: &str, builder: TrackBuilder, reading: &mut LoadedRecording) -> 
             }
         };
         reading.recording.tracks.push(part);
+        if !error.is_empty() {
+            reading.errors.push(error[start * n..end * n].to_vec());
+        }
         reading.rows.push(rows.part(start, end));
         reading.takes.push(take);
     }

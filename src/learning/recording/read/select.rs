@@ -20,7 +20,7 @@ pub struct Used {
 pub struct Selection {
     /// Columns of the file.
     pub width: usize,
-    /// Time if it is a column, coordinates, velocities, accelerations, forces.
+    /// Time if it is a column, coordinates, velocities, accelerations, forces, errors.
     pub values: Vec<Used>,
     /// `true` if the first of them is the time.
     pub timed: bool,
@@ -56,7 +56,13 @@ impl Selection {
                     }
                 },
             };
-            Ok(Used { name: name.to_string(), position, factor: columns.factor(name) })
+            let own = columns.units.iter().any(|(column, _)| column == name);
+            // An error is in the unit of its coordinate unless it has one of its own.
+            let coordinate = columns.error.iter().position(|error| error == name && !own);
+            let unit = coordinate.and_then(|k| columns.coords.get(k)).map_or(name, String::as_str);
+            // The sign of a factor turns positions around, not their errors.
+            let factor = columns.factor(unit) * if coordinate.is_some() { columns.factor(unit).signum() } else { 1.0 };
+            Ok(Used { name: name.to_string(), position, factor })
         };
         let time = match (&columns.time, columns.rate) {
             (Some(name), _) => Some(find("time", name)?),
@@ -76,6 +82,7 @@ impl Selection {
             ("velocity", &columns.velocity),
             ("acceleration", &columns.acceleration),
             ("force", &columns.force),
+            ("error", &columns.error),
         ] {
             for name in list {
                 values.push(find(what, name)?);

@@ -1,0 +1,106 @@
+//! What a user chose: unknown constants, sensors, errors, and what is met.
+
+use super::smoothed::Met;
+use super::solve::{Sensor, SensorKind};
+use super::{IdentifyError, IdentifyOptions};
+use crate::lagrangian::SystemInstance;
+use crate::names::pluralize;
+use crate::recording::{Recording, Targets};
+
+/// Errors of positions: one positive number for each of them.
+pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result<(), IdentifyError> {
+    if errors.is_empty() {
+        return Ok(());
+    }
+    for (at, track) in recording.tracks.iter().enumerate() {
+        let own = errors.get(at).map_or(&[][..], Vec::as_slice);
+        let (track, expected) = (track.name.clone(), track.q.len());
+        if own.len() != expected {
+            return Err(IdentifyError::Errors { track, expected, found: pluralize(own.len(), "number", "numbers") });
+        }
+        if let Some(sample) = own.iter().position(|x| !(x.is_finite() && *x > 0.0)) {
+            let found = format!("{} of sample {}", own[sample], sample / recording.n());
+            return Err(IdentifyError::Errors { track, expected, found });
+        }
+    }
+    Ok(())
+}
+
+/// What is met.
+pub(super) fn met(
+    instance: &SystemInstance<f64>,
+    recording: &Recording,
+    options: &IdentifyOptions,
+) -> Result<Met, IdentifyError> {
+    let driven = recording.is_driven();
+    // A joint that nothing drives has a known force of 0.
+    let mut forces = recording.tracks.iter().flat_map(|track| &track.force);
+    let pushed = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
+    // Both belong to motion that is followed.
+    let follows = options.segment.is_some()
+        || !options.errors.is_empty()
+        || [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
+    let refused = |expected: &str, found: &str| {
+        let (expected, found) = (expected.to_string(), found.to_string());
+        Err(IdentifyError::Option { what: "targets", expected, found })
+    };
+    match options.targets {
+        Some(Targets::Motion) => Ok(Met::Accelerations),
+        Some(Targets::Forces) if !pushed => refused("motion, of a recording without known forces", "forces"),
+        Some(Targets::Forces) if follows => refused(
+            "motion, beside unknown constants of sensors, errors of positions or a length of segments",
+            "forces",
+        ),
+        Some(Targets::Forces) => Ok(Met::Forces),
+        Some(Targets::Measured) => refused("motion or forces", "measured"),
+        Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),
+        None if instance.system.is_chain() && driven && !follows => Ok(Met::Forces),
+        None => Ok(Met::Accelerations),
+    }
+}
+
+/// Parameters that are unknown.
+pub(super) fn chosen(instance: &SystemInstance<f64>, options: &IdentifyOptions) -> Result<Vec<usize>, IdentifyError> {
+    let parameters = &instance.system.parameters;
+    let mut chosen = Vec::new();
+    for symbol in &options.constants {
+        let known = || parameters.iter().map(|parameter| parameter.symbol.to_string()).collect();
+        let found = parameters.iter().position(|parameter| parameter.symbol == *symbol);
+        let at = found.ok_or_else(|| IdentifyError::Constant { symbol: symbol.clone(), known: known() })?;
+        if chosen.contains(&at) {
+            return Err(IdentifyError::Repeated { what: "constants", name: symbol.clone() });
+        }
+        chosen.push(at);
+    }
+    if chosen.is_empty() {
+        let learned: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k].learn).collect();
+        chosen = if learned.is_empty() { (0..parameters.len()).collect() } else { learned };
+    }
+    chosen.sort_unstable();
+    match chosen.is_empty() {
+        true => Err(IdentifyError::Nothing { system: instance.system.name.to_string() }),
+        false => Ok(chosen),
+    }
+}
+
+/// Sensors with unknown constants.
+pub(super) fn sensors(recording: &Recording, options: &IdentifyOptions) -> Result<Vec<Sensor>, IdentifyError> {
+    let mut sensors = Vec::new();
+    let all = [
+        ("offsets", SensorKind::Offset, &options.offsets),
+        ("gains", SensorKind::Gain, &options.gains),
+        ("delays", SensorKind::Delay, &options.delays),
+    ];
+    for (what, kind, names) in all {
+        for name in names {
+            let missing = || IdentifyError::Sensor { what, name: name.clone(), known: recording.coordinates.clone() };
+            let coordinate = recording.coordinates.iter().position(|known| known == name).ok_or_else(missing)?;
+            let sensor = Sensor { kind, coordinate };
+            if sensors.contains(&sensor) {
+                return Err(IdentifyError::Repeated { what, name: name.clone() });
+            }
+            sensors.push(sensor);
+        }
+    }
+    Ok(sensors)
+}

@@ -1,0 +1,267 @@
+//! Levenberg and Marquardt's method for constants, sensors and starts, and when it has arrived.
+//!
+//! Of the normal equations of constants `c` and starts `s` the starts are eliminated: `S = H_cc - H_cs H_ss^-1 H_sc`, with the gradient
+//! `g = g_c - H_cs H_ss^-1 g_s`. A step is `dc = (S + damping diag S)^-1 g` and `ds = (H_ss + damping diag H_ss)^-1 g_s - H_ss^-1 H_sc dc`. Starts
+//! follow the constants undamped, so a constant that other starts almost make up for moves as fast as any other.
+//!
+//! The search has converged when the Newton decrement `g' S^-1 g`, the decrease of the sum of squares that is left to gain, is far below the
+//! variance of the noise: no constant is then farther from the minimum than a small part of its standard error. A constant at the bound of
+//! its range stays there as long as the gradient points out of the range (Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
+
+use super::follow::Segment;
+use super::linear::times;
+use super::solve::{Linear, Normal, Problem, Sensor, SensorKind};
+use crate::lagrangian::system::Range;
+use crate::linalg::{Workspace, dot, eigh};
+
+/// Newton decrement over the variance of the noise that is arrived at: constants within a thousandth of their standard errors.
+const ARRIVED: f64 = 1e-6;
+/// The same where no step, however short, gains anything: what rounding and the steps of the integrator leave.
+const STUCK: f64 = 1e-3;
+/// Part of the diagonal that keeps normal equations regular.
+pub(super) const RIDGE: f64 = 1e-11;
+/// Rounding of an eliminated diagonal, over the diagonal before starts were eliminated.
+const ELIMINATION: f64 = 1e-14;
+/// Part of the effect of an unknown, squared, that other starts do not have; integrators are no better.
+const LIKE_STARTS: f64 = 1e-8;
+/// Effect of an unknown on the motion, over the motion itself and squared, that is rounding alone.
+const NO_EFFECT: f64 = 1e-22;
+const FIRST_DAMPING: f64 = 1e-4;
+pub(super) const LEAST_DAMPING: f64 = 1e-10;
+/// Damping beyond which nothing gets better.
+pub(super) const MOST_DAMPING: f64 = 1e8;
+/// Gain of starts, over the sum of squares, that is none while they settle.
+const SETTLED: f64 = 1e-4;
+/// Sum of squares, of each residual, of a segment that cannot be followed.
+pub(super) const FAILED: f64 = 1e8;
+/// Part of a positive constant that a step leaves at least.
+const LEAST_PART: f64 = 0.1;
+/// Least value of a positive constant, over the value it starts with: its bound.
+const LEAST_POSITIVE: f64 = 1e-12;
+/// Largest delay of a sensor in usual steps between samples.
+const MOST_DELAY: f64 = 20.0;
+
+/// A solution of damped normal equations.
+pub(super) struct Step {
+    pub change: Vec<f64>,
+    /// Decrease of the sum of squares that the quadratic model promises of the whole step if it is undamped.
+    pub decrement: f64,
+    /// Constants that stay at the bound of their range.
+    pub held: Vec<bool>,
+}
+
+impl Problem<'_> {
+    /// Least value of an unknown.
+    fn bound(&self, k: usize) -> f64 {
+        let Some(&at) = self.chosen.get(k) else { return f64::NEG_INFINITY };
+        match self.ranges[at] {
+            Range::Any => f64::NEG_INFINITY,
+            Range::AtLeastZero => 0.0,
+            Range::Positive => (LEAST_POSITIVE * self.values[at].abs()).max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// A change of the unknowns, applied to them. Constants stay within their ranges; one that must be positive keeps a part of itself
+    /// unless all of it is below what the normal equations resolve.
+    pub(super) fn moved(&self, x: &[f64], change: &[f64], normal: &Normal) -> Vec<f64> {
+        let m = normal.right.len();
+        let moved = |(k, (&x, d)): (usize, (&f64, f64))| match k.checked_sub(self.chosen.len()) {
+            Some(sensor) if self.sensors[sensor].kind == SensorKind::Delay => {
+                (x + d).clamp(-MOST_DELAY * self.course.step, MOST_DELAY * self.course.step)
+            }
+            Some(_) => x + d,
+            None if self.ranges[self.chosen[k]] == Range::Positive => {
+                let unseen = normal.matrix[k * m + k] * x * x < 1.0;
+                (x + d).max(if unseen { 0.0 } else { LEAST_PART * x }).max(self.bound(k))
+            }
+            None => (x + d).max(self.bound(k)),
+        };
+        let changes = change.iter().copied().chain(std::iter::repeat(0.0));
+        x.iter().zip(changes).enumerate().map(moved).collect()
+    }
+
+    /// Sum of squares of the whole motion in units of noise, of as many numbers.
+    fn size(&self, numbers: f64) -> f64 {
+        let square = |(spread, sigma): (&f64, &f64)| (spread / sigma).powi(2);
+        numbers * self.spread.iter().zip(&self.sigma).map(square).sum::<f64>() / self.sigma.len() as f64
+    }
+
+    /// A change of an unknown that is large: its value, of a sensor's offset the spread of the motion, of its delay ten samples; 0 of a
+    /// constant that may be 0.
+    pub fn scale(&self, unknown: usize, x: f64) -> f64 {
+        match unknown.checked_sub(self.chosen.len()).map(|k| self.sensors[k]) {
+            None => x.abs(),
+            Some(Sensor { kind: SensorKind::Offset, coordinate }) => self.spread[coordinate],
+            Some(Sensor { kind: SensorKind::Gain, .. }) => 1.0,
+            Some(Sensor { kind: SensorKind::Delay, .. }) => 10.0 * self.course.step,
+        }
+    }
+
+    /// Unknowns of which a change of their size, or of that of their starting value, has less than this in the normal equations.
+    pub(super) fn too_weak(&self, x: &[f64], normal: &Normal, least: f64) -> Vec<bool> {
+        let m = normal.right.len();
+        let given = |k: usize| self.chosen.get(k).map_or(0.0, |&at| self.values[at].abs());
+        let scale = |k: usize| Some(self.scale(k, x[k]).max(given(k))).filter(|scale| *scale > 0.0).unwrap_or(1.0);
+        (0..m).map(|k| normal.matrix[k * m + k] * scale(k).powi(2) <= least).collect()
+    }
+
+    /// Unknowns that the motion shows nothing of: their effect is rounding, or what other starts do as well.
+    pub fn without_effect(&self, x: &[f64], normal: &Normal) -> Vec<bool> {
+        let m = x.len();
+        let mut muted = self.too_weak(x, normal, NO_EFFECT * self.size(normal.count));
+        for (k, muted) in muted.iter_mut().enumerate() {
+            *muted |= normal.matrix[k * m + k] <= LIKE_STARTS * normal.diagonal[k];
+        }
+        muted
+    }
+
+    /// The step by damped normal equations of unknowns that are not muted. Constants at a bound that would leave their range stay.
+    pub(super) fn step(&self, x: &[f64], normal: &Normal, muted: &[bool], damping: f64) -> Step {
+        let m = normal.right.len();
+        let at_bound: Vec<bool> = (0..m).map(|k| x[k] <= self.bound(k)).collect();
+        let mut held: Vec<bool> = (0..m).map(|k| !muted[k] && at_bound[k] && normal.right[k] <= 0.0).collect();
+        loop {
+            let free: Vec<usize> = (0..m).filter(|&k| !muted[k] && !held[k]).collect();
+            let change = solution(normal, &free, damping);
+            let out = |k: &usize| at_bound[*k] && change[*k] < 0.0;
+            let leaving: Vec<usize> = free.iter().copied().filter(out).collect();
+            if leaving.is_empty() {
+                let decrement = dot(&change, &normal.right);
+                return Step { change, decrement, held };
+            }
+            leaving.into_iter().for_each(|k| held[k] = true);
+        }
+    }
+
+    /// Notes how far the normal equations are from their minimum.
+    pub(super) fn judge(&self, x: &[f64], normal: &mut Normal, muted: &[bool], stuck: bool) {
+        let step = self.step(x, normal, muted, 0.0);
+        let variance = (normal.square / normal.count.max(1.0)).max(1.0);
+        normal.held = step.held;
+        normal.decrement = step.decrement.max(normal.of_starts) / variance;
+        normal.converged = normal.failed == 0 && normal.decrement < if stuck { STUCK } else { ARRIVED };
+    }
+
+    /// Fits unknowns and starts; the normal equations at the end, undamped, say whether the search has converged.
+    pub fn fit(&self, x: &mut Vec<f64>, segments: &mut [Segment], iterations: usize) -> Normal {
+        let mut best = self.all(x, segments);
+        let mut normal = self.normal(&best, segments);
+        let mut muted = self.without_effect(x, &normal);
+        self.judge(x, &mut normal, &muted, false);
+        let mut damping = FIRST_DAMPING;
+        for _ in 0..iterations {
+            let residual = (normal.square / normal.count.max(1.0)).sqrt();
+            if normal.converged || !self.cancellation.iterate(residual) {
+                break;
+            }
+            let change = self.step(x, &normal, &muted, damping).change;
+            let moved = self.moved(x, &change, &normal);
+            let real: Vec<f64> = moved.iter().zip(x.iter()).map(|(after, before)| after - before).collect();
+            let starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
+            for (segment, linear) in segments.iter_mut().zip(&best) {
+                let Some(linear) = linear else { continue };
+                let step = self.start_step(linear, &real, damping);
+                segment.start.iter_mut().zip(step).for_each(|(s, d)| *s += d);
+            }
+            let tried = self.all(&moved, segments);
+            let after = self.normal(&tried, segments);
+            if after.square < normal.square {
+                (*x, best, normal) = (moved, tried, after);
+                muted = self.without_effect(x, &normal);
+                self.judge(x, &mut normal, &muted, false);
+                damping = f64::max(damping / 10.0, LEAST_DAMPING);
+            } else {
+                segments.iter_mut().zip(starts).for_each(|(segment, start)| segment.start = start);
+                damping = f64::max(damping * 10.0, 1e-6);
+                if damping > MOST_DAMPING {
+                    self.judge(x, &mut normal, &muted, true);
+                    break;
+                }
+            }
+        }
+        normal
+    }
+
+    /// The step of a start, given that of the unknowns.
+    fn start_step(&self, linear: &Linear, change: &[f64], damping: f64) -> Vec<f64> {
+        let (starts, width) = (linear.right.len() - self.unknowns(), linear.right.len());
+        let own = times(starts, &self.start_inverse(linear, damping), &linear.right[..starts]);
+        if change.iter().all(|d| *d == 0.0) {
+            return own;
+        }
+        let pulled = |i: usize| dot(&linear.matrix[i * width + starts..(i + 1) * width], change);
+        let followed = times(starts, &self.start_inverse(linear, 0.0), &(0..starts).map(pulled).collect::<Vec<_>>());
+        own.iter().zip(followed).map(|(own, followed)| own - followed).collect()
+    }
+
+    /// Moves the starts alone, each segment for itself; `false` if they could go on gaining.
+    pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
+        let still = vec![0.0; self.unknowns()];
+        let mut best = self.all(x, segments);
+        let mut starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
+        let mut damping = vec![1e-6; segments.len()];
+        let mut settled = false;
+        for _ in 0..iterations {
+            for (k, segment) in segments.iter_mut().enumerate() {
+                segment.start.clone_from(&starts[k]);
+                if let Some(linear) = &best[k] {
+                    let step = self.start_step(linear, &still, damping[k]);
+                    segment.start.iter_mut().zip(step).for_each(|(s, d)| *s += d);
+                }
+            }
+            let tried = self.all(x, segments);
+            let mut gained = 0.0;
+            for (k, tried) in tried.into_iter().enumerate() {
+                let square = |linear: &Option<Linear>| linear.as_ref().map_or(f64::INFINITY, |linear| linear.square);
+                let (before, after) = (square(&best[k]), square(&tried));
+                if after < before {
+                    gained += if before.is_finite() { before - after } else { after };
+                    (best[k], damping[k]) = (tried, damping[k] / 10.0);
+                    starts[k].clone_from(&segments[k].start);
+                } else {
+                    damping[k] = (damping[k] * 100.0).max(1e-4);
+                }
+            }
+            let total: f64 = best.iter().flatten().map(|linear| linear.square).sum();
+            settled = gained < SETTLED * total;
+            if settled || self.cancellation.is_cancelled() {
+                break;
+            }
+        }
+        segments.iter_mut().zip(starts).for_each(|(segment, start)| segment.start = start);
+        settled
+    }
+}
+
+/// Solution of damped normal equations for some unknowns, the others held: by the eigenvectors of the matrix of correlations, whose
+/// eigenvalues below rounding count as rounding.
+fn solution(normal: &Normal, free: &[usize], damping: f64) -> Vec<f64> {
+    let (m, count) = (normal.right.len(), free.len());
+    let mut change = vec![0.0; m];
+    let root = |k: usize| normal.matrix[k * m + k].max(f64::MIN_POSITIVE).sqrt();
+    let scaled: Vec<f64> = (0..count * count)
+        .map(|at| (free[at / count], free[at % count]))
+        .map(|(i, j)| normal.matrix[i * m + j] / (root(i) * root(j)))
+        .collect();
+    let (mut values, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
+    if eigh(count, &scaled, &mut values, &mut vectors, &mut Workspace::new()).is_err() {
+        return change;
+    }
+    let before = free.iter().map(|&k| normal.diagonal[k] / root(k).powi(2)).fold(0.0, f64::max);
+    let ridge = RIDGE.max(ELIMINATION * before);
+    let pull: Vec<f64> = free.iter().map(|&k| normal.right[k] / root(k)).collect();
+    for (value, vector) in values.iter().zip(vectors.chunks_exact(count.max(1))) {
+        let size = dot(vector, &pull) / (value.max(ridge) + damping);
+        vector.iter().zip(free).for_each(|(v, &k)| change[k] += v * size / root(k));
+    }
+    change
+}
+
+/// Leaves unknowns out of normal equations: they stay where they are.
+pub(super) fn mute(muted: &[bool], matrix: &mut [f64], right: &mut [f64]) {
+    let m = right.len();
+    for (k, _) in muted.iter().enumerate().filter(|(_, muted)| **muted) {
+        (0..m).for_each(|l| (matrix[k * m + l], matrix[l * m + k]) = (0.0, 0.0));
+        (matrix[k * m + k], right[k]) = (1.0, 0.0);
+    }
+}

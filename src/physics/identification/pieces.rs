@@ -1,0 +1,225 @@
+//! Pieces of recorded motion between long gaps, each sample with a position and a velocity to start from.
+//!
+//! Smoothing does not reach across a long gap, but the equations of motion do: pieces are only where the search begins.
+
+use super::follow::Segment;
+use super::stages::thinned;
+use super::{IdentifyError, IdentifyOptions};
+use crate::linalg::{self, Workspace};
+use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise as estimated};
+use crate::recording::survey::{Stillness, stillness};
+use crate::recording::{Clock, RecordedTrajectory, Recording};
+use std::ops::Range;
+
+/// Samples that are needed of all trajectories together.
+const LEAST_SAMPLES: usize = 12;
+/// Samples of a piece that is smoothed.
+const SMOOTHED: usize = 12;
+/// Samples of a first segment at least.
+pub(super) const LEAST_SEGMENT: usize = 6;
+/// Samples of a trajectory that has something to say: two are taken by its start.
+const LEAST_TRACK: usize = 3;
+
+/// A piece of a trajectory.
+pub(super) struct Piece {
+    pub track: usize,
+    pub samples: Range<usize>,
+    /// Its number among the long ones.
+    long: Option<usize>,
+}
+
+/// The pieces of a recording in order.
+pub(super) struct Pieces<'a> {
+    recording: &'a Recording,
+    /// Pieces of a recording, those of one trajectory after each other.
+    all: Vec<Piece>,
+    /// The long pieces as trajectories of their own, of repeated measurements the first, with the trajectory and the samples they come from.
+    pub long: Recording,
+    origin: Vec<(usize, Vec<usize>)>,
+    /// Their motion, if there are any.
+    pub smoothing: Option<Smoothing>,
+    pub smoothed: Vec<Option<Smoothed>>,
+    /// Usual step in s.
+    pub step: f64,
+    /// Standard deviation of every coordinate's noise, as given or as estimated.
+    pub noise: Vec<f64>,
+    /// The same by trajectory, each estimated from its own pieces.
+    pub noise_of: Vec<Vec<f64>>,
+    /// What is to be said of the coordinates that stand still.
+    pub still: Vec<String>,
+}
+
+impl<'a> Pieces<'a> {
+    pub fn new(recording: &'a Recording, options: &IdentifyOptions) -> Result<Self, IdentifyError> {
+        let n = recording.n();
+        let (mut all, mut parts) = (Vec::new(), Vec::new());
+        for (track, recorded) in recording.tracks.iter().enumerate().filter(|(_, t)| t.len() >= LEAST_TRACK) {
+            // A state that was measured again is one state.
+            let distinct: Vec<usize> =
+                (0..recorded.len()).filter(|&k| k == 0 || recorded.times[k] > recorded.times[k - 1]).collect();
+            let times: Vec<f64> = distinct.iter().map(|&k| recorded.times[k]).collect();
+            let clock = Clock::of(&times);
+            let gap = |k: &usize| !clock.reaches_across(times[*k] - times[k - 1]);
+            let bounds: Vec<usize> = [0].into_iter().chain((1..times.len()).filter(gap)).chain([times.len()]).collect();
+            for pair in bounds.windows(2) {
+                let states = &distinct[pair[0]..pair[1]];
+                let end = distinct.get(pair[1]).copied().unwrap_or(recorded.len());
+                parts.push((part(recorded, states, n), states.to_vec()));
+                all.push(Piece { track, samples: states[0]..end, long: None });
+            }
+        }
+        let usable: usize = all.iter().map(|piece: &Piece| piece.samples.len()).sum();
+        if usable < LEAST_SAMPLES {
+            return Err(IdentifyError::Short { found: usable, needed: LEAST_SAMPLES });
+        }
+        let mut long = Recording { tracks: Vec::new(), ..recording.clone() };
+        let mut origin = Vec::new();
+        for (piece, (part, states)) in all.iter_mut().zip(&parts).filter(|(_, (part, _))| part.len() >= SMOOTHED) {
+            piece.long = Some(origin.len());
+            long.tracks.push(part.clone());
+            origin.push((piece.track, states.clone()));
+        }
+        let choices = SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() };
+        // Short pieces tell of the noise, but are not smoothed.
+        let chosen = (!long.tracks.is_empty()).then(|| Smoothing::choose(&long, &choices)).transpose();
+        let smoothing = match chosen {
+            Ok(smoothing) => smoothing,
+            Err(SmoothError::Short { .. }) => None,
+            Err(error) => return Err(error.into()),
+        };
+        let step = smoothing.as_ref().map_or_else(|| usual_step(&parts), |smoothing| smoothing.step);
+        let signals = || parts.iter().map(|(part, _)| (part.times.as_slice(), part.q.as_slice()));
+        let sigma = |i: usize| match (&smoothing, &options.noise) {
+            (Some(smoothing), _) => smoothing.coordinates[i].noise.sigma,
+            (None, Some(given)) => given[i],
+            (None, None) => estimated(signals(), n, i).sigma,
+        };
+        let noise: Vec<f64> = (0..n).map(sigma).collect();
+        let own = |track: usize, i: usize| {
+            let signals = all.iter().zip(signals()).filter(|(piece, _)| piece.track == track).map(|(_, signal)| signal);
+            estimated(signals, n, i).sigma
+        };
+        let noise_of = (0..recording.tracks.len()).map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
+        let still = smoothing.as_ref().map_or_else(Vec::new, |smoothing| stillness(&long, smoothing));
+        let still = still.into_iter().filter(|(_, how)| !matches!(how, Stillness::Copy(_)));
+        let still = still.map(|(i, how)| format!("{} {how}", recording.coordinates[i])).collect();
+        let smooth =
+            |track: &RecordedTrajectory| smoothing.as_ref().map(|smoothing| smoothing.apply(track)).transpose();
+        let smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { recording, all, long, origin, smoothing, smoothed, step, noise, noise_of, still })
+    }
+
+    /// Trajectory and sample of a sample of a long piece.
+    pub fn origin(&self, track: usize, sample: usize) -> (usize, usize) {
+        let (from, samples) = &self.origin[track];
+        (*from, samples[sample])
+    }
+
+    /// Segments of the long pieces.
+    pub fn cut_long(&self) -> Vec<Segment> {
+        let n = self.recording.n();
+        let of = |(track, smoothed): (usize, &Option<Smoothed>)| {
+            let smoothed = smoothed.as_ref()?;
+            let length = smoothed.times.len();
+            let start = |first: usize| {
+                let start = [&smoothed.q, &smoothed.v].map(|values| &values[first * n..(first + 1) * n]).concat();
+                Segment { track, first, samples: LEAST_SEGMENT.min(length - first), start }
+            };
+            Some((0..length).step_by(LEAST_SEGMENT).map(start).collect::<Vec<_>>())
+        };
+        thinned(self.smoothed.iter().enumerate().filter_map(of).flatten().collect())
+    }
+
+    /// First samples behind long gaps, by trajectory.
+    pub fn gaps(&self) -> Vec<Vec<usize>> {
+        let mut gaps = vec![Vec::new(); self.recording.tracks.len()];
+        self.all.iter().filter(|piece| piece.samples.start > 0).for_each(|p| gaps[p.track].push(p.samples.start));
+        gaps
+    }
+
+    /// Segments of about so many samples. Pieces of few samples are one segment with those behind them.
+    pub fn cut(&self, samples: usize) -> Vec<Segment> {
+        let mut segments: Vec<Segment> = Vec::new();
+        for pieces in self.all.chunk_by(|one, next| one.track == next.track) {
+            let (track, mut first) = (pieces[0].track, 0);
+            for piece in pieces {
+                let recorded = &self.recording.tracks[track];
+                let (end, rest) = (piece.samples.end, recorded.len() - piece.samples.end);
+                let long = end - first >= LEAST_SEGMENT && (rest == 0 || rest >= LEAST_SEGMENT);
+                if !long && rest > 0 {
+                    continue;
+                }
+                let length = end - first;
+                let count = ((length + samples / 2) / samples).max(1);
+                for k in 0..count {
+                    let (from, to) = (first + k * length / count, first + (k + 1) * length / count);
+                    segments.push(Segment { track, first: from, samples: to - from, start: self.start(track, from) });
+                }
+                first = end;
+            }
+        }
+        thinned(segments)
+    }
+
+    /// Position and velocity at a sample, smoothed or by a polynomial through the samples near it.
+    fn start(&self, track: usize, sample: usize) -> Vec<f64> {
+        let n = self.recording.n();
+        let behind = self.all.partition_point(|piece| (piece.track, piece.samples.start) <= (track, sample));
+        let piece = behind.checked_sub(1).and_then(|at| self.all.get(at));
+        let long = piece.and_then(|piece| piece.long);
+        if let Some((smoothed, k)) = long.and_then(|k| Some((self.smoothed[k].as_ref()?, k))) {
+            let at = self.origin[k].1.partition_point(|state| *state <= sample).saturating_sub(1);
+            return [&smoothed.q, &smoothed.v].map(|values| &values[at * n..(at + 1) * n]).concat();
+        }
+        nearby(&self.recording.tracks[track], n, sample, piece.map_or(0..0, |piece| piece.samples.clone()))
+    }
+}
+
+/// Some samples of a trajectory.
+fn part(track: &RecordedTrajectory, samples: &[usize], n: usize) -> RecordedTrajectory {
+    let rows = |values: &[f64]| match values.is_empty() {
+        true => Vec::new(),
+        false => samples.iter().flat_map(|&k| values[k * n..(k + 1) * n].to_vec()).collect(),
+    };
+    let times = samples.iter().map(|&k| track.times[k]).collect();
+    let (name, q, v) = (track.name.clone(), rows(&track.q), rows(&track.v));
+    RecordedTrajectory { name, times, q, v, a: rows(&track.a), force: rows(&track.force) }
+}
+
+/// Median step within pieces, or over their gaps if these are all there is.
+fn usual_step(parts: &[(RecordedTrajectory, Vec<usize>)]) -> f64 {
+    let mut steps: Vec<f64> =
+        parts.iter().flat_map(|(part, _)| part.times.windows(2).map(|pair| pair[1] - pair[0])).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Position and velocity at a sample by a polynomial of the second degree through all samples of its piece and, if these are few, those
+/// nearest to it in time.
+fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usize>) -> Vec<f64> {
+    let (mut first, mut end) = (piece.start.min(sample), piece.end.max(sample + 1));
+    let now = track.times[sample];
+    while end - first < LEAST_SEGMENT && (first > 0 || end < track.len()) {
+        let before = || now - track.times[first - 1] <= track.times[end] - now;
+        if end == track.len() || (first > 0 && before()) { first -= 1 } else { end += 1 }
+    }
+    let span = track.times[first..end].iter().fold(0.0, |most: f64, t| most.max((t - now).abs()));
+    let (mut matrix, mut rights) = ([0.0; 9], vec![[0.0; 3]; n]);
+    for k in first..end {
+        let t = if span > 0.0 { (track.times[k] - now) / span } else { 0.0 };
+        let row = [1.0, t, t * t];
+        for i in 0..3 {
+            (0..3).for_each(|j| matrix[3 * i + j] += row[i] * row[j]);
+            (0..n).for_each(|c| rights[c][i] += row[i] * track.q[k * n + c]);
+        }
+    }
+    // Of fewer than three times the smallest polynomial.
+    (0..3).for_each(|i| matrix[4 * i] += 1e-9);
+    let mut start = vec![0.0; 2 * n];
+    for (i, right) in rights.iter().enumerate() {
+        let mut solved = [0.0; 3];
+        let _ = linalg::solve(3, &matrix, right, &mut solved, &mut Workspace::new());
+        (start[i], start[n + i]) = (solved[0], if span > 0.0 { solved[1] / span } else { 0.0 });
+    }
+    start
+}
