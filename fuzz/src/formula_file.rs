@@ -20,7 +20,7 @@ pub fn run(bytes: &[u8]) {
     let q: Vec<f64> = (0..40).map(|k| -1.0 + 0.05 * f64::from(k)).collect();
     let v: Vec<f64> = (0..40).map(|k| (1.7 * f64::from(k)).sin()).collect();
     let options = FormulaOptions {
-        families: "polynomial:3".parse().expect("a family"),
+        families: Some("polynomial:3".parse().expect("a family")),
         gyroscopic: false,
         friction,
         bootstraps: 1,
