@@ -82,10 +82,6 @@ impl<T: Real> Real for Dual<T> {
     forward_real!();
 
     #[inline(always)]
-    fn may_be_finite(self) -> bool {
-        self.value.may_be_finite()
-    }
-    #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.value.is_exact_zero() && self.tangent.is_exact_zero()
     }
@@ -219,10 +215,6 @@ assign_operators!([T: Real] HyperDual<T>);
 impl<T: Real> Real for HyperDual<T> {
     forward_real!();
 
-    #[inline(always)]
-    fn may_be_finite(self) -> bool {
-        self.value.may_be_finite()
-    }
     #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.value.is_exact_zero() && self.s.is_exact_zero() && self.t.is_exact_zero() && self.st.is_exact_zero()

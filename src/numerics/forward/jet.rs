@@ -190,10 +190,6 @@ impl<T: Real, const N: usize, const F: usize> Real for Jet<T, N, F> {
     forward_real!();
 
     #[inline(always)]
-    fn may_be_finite(self) -> bool {
-        self.value.may_be_finite()
-    }
-    #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.value.is_exact_zero()
             && self.linear.iter().all(|first| first.is_exact_zero())

@@ -210,10 +210,6 @@ impl<T: Real> Real for Var<'_, T> {
         self.value.primal()
     }
     #[inline(always)]
-    fn may_be_finite(self) -> bool {
-        self.value.may_be_finite()
-    }
-    #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.id == 0 && self.value.is_exact_zero()
     }
