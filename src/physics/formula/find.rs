@@ -146,6 +146,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     }
     let mut found = best.ok_or_else(|| refused.unwrap_or(FormulaError::Singular))?;
     found.tried = searched;
+    found.notes.extend(data.suspicious.iter().cloned());
     if let Some(formula) = held {
         found.notes.push(format!(
             "the single trajectory keeps to {formula} = 0, by a constraint or by itself: what moves off it is not determined, record others"
@@ -335,14 +336,14 @@ impl WeakForm {
         found.between = data.forced.contains(&true).then_some(search.motion.between);
         if let Some(rival) = rival {
             found.several = rival.cost < THRESHOLD;
-            let written = |k: &usize| library.written(*k, Notation::System);
+            let written = |&k: &usize| {
+                let kind = if library.is_dissipation(k) { "D: " } else { "" };
+                format!("{kind}{}", library.written(k, Notation::System))
+            };
             found.rival = Some(Rival { terms: rival.model.terms.iter().map(written).collect(), cost: rival.cost });
         }
         if !chosen {
             found.notes.push(format!("the choice of terms still changed after {ROUNDS} rounds"));
-        }
-        if !self.path.settled {
-            found.notes.push("exchanges in the weak form were cut off while they still helped".to_string());
         }
         if !settled {
             found.doubts.push("the fit of the coefficients has not come to its end".to_string());
@@ -351,6 +352,9 @@ impl WeakForm {
         found.verdict = judged.verdict(&found.doubts);
         if found.verdict == Verdict::NotInLibrary {
             found.doubts.clear();
+        }
+        if !self.path.settled && found.verdict != Verdict::Found {
+            found.notes.push("exchanges in the weak form were cut off while they still helped".to_string());
         }
         Ok(found)
     }
