@@ -201,8 +201,7 @@ fn lines(
     }
     let test = measured.test.estimated();
     let pairs = test.iter().zip(&measured.test.states);
-    let windows: Vec<Window> =
-        pairs.flat_map(|(e, s)| Window::cut(e.track, (e.q, e.v), s.interior(), 2, HORIZON)).collect();
+    let windows: Vec<Window> = pairs.flat_map(|(e, s)| Window::cut(*e, s.interior(), 2, HORIZON)).collect();
     let mut lines = Vec::new();
     let mut add = |name: &'static str, predict: &mut dyn FnMut() -> Predictions| {
         let start = Instant::now();

@@ -124,7 +124,7 @@ impl Textbook {
 fn windows(measured: &RecordingSplit) -> Vec<Window> {
     let estimated = measured.training.estimated();
     let pairs = estimated.iter().zip(&measured.training.states);
-    pairs.flat_map(|(e, s)| Window::cut(e.track, (e.q, e.v), s.interior(), 2, SPAN)).collect()
+    pairs.flat_map(|(e, s)| Window::cut(*e, s.interior(), 2, SPAN)).collect()
 }
 
 fn median(residuals: &[f64]) -> f64 {

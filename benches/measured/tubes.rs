@@ -3,8 +3,10 @@
 use super::Scale;
 use super::determination::{CASES, Case, learn};
 use lnn::analysis::{Tube, Window, predict_by_motion};
+use lnn::data::StateEstimate;
 use lnn::recording::Recording;
 use lnn::recording::smooth::{SmoothOptions, Smoothing};
+use lnn::rollout::Between;
 
 /// Systems whose models predict the motion.
 const SYSTEMS: [&str; 3] = ["cart-pendulum", "pendulum with a known force", "two pendula"];
@@ -28,7 +30,8 @@ fn beginnings(recording: &Recording, ahead: f64) -> Vec<Window> {
     let first = |track| {
         let states = smoothing.apply(track).expect("a long trajectory");
         let samples = states.interior().start..states.times.len();
-        Window::cut(track, (&states.q, &states.v), samples, recording.n(), ahead).into_iter().next()
+        let estimate = StateEstimate { track, q: &states.q, v: &states.v, between: Between::default() };
+        Window::cut(estimate, samples, recording.n(), ahead).into_iter().next()
     };
     recording.tracks.iter().filter_map(first).collect()
 }

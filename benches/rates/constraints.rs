@@ -32,7 +32,7 @@ fn uniform(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 }
 
 /// A sum of three waves about 0, of amplitude about 1, at most about 2 rad/s.
-fn wave(rng: &mut ChaCha8Rng) -> impl Fn(f64) -> f64 + 'static {
+fn wave(rng: &mut ChaCha8Rng) -> impl Fn(f64) -> f64 + use<> {
     let parts: Vec<[f64; 3]> =
         (0..3).map(|_| [uniform(rng, 0.2, 0.6), uniform(rng, 0.4, 2.0), uniform(rng, 0.0, TAU)]).collect();
     move |t| parts.iter().map(|[a, omega, phase]| a * (omega * t + phase).sin()).sum()

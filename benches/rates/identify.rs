@@ -3,6 +3,7 @@
 use super::{Outcome, Rate};
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{Description, SystemInstance, configure_system};
+use lnn::prelude::Motion;
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{Driven, Options, SampledForce};

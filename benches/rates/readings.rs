@@ -44,6 +44,11 @@ struct Motion<'a> {
     noise: f64,
 }
 
+/// Motion of a model with little noise.
+fn quiet(model: &dyn EulerLagrange<f64>, seconds: f64) -> Motion<'_> {
+    Motion { model: Some(model), seconds, noise: 1e-4 }
+}
+
 impl Motion<'_> {
     const RUNS: usize = 6;
 
@@ -78,31 +83,22 @@ fn is_good(motion: &Motion<'_>, rng: &mut ChaCha8Rng, periodic: [bool; 2]) -> Ou
 }
 
 fn fits(seeds: u64) -> Outcome<Vec<Rate>> {
-    let springs = |coupling: f64| Mechanics::new(Springs, vec![1.0, 2.5, coupling]);
-    let all = [
-        ("white noise", Motion { model: None, seconds: 2.0, noise: 1.0 }, [false; 2]),
-        ("motionless data", Motion { model: None, seconds: 2.0, noise: 0.0 }, [false; 2]),
-        (
-            "recordings of a quarter of a period",
-            Motion { model: Some(&springs(0.6)), seconds: 1.0, noise: 1e-4 },
-            [false; 2],
-        ),
-        (
-            "coordinates that do not act on each other",
-            Motion { model: Some(&springs(0.0)), seconds: 8.0, noise: 1e-4 },
-            [false; 2],
-        ),
-        (
-            "an orbit whose momentum is conserved",
-            Motion { model: Some(&Mechanics::new(Orbit, vec![])), seconds: 8.0, noise: 1e-4 },
-            [false, true],
-        ),
+    let springs = |coupling: f64| Mechanics::<_, f64>::new(Springs, vec![1.0, 2.5, coupling]);
+    let (apart, joined, orbit) = (springs(0.0), springs(0.6), Mechanics::<_, f64>::new(Orbit, vec![]));
+    let silent = |noise: f64| Motion { model: None, seconds: 2.0, noise };
+    let plain = [false; 2];
+    let all: [(&'static str, Motion<'_>, [bool; 2]); 5] = [
+        ("white noise", silent(1.0), plain),
+        ("motionless data", silent(0.0), plain),
+        ("recordings of a quarter of a period", quiet(&joined, 1.0), plain),
+        ("coordinates that do not act on each other", quiet(&apart, 8.0), plain),
+        ("an orbit whose momentum is conserved", quiet(&orbit, 8.0), [false, true]),
     ];
     let mut rates = Vec::new();
     for (case, motion, periodic) in all {
         rates.push(rate(("good", case), NEVER, seeds, |rng| is_good(&motion, rng, periodic))?);
     }
-    let coupled = Motion { model: Some(&springs(0.6)), seconds: 8.0, noise: 1e-4 };
+    let coupled = quiet(&joined, 8.0);
     rates.push(rate(("good", "coupled springs"), 0.5..=1.0, seeds, |rng| is_good(&coupled, rng, [false; 2]))?);
     Ok(rates)
 }

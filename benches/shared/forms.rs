@@ -2,12 +2,10 @@
 
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{Description, SystemInstance, configure_system};
-use lnn::prelude::*;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Driven, Options};
 use rand::Rng;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -117,9 +115,9 @@ pub struct Trial {
 }
 
 /// Values of constants within a factor of the usual ones.
-fn drawn(form: &Form, factor: f64, rng: &mut ChaCha8Rng) -> BTreeMap<String, f64> {
-    let scale = |rng: &mut ChaCha8Rng| factor.powf(rng.random_range(-1.0..1.0));
-    form.constants.iter().map(|(name, usual, _)| (name.to_string(), usual * scale(rng))).collect()
+fn drawn(form: &Form, factor: f64, rng: &mut impl Rng) -> BTreeMap<String, f64> {
+    let mut scaled = |usual: f64| usual * factor.powf(rng.random_range(-1.0..1.0));
+    form.constants.iter().map(|(name, usual, _)| (name.to_string(), scaled(*usual))).collect()
 }
 
 fn instance(form: &Form, values: &BTreeMap<String, f64>) -> Outcome<SystemInstance<f64>> {
@@ -162,7 +160,7 @@ impl Trial {
         for sign in [1.0, -0.6] {
             let start: Vec<f64> = form.coordinates.iter().map(|(_, q)| q * sign).collect();
             let motion = Driven::new(&*model, &law).rollout(&start, &vec![0.0; n], &Options::reference(seconds, 0.02));
-            let motion = motion.complete().ok_or("the motion ends early")?;
+            let motion = motion.complete()?;
             let noisy = |q: &f64| {
                 let draw: f64 = StandardNormal.sample(&mut rng);
                 q + NOISE * draw

@@ -5,7 +5,7 @@ use crate::errors::{runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
 use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
-use lnn::formula::{FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
+use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
 use lnn::identification::{Between, IdentifyOptions, identify as identified};
 use lnn::recording::smooth::SmoothOptions;
 use pyo3::prelude::*;
@@ -99,10 +99,8 @@ impl FormulaChoices {
     pub fn read(choices: &str) -> PyResult<(FormulaOptions, String)> {
         let Self { basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between } =
             serde_json::from_str(choices).map_err(value)?;
-        let families = match basis {
-            Some(text) => Some(text.parse().map_err(|problem| value(format_args!("basis: {problem}")))?),
-            None => None,
-        };
+        let families = basis.map(|text| text.parse::<Families>()).transpose();
+        let families = families.map_err(|problem| value(format_args!("basis: {problem}")))?;
         if !(1..=MOST_BOOTSTRAPS).contains(&bootstraps) {
             return Err(value(format_args!("bootstraps: expected 1 to {MOST_BOOTSTRAPS}, found {bootstraps}")));
         }

@@ -37,6 +37,10 @@ macro_rules! forward_real {
             self.value.primal()
         }
         #[inline(always)]
+        fn may_be_finite(self) -> bool {
+            self.value.may_be_finite()
+        }
+        #[inline(always)]
         fn elementary<E: crate::scalar::Elementary>(self, f: E) -> Self {
             self.chain1(f)
         }

@@ -117,6 +117,10 @@ impl<F: Foreign> Real for AnyFloat<F> {
     fn primal(self) -> Self {
         self
     }
+    #[inline]
+    fn may_be_finite(self) -> bool {
+        Scalar::is_finite(self)
+    }
     same!(recip sqrt exp exp_m1 ln ln_1p sin cos tan asin acos atan sinh cosh tanh abs);
     fn erfc(self) -> Self {
         self.cast::<Dd>().erfc().cast()

@@ -90,11 +90,11 @@ pub trait Real:
         self.primal() == Self::Scalar::of_f64(0.0)
     }
 
-    /// `false` for a number known to be infinite or `NaN`. Of a number whose value is not known yet, `true`: its products with exact
-    /// zeros are left out anyway.
+    /// `false` for a number known to be infinite or `NaN`. `true` of one whose value stands for many, on a tape that records a program for
+    /// instance: its products with exact zeros are left out anyway.
     #[inline(always)]
     fn may_be_finite(self) -> bool {
-        self.primal().is_finite()
+        true
     }
 
     /// `self * weight`, where a weight that is exactly 0 answers for itself: an infinite derivative along a direction in which nothing

@@ -19,6 +19,10 @@ macro_rules! impl_primitive {
                 self
             }
             #[inline(always)]
+            fn may_be_finite(self) -> bool {
+                self.is_finite()
+            }
+            #[inline(always)]
             fn recip(self) -> Self {
                 1.0 / self
             }

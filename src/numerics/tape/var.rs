@@ -213,6 +213,10 @@ impl<T: Real> Real for Var<'_, T> {
     fn is_exact_zero(self) -> bool {
         self.id == 0 && self.value.is_exact_zero()
     }
+    #[inline(always)]
+    fn may_be_finite(self) -> bool {
+        self.value.may_be_finite()
+    }
     #[inline]
     fn elementary<F: Elementary>(self, f: F) -> Self {
         self.table1(f)

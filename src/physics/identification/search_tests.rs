@@ -4,7 +4,7 @@ use super::tests::{described, noise, recorded};
 use super::*;
 use crate::lagrangian::SystemInstance;
 use crate::recording::{RecordedTrajectory, Recording};
-use crate::rollout::{Driven, Motion, Options};
+use crate::rollout::{Driven, Options};
 
 /// A damped oscillator whose stiffness and friction are positive, from starting values.
 fn damped(k: f64, c: f64) -> SystemInstance<f64> {

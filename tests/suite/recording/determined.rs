@@ -4,7 +4,6 @@ use crate::common::forms::{KINDS, Trial, stated, values};
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{Description, EulerLagrange, SystemInstance, configure_system, inverse_dynamics};
 use lnn::linalg::is_positive_definite;
-use lnn::prelude::*;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
 use rand::Rng;

@@ -84,6 +84,10 @@ impl Real for Dd {
     fn primal(self) -> Self {
         self
     }
+    #[inline]
+    fn may_be_finite(self) -> bool {
+        Scalar::is_finite(self)
+    }
     forward! {
         sqrt = square_root;
         exp = exponential;

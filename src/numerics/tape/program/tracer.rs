@@ -167,10 +167,6 @@ impl<S: Scalar> Real for Tracer<'_, S> {
     fn is_exact_zero(self) -> bool {
         self.is(0.0)
     }
-    #[inline(always)]
-    fn may_be_finite(self) -> bool {
-        true
-    }
     fn elementary<F: Elementary>(self, f: F) -> Self {
         match Unary::made(f) {
             Some(f) => self.table1(f),
