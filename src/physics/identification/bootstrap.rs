@@ -122,9 +122,9 @@ fn integrate(motion: &mut Smoothed, n: usize) {
             continue;
         }
         let lines: Vec<f64> = times().map(|t| level + slope * t).collect();
-        for k in 0..count {
-            motion.q[k * n + i] = q[k] + lines[k];
-            motion.v[k * n + i] = v[k] + slope;
+        for (k, ((q, v), line)) in q.iter().zip(&v).zip(&lines).enumerate() {
+            motion.q[k * n + i] = q + line;
+            motion.v[k * n + i] = v + slope;
         }
     }
 }
