@@ -129,7 +129,7 @@ impl Examiner<'_> {
         follower.accelerate(&values, (&probe.q, &probe.v), &probe.force, &mut a);
         let slopes = follower.slopes(&values, (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
-        effects(&rows, &place.changes, |at| sizes[at % n])
+        effects((&rows, 1.0), &place.changes, |at| sizes[at % n])
     }
 
     /// Root mean square of the accelerations of every coordinate.
@@ -281,7 +281,7 @@ impl Examiner<'_> {
         let mut follower = Follower::new(&self.problem.course);
         let slopes = follower.force_slopes(&self.problem.parameters(x), (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
-        let (columns, apart) = effects(&rows, changes, |_| 1.0);
+        let (columns, apart) = effects((&rows, 0.0), changes, |_| 1.0);
         let (seen, unseen) = split(&scaled(columns, &apart));
         let basis = |rows: &[Vec<f64>]| {
             let own = if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &apart), rows) };
@@ -308,8 +308,13 @@ impl Examiner<'_> {
     }
 }
 
-/// Effects of changes by the slopes of equations, a column each, and those of their unknowns each for itself, the root of the sum of squares.
-fn effects(rows: &[&[f64]], changes: &[Vec<f64>], size: impl Fn(usize) -> f64) -> (Vec<Vec<f64>>, Vec<f64>) {
+/// Effects of changes by the slopes of equations, a column each, and those of their unknowns each for itself, the root of the sum of squares,
+/// of which every row has `least` at least.
+fn effects(
+    (rows, least): (&[&[f64]], f64),
+    changes: &[Vec<f64>],
+    size: impl Fn(usize) -> f64,
+) -> (Vec<Vec<f64>>, Vec<f64>) {
     let finite = |row: &&[f64]| row.iter().all(|x| x.is_finite());
     let of = |change: &Vec<f64>| {
         let (mut column, mut apart) = (Vec::with_capacity(rows.len()), 0.0);
@@ -318,7 +323,8 @@ fn effects(rows: &[&[f64]], changes: &[Vec<f64>], size: impl Fn(usize) -> f64) -
             column.push(parts().sum::<f64>());
             apart += parts().map(f64::abs).sum::<f64>().powi(2);
         }
-        (column, apart.sqrt())
+        let least = least * (column.len() as f64).sqrt();
+        (column, apart.sqrt().max(least))
     };
     changes.iter().map(of).unzip()
 }
