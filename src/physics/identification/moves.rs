@@ -171,12 +171,12 @@ impl<'a> Moves<'a> {
 
     /// Every direction alone, either way, and of several all together, alternately forth and back: what holds along each need not hold along
     /// all. A pivot far below its size is moved up to this.
-    fn moves_of(&self, x: &[f64], columns: &[&'a Column]) -> Vec<Vec<(&'a Column, f64)>> {
-        let factors = |column: &'a Column| {
+    fn moves_of<'c>(&self, x: &[f64], columns: &[&'c Column]) -> Vec<Vec<(&'c Column, f64)>> {
+        let factors = |column: &'c Column| {
             let far = self.determined.size[column.pivot] / x[column.pivot].abs();
             [(column, FACTOR.max(far.min(f64::MAX))), (column, FACTOR.recip())]
         };
-        let alone = columns.iter().flat_map(|column| factors(column).map(|one| vec![one]));
+        let alone = columns.iter().copied().flat_map(|column| factors(column).map(|one| vec![one]));
         let all =
             |first: usize| columns.iter().enumerate().map(|(at, column)| factors(column)[(at + first) % 2]).collect();
         alone.chain((0..2).filter(|_| columns.len() > 1).map(all)).collect()
