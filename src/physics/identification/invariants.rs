@@ -148,6 +148,10 @@ pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invar
         for column in columns {
             factors[column.pivot] = -near(column.change[k] / column.change[column.pivot]);
         }
+        // The first has a positive factor, whichever the pivots are.
+        if factors.iter().find(|factor| **factor != 0.0).is_some_and(|first| *first < 0.0) {
+            factors.iter_mut().for_each(|factor| *factor = -*factor);
+        }
         Invariant { kind: Kind::Sum, factors }
     };
     free.map(of).collect()
