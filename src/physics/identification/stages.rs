@@ -83,10 +83,13 @@ impl Fitted {
         if plain { (square, 1.0) } else { (square * scatter, scatter) }
     }
 
-    /// Mean logarithm of the errors of the unknowns, each with the others fixed.
+    /// Mean logarithm of the errors of the unknowns, each with the others fixed; of those whose size is seen, since the others have rounding
+    /// for errors.
     fn spread(&self) -> f64 {
         let m = self.x.len();
-        let logarithms = (0..m).map(|k| self.normal.matrix[k * m + k]).filter(|x| *x > 0.0).map(f64::ln);
+        let own = |k: &usize| self.normal.matrix[k * m + k];
+        let is_seen = |k: &usize| own(k) > 0.0 && (self.x[*k] == 0.0 || own(k) * self.x[*k] * self.x[*k] > 1.0);
+        let logarithms = (0..m).filter(is_seen).map(|k| own(&k).ln());
         let (sum, count) = logarithms.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
         (self.inflation().0.ln() - sum / f64::max(count, 1.0)) / 2.0
     }
