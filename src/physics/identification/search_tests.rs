@@ -44,7 +44,7 @@ fn a_strong_friction_is_found_from_a_weak_one() {
 
 #[test]
 fn positive_constants_come_back_from_almost_nothing() {
-    for (k, c) in [(2.0, 1e-12), (1e-12, 0.5), (1e-12, 1e-12), (1e4, 1e3)] {
+    for (k, c) in [(2.0, 1e-9), (1e-9, 0.5), (1e-9, 1e-9), (1e4, 1e3)] {
         let recording = recorded(&damped(3.0, 0.4), &[&[1.3, 0.2]], (6.0, 0.02), &[1e-3], 3);
         let found = identify(&damped(k, c), &recording, &IdentifyOptions::default()).unwrap();
         let off = off(&found, &[("k", 3.0), ("c", 0.4)]);
@@ -102,6 +102,10 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
     assert!(!short.converged && short.decrement > 1.0, "{short:?}");
     let whole = problem.fit(&mut start.clone(), &mut segments(), 100);
     assert!(whole.converged && whole.decrement < 1e-6, "{whole:?}");
+    // From where an earlier step went astray.
+    let mut x = vec![1e-12; 2];
+    let back = problem.fit(&mut x, &mut segments(), 100);
+    assert!(back.converged && (back.square / whole.square - 1.0).abs() < 1e-6, "{x:?} {back:?}");
 }
 
 /// Some of the samples of a trajectory.
