@@ -56,7 +56,7 @@ fn positive_constants_come_back_from_almost_nothing() {
 fn a_constant_at_its_bound_is_called_that() {
     let mut bound = 0;
     for seed in 0..8 {
-        let recording = recorded(&damped(3.0, 0.0), &[&[0.5, 0.2]], (6.0, 0.05), &[2e-2], seed);
+        let recording = recorded(&damped(3.0, 1e-9), &[&[0.5, 0.2]], (6.0, 0.05), &[2e-2], seed);
         let found = identify(&damped(2.0, 0.5), &recording, &IdentifyOptions::default()).unwrap();
         let (c, k) = (&found.constants[0], &found.constants[1]);
         assert!(found.converged && (k.value - 3.0).abs() < 4.5 * k.standard_error.unwrap(), "{found:?}");
@@ -145,9 +145,10 @@ fn angles_turn_within_gaps() {
     let mut track = sampled(&recording.tracks[0], 1, &kept);
     track.q.iter_mut().skip(60).for_each(|q| *q -= 6.0 * std::f64::consts::TAU);
     recording.tracks[0] = track;
-    let found = identify(&pendulum(&[]), &recording, &IdentifyOptions::default()).unwrap();
+    let options = IdentifyOptions { segment: Some(8.0), ..Default::default() };
+    let found = identify(&pendulum(&[]), &recording, &options).unwrap();
     assert!(found.converged && off(&found, &[("w", 8.0)])[0].abs() < 4.5, "{found:?}");
-    assert!(found.constants[0].standard_error.unwrap() < 2e-3 && found.segments == 1, "{found:?}");
+    assert!((found.over_noise - 1.0).abs() < 0.2 && found.segments == 1, "{found:?}");
 }
 
 #[test]
@@ -254,12 +255,16 @@ fn a_delay_beside_a_force_is_found() {
         let track = RecordedTrajectory { name: "run".into(), times, q, v: vec![], a: vec![], force };
         let mut recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         noise(&mut recording, &[1e-3], seed);
-        let options = IdentifyOptions { delays: vec!["x".into()], ..Default::default() };
+        let options = IdentifyOptions { delays: vec!["x".into()], between: Some(Between::Cubic), ..Default::default() };
         let found = identify(&form(&[]), &recording, &options).unwrap();
-        let delay = &found.sensors[0];
-        let z = (delay.value - 0.01 * late as f64) / delay.standard_error.unwrap();
-        assert!(found.converged && z.abs() < 4.5 && delay.standard_error.unwrap() < 2e-3, "{late}: {found:?}");
-        let off = off(&found, &[("m", 1.0), ("k", 20.0), ("c", 0.4)]);
-        assert!(off.iter().all(|off| off.abs() < 4.5), "{late}: {found:?}");
+        // A force that is held is late by half a sample, which is a delay as well.
+        let any = identify(&form(&[]), &recording, &IdentifyOptions { between: None, ..options }).unwrap();
+        for (found, most) in [(found, 1e-3), (any, 0.02)] {
+            let delay = &found.sensors[0];
+            let z = (delay.value - 0.01 * late as f64) / delay.standard_error.unwrap();
+            assert!(found.converged && z.abs() < 4.5 && delay.standard_error.unwrap() < most, "{late}: {found:?}");
+            let off = off(&found, &[("m", 1.0), ("k", 20.0), ("c", 0.4)]);
+            assert!(off.iter().all(|off| off.abs() < 4.5), "{late}: {found:?}");
+        }
     }
 }
