@@ -177,9 +177,13 @@ pub fn identify(
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
+    if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+        refit(&problem, &mut fitted, ITERATIONS);
+    }
+    // Noise of the forces is known by now: the smoothest curve through it does not pass for the best.
     let (best, rivals) = best_between(&mut problem, fitted, options, forced);
     fitted = best;
-    if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+    if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
         refit(&problem, &mut fitted, ITERATIONS);
     }
     if !known {
@@ -523,7 +527,10 @@ fn result(
         size,
     };
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
-    let lags = follow.iter().filter(|of| !is_white(of)).map(|of| 2 * of.length).max();
+    // Where a correlation is not seen to end within segments it goes on in the next ones.
+    let longest = fitted.segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
+    let window = |of: &Correlation| if 4 * of.length >= longest { 4 * longest } else { 2 * of.length };
+    let lags = follow.iter().filter(|of| !is_white(of)).map(window).max();
     let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
     let (normal, inflation) = informed(problem, fitted, (weighing, lags), known);
     let verdict = Evidence {
