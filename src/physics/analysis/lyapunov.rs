@@ -84,7 +84,7 @@ pub fn lyapunov<S: Integrable>(
         let here = Separation::new(model, &ends[0]);
         offset = ends[1].iter().zip(&ends[0]).map(|(a, b)| a - b).collect();
         let now = here.size(&offset);
-        if now > 0.0 && now.is_finite() {
+        if now > 0.0 && now.is_finite() && before > 0.0 {
             growth += (now / before).ln();
             let shrink = (now / unit).max(size(&offset) / (WIDEST * distance));
             offset.iter_mut().for_each(|x| *x /= shrink);
