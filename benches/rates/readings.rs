@@ -91,8 +91,8 @@ fn fits(seeds: u64) -> Outcome<Vec<Rate>> {
         ("white noise", silent(1.0), plain),
         ("motionless data", silent(0.0), plain),
         ("recordings of a quarter of a period", quiet(&joined, 1.0), plain),
-        ("coordinates that do not act on each other", quiet(&apart, 12.0), plain),
-        ("an orbit whose momentum is conserved", quiet(&orbit, 12.0), [false, true]),
+        ("coordinates that do not act on each other", quiet(&apart, 16.0), plain),
+        ("an orbit whose momentum is conserved", quiet(&orbit, 16.0), [false, true]),
     ];
     // A trial takes no time.
     let epochs = if seeds > 1 { 300 } else { 3 };
@@ -100,8 +100,8 @@ fn fits(seeds: u64) -> Outcome<Vec<Rate>> {
     for (case, motion, periodic) in all {
         rates.push(rate(("good", case), NEVER, seeds, |rng| is_good(&motion, rng, (periodic, epochs)))?);
     }
-    let coupled = quiet(&joined, 12.0);
-    let limits = if seeds > 1 { 0.5..=1.0 } else { 0.0..=1.0 };
+    let coupled = quiet(&joined, 16.0);
+    let limits = if seeds > 1 { 0.3..=1.0 } else { 0.0..=1.0 };
     rates.push(rate(("good", "coupled springs"), limits, seeds, |rng| is_good(&coupled, rng, (plain, epochs)))?);
     Ok(rates)
 }
