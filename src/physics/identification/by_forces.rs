@@ -49,7 +49,9 @@ pub(super) fn identify(
     for _ in 0..ROUNDS {
         states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
         problem.cancellation.check()?;
-        search = states.fit(problem, &mut x, Met::Forces).ok_or(IdentifyError::Singular)?;
+        let fitted = states.fit(problem, &mut x, Met::Forces);
+        problem.cancellation.check()?;
+        search = fitted.ok_or(IdentifyError::Singular)?;
         let residuals = [states.force_residuals(problem, &x)];
         let left: Vec<f64> = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
         let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
@@ -61,7 +63,9 @@ pub(super) fn identify(
         }
     }
     states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
-    let mut normal = states.normal(problem, &x, Met::Forces).ok_or(IdentifyError::Singular)?;
+    let normal = states.normal(problem, &x, Met::Forces);
+    problem.cancellation.check()?;
+    let mut normal = normal.ok_or(IdentifyError::Singular)?;
     (normal.converged, normal.decrement, normal.held) = (search.converged, search.decrement, search.held);
     let residuals = states.force_residuals(problem, &x);
     let copies = bootstrap::copies(problem, smoothing, (states, &x, &sigma));

@@ -82,7 +82,8 @@ impl States {
         let values = problem.parameters(x);
         let mut follower = Follower::new(&problem.course);
         let mut a = vec![0.0; LANES * n];
-        for first in (0..self.q.len()).step_by(LANES * n) {
+        let firsts = (0..self.q.len()).step_by(LANES * n);
+        for first in firsts.take_while(|_| problem.cancellation.go_on()) {
             let range = first..(first + LANES * n).min(self.q.len());
             let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);

@@ -170,7 +170,9 @@ pub fn identify(
         }
         return Ok(Identified { obstacles: pieces.still, ..found });
     }
-    if states.len(n) > 0 && states.fit(&on_pieces, &mut x, met).is_none() {
+    let fitted = states.len(n) == 0 || states.fit(&on_pieces, &mut x, met).is_some();
+    stop.check()?;
+    if !fitted {
         return Err(IdentifyError::Singular);
     }
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
