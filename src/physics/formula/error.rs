@@ -65,8 +65,8 @@ pub enum FormulaError {
     },
     /// Rows that belong to no motion.
     #[error(
-        "{coordinate} is {value:e} at t = {time} (sample {} of trajectory {}{}), {} by {size:.3e} where its motion has a range of {range:.3e}; {}",
-        sample + 1, track + 1, if trajectory.is_empty() { String::new() } else { format!(", {trajectory}") }, if *jumps { "it jumps there" } else { "it is off" },
+        "{coordinate} is {value:.4e} at t = {time} (sample {} of trajectory {}), {} by {size:.3e} where its motion has a range of {range:.3e}; {}",
+        sample + 1, if trajectory.is_empty() { (track + 1).to_string() } else { trajectory.clone() }, if *jumps { "it jumps there" } else { "it is off" },
         if *places == 1 { "leave the row out or mend it".to_string() } else { format!("leave such rows out or mend them, there are {places}") }
     )]
     Wild {

@@ -1,7 +1,7 @@
-//! Terms exchanged after convergence: one candidate for one to three terms of the formula.
+//! Terms exchanged after convergence: one candidate for one to four terms of the formula.
 
 use super::motion::{BlockSum, Model, inflation, total};
-use super::search::{PASSES, Search, THRESHOLD};
+use super::search::{Search, THRESHOLD};
 use super::wald::RIDGE;
 use crate::identification::Segment;
 use crate::identification::linear::{inverse_with, part, times};
@@ -17,8 +17,9 @@ const LOOKED_AT: usize = 100;
 const FAR: f64 = 100.0;
 /// Cost up to which an exchange is looked at, in units of noise: what is linear says less of larger ones.
 const WITHIN: f64 = 10.0 * THRESHOLD;
-/// Cost that an exchange must save.
-const SAVED: f64 = THRESHOLD / 10.0;
+/// Choices of terms after an exchange, at most, and terms that are exchanged for one.
+const CHOICES: usize = 2;
+const MOST_GONE: usize = 4;
 
 /// Another choice of terms, and what it costs more: the sum of squares in units of noise, and a threshold for every term.
 #[derive(Clone, Debug)]
@@ -43,8 +44,11 @@ impl Search<'_> {
             rival = proposals.get(TRIED).cloned();
             for Exchanged { model: mut tried, .. } in proposals.into_iter().take(TRIED) {
                 let mut starts = segments.clone();
-                self.motion.settle(&tried, &mut starts, 4);
-                self.motion.fit(&mut tried, &mut starts, PASSES);
+                // The exchange may make other terms superfluous.
+                self.converge(&mut tried, &mut starts, CHOICES);
+                if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
+                    continue;
+                }
                 let square = self.motion.settle(&tried, &mut starts, 1).0;
                 let longer = tried.terms.len() as f64 - model.terms.len() as f64;
                 let cost = (square - before) / noise + THRESHOLD * longer;
@@ -56,7 +60,7 @@ impl Search<'_> {
                 }
             }
             let Some((found, starts)) = best else { break };
-            if found.cost > -SAVED {
+            if found.cost >= 0.0 {
                 if rival.as_ref().is_none_or(|rival| found.cost < rival.cost) {
                     rival = Some(found);
                 }
@@ -100,7 +104,8 @@ impl Search<'_> {
             let Some(inverse) = inverse_with(size, &part(m, &sum.matrix, &longer), RIDGE) else { continue };
             let x = times(size, &inverse, &pick(&longer));
             let gained = dot(&x, &pick(&longer)) - gain;
-            for (lost, gone) in removals(&inverse, &x, gained + noise * (WITHIN + 2.0 * THRESHOLD)) {
+            let most = gained + noise * (WITHIN + (MOST_GONE - 1) as f64 * THRESHOLD);
+            for (lost, gone) in removals(&inverse, &x, most) {
                 let cost = (lost - gained) / noise + THRESHOLD * (1.0 - gone.len() as f64);
                 let column = |k: usize| gone.iter().map(|&g| inverse[k * size + g]).collect::<Vec<f64>>();
                 let Some(pivot) = inverse_with(gone.len(), &part(size, &inverse, &gone), 0.0) else { continue };
@@ -119,7 +124,7 @@ impl Search<'_> {
     }
 }
 
-/// One to three of all terms but the last whose loss, together, is below `most`, with what they cost.
+/// One to four of all terms but the last whose loss, together, is below `most`, with what they cost.
 fn removals(inverse: &[f64], x: &[f64], most: f64) -> Vec<(f64, Vec<usize>)> {
     let size = x.len();
     let lost = |gone: &[usize]| {
@@ -130,7 +135,7 @@ fn removals(inverse: &[f64], x: &[f64], most: f64) -> Vec<(f64, Vec<usize>)> {
     // More terms never cost less than one of them.
     let mut found: Vec<(f64, Vec<usize>)> = Vec::new();
     let mut last: Vec<Vec<usize>> = vec![Vec::new()];
-    for _ in 0..3 {
+    for _ in 0..MOST_GONE {
         let mut next = Vec::new();
         for gone in &last {
             let from = gone.last().map_or(0, |last| last + 1);

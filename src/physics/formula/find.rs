@@ -80,8 +80,10 @@ const MOST_CANDIDATES: usize = 60;
 const MOST_START: usize = 15;
 /// Error of accelerations over the least of all choices that a shorter choice may have to start with.
 const START_ERROR: f64 = 1.3;
-/// The same of a choice with a positive definite mass matrix, if no such one is nearer.
+/// The same of a choice with a positive definite mass matrix, if no such one is nearer, and of others that are tried where the first leads
+/// to no formula; and their number.
 const DEFINITE_ERROR: f64 = 3.0;
+const OTHER_STARTS: usize = 2;
 /// Held-out residual over noise from which, and up to which, a formula is found; of noise that is given or that of exact numbers, only the
 /// latter.
 const LEAST_RESIDUAL: f64 = 0.8;
@@ -126,7 +128,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
             // Only a library that meets accelerations better is worth following the motion.
             let (error, before) = (weak.least(), least);
             least = least.min(error);
-            if error > BETTER * before { Ok(None) } else { weak.follow(&data, &judges, options).map(Some) }
+            if error > BETTER * before { Ok(None) } else { weak.follow_all(&data, &judges, options).map(Some) }
         });
         stop.check()?;
         match followed {
@@ -146,6 +148,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     }
     let mut found = best.ok_or_else(|| refused.unwrap_or(FormulaError::Singular))?;
     found.tried = searched;
+    found.notes.extend(data.suspicious.iter().cloned());
     if let Some(formula) = held {
         found.notes.push(format!(
             "the single trajectory keeps to {formula} = 0, by a constraint or by itself: what moves off it is not determined, record others"
@@ -251,18 +254,39 @@ impl WeakForm {
         best(&self.path).map_or(f64::INFINITY, judged)
     }
 
-    /// Goes on through the motion.
-    fn follow(
+    /// Goes on through the motion, from another choice of the weak form where one leads to no formula.
+    fn follow_all(
         &self,
         data: &Prepared<'_>,
         held: &BTreeSet<usize>,
         options: &FormulaOptions,
     ) -> Result<FoundFormula, FormulaError> {
+        let mut best: Option<FoundFormula> = None;
+        for choice in beginnings(&self.path, &self.windows) {
+            let found = self.follow(choice, data, held, options)?;
+            let done = found.verdict != Verdict::NotInLibrary;
+            if done || best.as_ref().is_none_or(|best| found.residual < best.residual) {
+                best = Some(found);
+            }
+            if done {
+                break;
+            }
+        }
+        best.ok_or(FormulaError::Singular)
+    }
+
+    /// Goes on through the motion.
+    fn follow(
+        &self,
+        choice: &Choice,
+        data: &Prepared<'_>,
+        held: &BTreeSet<usize>,
+        options: &FormulaOptions,
+    ) -> Result<FoundFormula, FormulaError> {
         let (library, kept) = (&self.library, &self.quotient.kept);
-        let Some(choice) = beginning(&self.path, &self.windows) else { return Err(FormulaError::Singular) };
         let mut model = Model {
-            terms: choice.iter().map(|&(k, _)| kept[k]).collect(),
-            coefficients: choice.iter().map(|&(_, c)| c).collect(),
+            terms: choice.set.iter().map(|&k| kept[k]).collect(),
+            coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
         };
         let mut candidates: Vec<usize> = self.path.order.iter().take(MOST_CANDIDATES).map(|&k| kept[k]).collect();
         candidates.extend(model.terms.iter().filter(|k| !candidates.contains(k)).copied().collect::<Vec<_>>());
@@ -313,7 +337,7 @@ impl WeakForm {
         let resampled = search.resample(&model, &blocks, &learned, (options.bootstraps, options.seed));
         stop.check()?;
         let shortened = shorten(&search, &self.quotient, &mut model, &mut learned);
-        let (covariance, settled) = covariance(&search, &mut model, &mut learned, &resampled);
+        let (covariance, settled) = covariance(&search, &mut model, &mut learned);
         let (square, count) = search.motion.settle(&model, &mut judges, 8);
         let share = |k: &usize| resampled.share.get(k).copied().unwrap_or(1.0);
         let probability = |k: &usize| match shortened.get(k) {
@@ -325,6 +349,7 @@ impl WeakForm {
         let mut found = FoundFormula::new(library, periodic, &model, (&covariance, &probability), options);
         let judged = Judged { search: &search, model: &model, segments: &judges, square, count };
         found.forced.clone_from(&data.forced);
+        found.draw(library, &model, &resampled.coefficients);
         found.residual = judged.residual();
         found.noise = data.sigma.clone();
         found.noise_resolved = data.resolved;
@@ -335,14 +360,14 @@ impl WeakForm {
         found.between = data.forced.contains(&true).then_some(search.motion.between);
         if let Some(rival) = rival {
             found.several = rival.cost < THRESHOLD;
-            let written = |k: &usize| library.written(*k, Notation::System);
+            let written = |&k: &usize| {
+                let kind = if library.is_dissipation(k) { "D: " } else { "" };
+                format!("{kind}{}", library.written(k, Notation::System))
+            };
             found.rival = Some(Rival { terms: rival.model.terms.iter().map(written).collect(), cost: rival.cost });
         }
         if !chosen {
             found.notes.push(format!("the choice of terms still changed after {ROUNDS} rounds"));
-        }
-        if !self.path.settled {
-            found.notes.push("exchanges in the weak form were cut off while they still helped".to_string());
         }
         if !settled {
             found.doubts.push("the fit of the coefficients has not come to its end".to_string());
@@ -351,6 +376,9 @@ impl WeakForm {
         found.verdict = judged.verdict(&found.doubts);
         if found.verdict == Verdict::NotInLibrary {
             found.doubts.clear();
+        }
+        if !self.path.settled && found.verdict != Verdict::Found {
+            found.notes.push("exchanges in the weak form were cut off while they still helped".to_string());
         }
         Ok(found)
     }
@@ -438,15 +466,18 @@ fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     (0..count).map(|_| blocks.swap_remove(rng.random_range(0..blocks.len()))).collect()
 }
 
-/// The shortest choice whose error is near the least, with its coefficients; one with a positive definite mass matrix if there is any that
-/// is not much worse.
-fn beginning(path: &Path, windows: &Windows) -> Option<Vec<(usize, f64)>> {
-    let few = || path.best.values().filter(|choice| choice.set.len() <= MOST_START);
-    let least = few().map(judged).fold(f64::INFINITY, f64::min);
-    let near = |most: f64| few().filter(move |choice| judged(choice) <= most * least);
+/// The shortest choice whose error is near the least, one with a positive definite mass matrix if there is any that is not much worse; then
+/// others near the least.
+fn beginnings<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
+    let few: Vec<&'a Choice> = path.best.values().filter(|choice| choice.set.len() <= MOST_START).collect();
+    let least = few.iter().map(|choice| judged(choice)).fold(f64::INFINITY, f64::min);
+    let near = |most: f64| few.iter().copied().filter(move |choice| judged(choice) <= most * least);
     let definite = |most: f64| near(most).find(|choice| windows.is_definite(&choice.coefficients));
-    let choice = definite(START_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(START_ERROR).next())?;
-    Some(choice.set.iter().map(|&k| (k, choice.coefficients[k])).collect())
+    let first = definite(START_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(START_ERROR).next());
+    let Some(first) = first else { return Vec::new() };
+    let mut others: Vec<&Choice> = near(DEFINITE_ERROR).filter(|choice| choice.set != first.set).collect();
+    others.sort_by(|a, b| judged(a).total_cmp(&judged(b)));
+    [first].into_iter().chain(others.into_iter().take(OTHER_STARTS)).collect()
 }
 
 /// The choice of the least error that the search through the motion may start with.

@@ -10,6 +10,7 @@ use crate::identification::Between;
 use crate::identification::linear::{inverse, part};
 use crate::linalg::dot;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Whether the library holds the Lagrangian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -65,6 +66,9 @@ pub struct FoundTerm {
     /// Place of the term of its block whose coefficient is given, if there is one.
     #[serde(skip)]
     reference: Option<usize>,
+    /// Coefficients of resamplings in which terms were chosen anew.
+    #[serde(skip)]
+    drawn: Vec<f64>,
     /// Coordinates that it joins.
     #[serde(skip)]
     joined: Vec<usize>,
@@ -186,6 +190,7 @@ impl FoundFormula {
                     unit: None,
                     near: None,
                     reference: None,
+                    drawn: Vec::new(),
                     joined: library.coordinates(k),
                     dimension: units.of_term(library, k),
                     latex: library.written(k, Notation::Latex),
@@ -225,6 +230,32 @@ impl FoundFormula {
             covariance,
             units: (options.units.clone(), options.time_unit.clone()),
         }
+    }
+
+    /// Takes the coefficients of resamplings of the recording, by the terms of the library.
+    pub(super) fn draw(&mut self, library: &Library, model: &Model, coefficients: &BTreeMap<usize, Vec<f64>>) {
+        for &k in &model.terms {
+            let text = library.written(k, Notation::System);
+            let own = |t: &&mut FoundTerm| t.term == text && t.dissipation == library.is_dissipation(k);
+            if let (Some(term), Some(drawn)) = (self.terms.iter_mut().find(own), coefficients.get(&k)) {
+                term.drawn.clone_from(drawn);
+            }
+        }
+    }
+
+    /// Standard deviation of a term's coefficient over the resamplings, as a ratio to that of a reference which is `value` then.
+    fn scatter(&self, k: usize, reference: Option<(usize, f64)>) -> f64 {
+        let own = &self.terms[k].drawn;
+        let values: Vec<f64> = match reference {
+            None => own.clone(),
+            Some((at, value)) => {
+                let pairs = own.iter().zip(&self.terms[at].drawn).filter(|(_, base)| **base != 0.0);
+                pairs.map(|(x, base)| x * value / base).collect()
+            }
+        };
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count.max(1.0);
+        (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt()
     }
 
     /// Fixes the common factor of every block of coordinates that no known force gives it: a term gets the coefficient that is given, or
@@ -296,7 +327,15 @@ impl FoundFormula {
         let element = |k: usize, l: usize| -> f64 {
             slopes[k].iter().flat_map(|(i, a)| slopes[l].iter().map(move |(j, b)| a * old[i * m + j] * b)).sum()
         };
-        let covariance: Vec<f64> = (0..m * m).map(|e| element(e / m, e % m)).collect();
+        let mut covariance: Vec<f64> = (0..m * m).map(|e| element(e / m, e % m)).collect();
+        // No error is smaller than what choosing the terms anew makes.
+        let wider = |k: usize| {
+            let reference = self.terms[k].reference.and_then(|at| references.iter().find(|(known, _)| *known == at));
+            let (own, drawn) = (covariance[k * m + k].max(0.0).sqrt(), self.scatter(k, reference.copied()));
+            if own > 0.0 { (drawn / own).max(1.0) } else { 1.0 }
+        };
+        let wider: Vec<f64> = (0..m).map(wider).collect();
+        covariance.iter_mut().enumerate().for_each(|(e, x)| *x *= wider[e / m] * wider[e % m]);
         let factors: Vec<f64> = (0..m).map(|k| of(k).map_or(1.0, |(_, factor)| factor)).collect();
         self.covariance = covariance;
         for (k, term) in self.terms.iter_mut().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::error::FormulaError;
 use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
+use crate::names::pluralize;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothing};
 use crate::recording::survey::{Kind, find_suspicious, stillness};
@@ -11,17 +12,18 @@ const WILD: f64 = 0.25;
 /// Samples that are looked at for ranges, about.
 const LOOKED_AT: usize = 1 << 16;
 
-/// Refuses a recording that holds no motion, or rows that are none.
-pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<(), FormulaError> {
+/// Refuses a recording that holds no motion, or rows that are none; what else does not look like motion, a sentence for each coordinate.
+pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<Vec<String>, FormulaError> {
     if let Some((i, how)) = stillness(recording, smoothing).into_iter().next() {
         let coordinate = recording.coordinates[i].clone();
         return Err(FormulaError::Still { coordinate, how: how.to_string() });
     }
-    (0..recording.n()).try_for_each(|i| wild(recording, i, smoothing.coordinates[i].noise.sigma))
+    let all = (0..recording.n()).map(|i| wild(recording, i, smoothing.coordinates[i].noise.sigma));
+    Ok(all.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
-/// Refuses rows far from the motion around them, and motion by steps.
-fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<(), FormulaError> {
+/// Refuses rows far from the motion around them, and motion by steps; a sentence about rows that stand out by less.
+fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, FormulaError> {
     let n = recording.n();
     let stride = (recording.samples() / LOOKED_AT).max(1);
     let of = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
@@ -41,8 +43,18 @@ fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<(), FormulaError>
     }
     let mut found = Vec::new();
     find_suspicious(recording, &|_, sample| sample as u64 + 1, (i, sigma), &mut found);
-    found.retain(|place| matches!(place.kind, Kind::Outlier | Kind::Jump) && place.size.abs() > WILD * range);
-    let Some(first) = found.iter().max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())) else { return Ok(()) };
+    found.retain(|place| matches!(place.kind, Kind::Outlier | Kind::Jump));
+    let mild = found.first().map(|first| {
+        let (places, number) = (pluralize(found.len(), "row does", "rows do"), first.place.0 + 1);
+        format!(
+            "{places} not look like motion in {}, first sample {} of trajectory {number}, off by {:.3e}",
+            coordinate(),
+            first.row,
+            first.size
+        )
+    });
+    found.retain(|place| place.size.abs() > WILD * range);
+    let Some(first) = found.iter().max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())) else { return Ok(mild) };
     let (track, sample) = first.place;
     Err(FormulaError::Wild {
         coordinate: coordinate(),

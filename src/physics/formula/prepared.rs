@@ -39,6 +39,8 @@ pub(super) struct Prepared<'a> {
     pub resolved: bool,
     /// `true` for a coordinate whose noise was estimated, and is not just that of exact numbers.
     pub estimated: Vec<bool>,
+    /// What does not look like motion, but is not far from it.
+    pub suspicious: Vec<String>,
     /// Coordinates with known forces.
     pub forced: Vec<bool>,
     pub bounds: Vec<[f64; 2]>,
@@ -59,7 +61,7 @@ impl<'a> Prepared<'a> {
         }
         let choice = SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() };
         let smoothing = Smoothing::choose(recording, &choice)?;
-        obstacles::refuse(recording, &smoothing)?;
+        let suspicious = obstacles::refuse(recording, &smoothing)?;
         let smooth =
             |track: &RecordedTrajectory| (track.len() >= LEAST_SAMPLES).then(|| smoothing.apply(track)).transpose();
         let smoothed = recording.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
@@ -123,6 +125,7 @@ impl<'a> Prepared<'a> {
             step,
             resolved,
             estimated,
+            suspicious,
             forced,
             bounds,
             speeds,

@@ -136,8 +136,8 @@ impl Search<'_> {
 pub(super) struct Resampled {
     /// Share that keeps it.
     pub share: BTreeMap<usize, f64>,
-    /// Standard deviation of its coefficient, 0 where it is given up, the common factors fixed.
-    pub deviation: BTreeMap<usize, f64>,
+    /// Its coefficients, 0 where it is given up.
+    pub coefficients: BTreeMap<usize, Vec<f64>>,
 }
 
 impl Search<'_> {
@@ -161,16 +161,13 @@ impl Search<'_> {
             drawn.extend(self.survivors(model, segments, blocks, &weight));
         }
         let count = drawn.len().max(1) as f64;
-        let (mut share, mut deviation) = (BTreeMap::new(), BTreeMap::new());
+        let (mut share, mut coefficients) = (BTreeMap::new(), BTreeMap::new());
         for (at, &k) in self.candidates.iter().enumerate() {
             let kept = drawn.iter().filter(|found| found.set.contains(&at)).count();
-            let values = || drawn.iter().map(|found| found.coefficients[at]);
-            let mean = values().sum::<f64>() / count;
-            let square = values().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
             share.insert(k, kept as f64 / count);
-            deviation.insert(k, square.sqrt());
+            coefficients.insert(k, drawn.iter().map(|found| found.coefficients[at]).collect());
         }
-        Resampled { share, deviation }
+        Resampled { share, coefficients }
     }
 }
 
@@ -229,14 +226,8 @@ pub(super) fn shorten(
     }
 }
 
-/// Covariance of the coefficients, the common factors fixed, no error smaller than what choosing the terms anew makes; `false` if the
-/// fit has not come to its end.
-pub(super) fn covariance(
-    search: &Search<'_>,
-    model: &mut Model,
-    segments: &mut [Segment],
-    resampled: &Resampled,
-) -> (Vec<f64>, bool) {
+/// Covariance of the coefficients, the common factors fixed; `false` if the fit has not come to its end.
+pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut [Segment]) -> (Vec<f64>, bool) {
     let m = model.terms.len();
     let mut last = (vec![f64::NAN; m * m], false);
     for _ in 0..REFITS {
@@ -252,15 +243,7 @@ pub(super) fn covariance(
         tracing::debug!(decrement, "fit goes on");
         search.motion.fit(model, segments, PASSES);
     }
-    let (mut covariance, settled) = last;
-    let wider = |at: usize| {
-        let own: f64 = covariance[at * m + at];
-        let drawn = resampled.deviation.get(&model.terms[at]).copied().unwrap_or(0.0);
-        if own > 0.0 { (drawn / own.sqrt()).max(1.0) } else { 1.0 }
-    };
-    let wider: Vec<f64> = (0..m).map(wider).collect();
-    covariance.iter_mut().enumerate().for_each(|(at, x)| *x *= wider[at / m] * wider[at % m]);
-    (covariance, settled)
+    last
 }
 
 /// Residuals over noise in eight parts of the range of every coordinate.

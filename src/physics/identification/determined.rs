@@ -57,8 +57,9 @@ impl Determined {
     ) -> Self {
         let m = x.len();
         let variance = variance.max(f64::MIN_POSITIVE);
-        let information: Vec<f64> = normal.matrix.iter().map(|x| x / variance).collect();
         let muted = problem.without_effect(x, normal);
+        let known = |(at, x): (usize, &f64)| if muted[at / m] || muted[at % m] { 0.0 } else { x / variance };
+        let information: Vec<f64> = normal.matrix.iter().enumerate().map(known).collect();
         let effect: Vec<f64> =
             (0..m).map(|k| if muted[k] { 0.0 } else { information[k * m + k].max(0.0).sqrt() }).collect();
         let size = |k: usize| {
