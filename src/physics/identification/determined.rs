@@ -15,7 +15,7 @@ const ALONE: f64 = 10.0;
 /// Part of the largest effect along a direction that is rounding of the eigenvectors; their unknowns are scaled to effects of at most 1e4.
 const PART: f64 = 1e-6;
 /// Relative error from which on the motion does not depend on a direction: what it shows is rounding.
-const NOTHING: f64 = 1e6;
+pub(super) const NOTHING: f64 = 1e6;
 /// Part of the largest change from which on another one is as large.
 const EQUAL: f64 = 0.99;
 
@@ -47,8 +47,14 @@ pub(super) struct Column {
 }
 
 impl Determined {
-    /// From undamped normal equations of `x`, found from `start`; `variance` is that of the residuals.
-    pub fn new(problem: &Problem<'_>, (x, start): (&[f64], &[f64]), normal: &Normal, variance: f64) -> Self {
+    /// From undamped normal equations of `x`, found from `start`; `variance` is that of the residuals. A direction is open from the relative error
+    /// `open` on: 1, or [`NOTHING`] of equations that are linear in the unknowns, where a sum with a large error is known none the less.
+    pub fn new(
+        problem: &Problem<'_>,
+        (x, start): (&[f64], &[f64]),
+        normal: &Normal,
+        (variance, open): (f64, f64),
+    ) -> Self {
         let m = x.len();
         let variance = variance.max(f64::MIN_POSITIVE);
         let muted = problem.without_effect(x, normal);
@@ -67,7 +73,8 @@ impl Determined {
         };
         let size: Vec<f64> = (0..m).map(size).collect();
         let rounding: Vec<f64> = normal.diagonal.iter().map(|x| ROUNDING * x.max(0.0) / variance).collect();
-        let resolved: Vec<f64> = (0..m).map(|k| size[k] / (1.0 + rounding[k] * size[k] * size[k]).sqrt()).collect();
+        let resolved = |k: usize| size[k] * open / (1.0 + rounding[k] * (size[k] * open).powi(2)).sqrt();
+        let resolved: Vec<f64> = (0..m).map(resolved).collect();
         let (live, silent): (Vec<usize>, Vec<usize>) = (0..m).partition(|&k| effect[k] * resolved[k] >= 1.0);
         let count = live.len();
         let scaled: Vec<f64> = (0..count * count)
@@ -78,7 +85,7 @@ impl Determined {
         // Finite by construction.
         let _ = eigh(count, &scaled, &mut values, &mut vectors, &mut Workspace::new());
         let mut covariance = vec![0.0; m * m];
-        let mut open = Vec::new();
+        let mut directions = Vec::new();
         for (value, vector) in values.iter().zip(vectors.chunks_exact(count.max(1))) {
             let along: Vec<(usize, f64)> = live.iter().zip(vector).map(|(&k, x)| (k, x * resolved[k])).collect();
             if *value >= 1.0 {
@@ -88,21 +95,21 @@ impl Determined {
             } else {
                 let mut change = vec![0.0; m];
                 along.iter().for_each(|&(k, x)| change[k] = x);
-                open.push(change);
+                directions.push(change);
             }
         }
-        let open = echelon(open, &size);
-        let mut found = Self { size, effect, covariance, silent, open, information, rounding };
-        found.drop_unseen();
+        let columns = echelon(directions, &size);
+        let mut found = Self { size, effect, covariance, silent, open: columns, information, rounding };
+        found.drop_unseen(open.recip());
         found
     }
 
     /// An unknown has part in an open direction if its own change along it, the others held, is seen and is no rounding of the others.
-    fn drop_unseen(&mut self) {
+    fn drop_unseen(&mut self, seen_from: f64) {
         for column in &mut self.open {
             let seen: Vec<f64> = column.change.iter().zip(&self.effect).map(|(x, effect)| (x * effect).abs()).collect();
             let largest = seen.iter().copied().fold(0.0, f64::max);
-            let least = f64::max(1.0, PART * largest);
+            let least = f64::max(seen_from, PART * largest);
             for (k, x) in column.change.iter_mut().enumerate().filter(|(k, _)| *k != column.pivot) {
                 *x = if seen[k] >= least { *x } else { 0.0 };
             }

@@ -2,7 +2,7 @@
 
 use super::bodies;
 use super::cure::{ByForces, Examiner};
-use super::determined::{Determined, echelon};
+use super::determined::{Determined, NOTHING, echelon};
 use super::found::{Combination, Constant, Identified, SensorConstant, Undetermined};
 use super::invariants::{Invariant, Kind, unit_of, written};
 use super::moves::{Group, Moves, nearest};
@@ -33,7 +33,10 @@ pub(super) fn unknowns(
     let (n, m) = (problem.sigma.len(), fitted.x.len());
     let recording = problem.course.recording;
     let before: Vec<f64> = start.iter().copied().chain(problem.sensors.iter().map(|sensor| sensor.perfect())).collect();
-    let determined = Determined::new(problem, (&fitted.x, &before), &fitted.normal, variance);
+    // What sums are known says what is open.
+    let is_linear = met == Met::Forces && problem.is_linear(&fitted.segments);
+    let from = if is_linear { NOTHING } else { 1.0 };
+    let determined = Determined::new(problem, (&fitted.x, &before), &fitted.normal, (variance, from));
     let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
     let sensor_name = |sensor: &Sensor| {
         let coordinate = &recording.coordinates[sensor.coordinate];
@@ -48,16 +51,15 @@ pub(super) fn unknowns(
     let bounds = instance.system.validation(n);
     let examiner = Examiner { problem, segments: &fitted.segments, coordinates: &recording.coordinates, bounds };
     let mut x = fitted.x.clone();
-    let (undetermined, combinations) = match met {
-        // What sums are known says what is open.
-        Met::Forces if problem.is_linear(&fitted.segments) => {
+    let (undetermined, combinations) = match is_linear {
+        true => {
             let changes = determined.changes();
             let columns: Vec<&[f64]> = changes.iter().map(Vec::as_slice).collect();
             nearest(&mut x, &before, &columns, &determined.size);
             let open = examiner.by_forces(&x, (&changes, &determined.size));
             (together(&names, &open, &examiner.still()), base_parameters(&determined, &names, &x))
         }
-        _ => {
+        false => {
             let square = fitted.normal.square / fitted.normal.count.max(1.0);
             let moves = Moves { problem, determined: &determined, variance: square.max(f64::MIN_POSITIVE), normal_at };
             let groups = moves.groups(&x);
