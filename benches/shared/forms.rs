@@ -106,6 +106,8 @@ const FORMS: [Form; 10] = [
 /// Number of kinds.
 pub const KINDS: usize = FORMS.len();
 const NOISE: f64 = 1e-3;
+/// Time between samples in s.
+const STEP: f64 = 0.02;
 
 /// A system of a kind with its true constants and a recording of its motion.
 pub struct Trial {
@@ -155,11 +157,17 @@ impl Trial {
         let model = instance(form, &truth)?.build()?;
         let n = form.coordinates.len();
         let push = |t: f64| 4.0 * (1.7 * t).sin() + 2.5 * (4.1 * t).cos();
-        let law = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = if form.driven { push(t) } else { 0.0 };
+        // Straight lines between the samples, so that it is known what drives the system there.
+        let between = |t: f64| {
+            let (before, share) = ((t / STEP).floor(), (t / STEP).fract());
+            (1.0 - share) * push(before * STEP) + share * push((before + 1.0) * STEP)
+        };
+        let law =
+            |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = if form.driven { between(t) } else { 0.0 };
         let mut tracks = Vec::new();
         for sign in [1.0, -0.6] {
             let start: Vec<f64> = form.coordinates.iter().map(|(_, q)| q * sign).collect();
-            let motion = Driven::new(&*model, &law).rollout(&start, &vec![0.0; n], &Options::reference(seconds, 0.02));
+            let motion = Driven::new(&*model, &law).rollout(&start, &vec![0.0; n], &Options::reference(seconds, STEP));
             let motion = motion.complete()?;
             let noisy = |q: &f64| {
                 let draw: f64 = StandardNormal.sample(&mut rng);

@@ -62,7 +62,7 @@ def imported(code):
 def fits(program, epochs, rounds):
     """Processor times of a fit by the program and by the package, in turns, and whether their models are the same."""
     angles, found = "theta1,theta2", {"program": [], "package": []}
-    choices = "trajectory='run', threads=1, epochs=int(sys.argv[3]), out=sys.argv[2]"
+    choices = "trajectory='run', threads=1, epochs=int(sys.argv[3]), out=sys.argv[2], overwrite=True"
     code = f"import lnn, sys; a = ['theta1', 'theta2']; lnn.fit(sys.argv[1], coordinates=a, angles=a, {choices})"
     with tempfile.TemporaryDirectory() as folder:
         outs = [Path(folder, name) for name in found]

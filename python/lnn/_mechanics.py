@@ -175,7 +175,8 @@ class Mechanics:
         points, _, shape = states(q, q, n)
         velocity = [0.0] * n if velocity is None else doubles_list("velocity", velocity)
         numbers, signatures, failures = self._subject.geometry(points, velocity)
-        fields: dict[str, Any] = {name: x.reshape(*shape, *[n] * TENSORS.get(name, 0)) for name, x in numbers.items()}
+        width = lambda name: (n,) * TENSORS.get(name, 0)
+        fields: dict[str, Any] = {name: x.reshape(shape + width(name)) for name, x in numbers.items()}
         return Geometry(**fields, signature=signatures.reshape(*shape, 2), failures=tuple(failures))
 
     def symmetries(

@@ -539,7 +539,7 @@ class Identified:
     over_noise : float
         Residuals over the noise, root mean square, all coordinates together.
     obstacles : tuple of str
-        What is to be known before all else: coordinates that stand still.
+        What is to be known before all else: coordinates that stand still, forces of which too little is known between the samples.
     converged : bool
         Whether the search arrived; if not, the constants are where it stopped.
     decrement : float

@@ -163,7 +163,7 @@ def test_torch_derivatives_and_vmap(models):
 def test_a_file_comes_back_and_an_altered_one_is_refused(models, tmp_path):
     for kind in ["single precision", "input layers of a hybrid"]:
         file = models[kind]
-        file.save(tmp_path / "model.safetensors")
+        file.save(tmp_path / "model.safetensors", overwrite=True)
         again = ModelFile.load(tmp_path / "model.safetensors")
         assert again.header == file.header and again.tensors.keys() == file.tensors.keys()
         assert all(np.array_equal(again.tensors[name], file.tensors[name]) for name in file.tensors)

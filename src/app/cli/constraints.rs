@@ -147,7 +147,7 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         .collect();
     let _ = writeln!(text, "\nsmaller deviations are not seen than the noise: {}", noise.join(", "));
     for (column, how) in &found.still {
-        let _ = writeln!(text, "{column} {how}: it takes no part");
+        let _ = writeln!(text, "{column} {how}; it takes no part");
     }
     let has = |kind| found.constraints.iter().any(|found| found.kind == kind);
     if has(ConstraintKind::Nearly) {

@@ -310,8 +310,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         row(sensor(s), (s.value, s.standard_error), unit, perfect(s.kind))
     });
     let headers = ["constant", "value", "standard error", "unit", "start"];
-    let said: String =
-        found.obstacles.iter().map(|obstacle| format!("{obstacle}; nothing can be learned of it\n")).collect();
+    let said: String = found.obstacles.iter().map(|obstacle| format!("{obstacle}\n")).collect();
     let mut text = said + &text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
     let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1);
     let known = sums.chain(found.undetermined.iter().flat_map(|open| &open.known)).map(|known| {

@@ -105,9 +105,12 @@ impl Determined {
     ) -> Result<Self, PipelineError> {
         let recording = &measured.training.recording;
         let (names, periodic) = (&recording.coordinates, &recording.periodic);
-        let observed = Observed::new(measured, targets)?;
+        let mut observed = Observed::new(measured, targets)?;
         let held_out = Observed::held_out(measured, targets)?;
         let missed = misfit(model, held_out.as_ref().unwrap_or(&observed));
+        if held_out.is_some() {
+            observed.missed = missed.clone().unwrap_or_default();
+        }
         let outside = held_out.as_ref().map(|held_out| observed.share_outside(held_out, periodic));
         let misfit: BTreeMap<_, _> = names.iter().cloned().zip(missed.into_iter().flatten()).collect();
         let withheld = withheld(&misfit, hold_out, held_out.is_some());

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 /// Lyapunov time is then above a fifth of the time span. Those of regular motions part in proportion to time, by a factor of
 /// some 50 in 50 s.
 pub const REGULAR: f64 = 5.0;
+/// Largest distance of neighbours in the numbers of the chart, over that at the start: more would leave the linear range.
+const WIDEST: f64 = 1e4;
 /// Time beyond which that factor counts relative to what it is there.
 const LONG: f64 = 50.0;
 
@@ -63,7 +65,9 @@ pub fn lyapunov<S: Integrable>(
     offset.iter_mut().for_each(|x| *x *= distance / norm);
 
     let mut growth = 0.0;
-    let mut here = Separation::new(model, &flat(0));
+    // Separations keep this size, as long as their coordinates do not become too large where those of the chart change fast.
+    let unit = Separation::new(model, &flat(0)).size(&offset);
+    let mut before = unit;
     for k in 0..main.len().saturating_sub(1) {
         let shifted: Vec<S> = flat(k).iter().zip(&offset).map(|(x, d)| S::of_f64(x + d)).collect();
         let (t, t_end) = (main.t[k], main.t[k + 1]);
@@ -77,16 +81,17 @@ pub fn lyapunov<S: Integrable>(
                 Ok(q.iter().chain(v).map(|x| x.to_f64()).collect())
             })
             .collect::<Result<_, RolloutError>>()?;
-        let before = here.size(&offset);
-        here = Separation::new(model, &ends[0]);
+        let here = Separation::new(model, &ends[0]);
         offset = ends[1].iter().zip(&ends[0]).map(|(a, b)| a - b).collect();
-        let grown = size(&offset);
-        if grown > 0.0 {
-            let factor = here.size(&offset) / before;
-            growth += if factor > 0.0 { factor.ln() } else { 0.0 };
-            offset.iter_mut().for_each(|x| *x *= distance / grown);
+        let now = here.size(&offset);
+        if now > 0.0 && now.is_finite() && before > 0.0 {
+            growth += (now / before).ln();
+            let shrink = (now / unit).max(size(&offset) / (WIDEST * distance));
+            offset.iter_mut().for_each(|x| *x /= shrink);
+            before = now / shrink;
         } else {
             offset = vec![distance / (2.0 * n as f64).sqrt(); 2 * n];
+            before = here.size(&offset);
         }
     }
     let time = (options.t_end - options.t0).abs().to_f64();
@@ -228,7 +233,7 @@ mod tests {
         let sphere = build::<f64>("sphere-geodesic", &[]).unwrap();
         let mut rng = RngStream::Test.generator(8);
         for k in 0..6 {
-            let turn = if k % 2 == 0 { 0.02 } else { 1.0 };
+            let turn = [0.005, 0.02, 1.0][k % 3];
             let (polar, rate) = (rng.random_range(0.6..2.5), rng.random_range(0.5..1.5));
             let state = ([polar, 0.3], [rate, turn * rng.random_range(0.5..1.0)]);
             let found = lyapunov(&*sphere, &state.0, &state.1, &Options::reference(60.0, 0.5)).unwrap();

@@ -23,8 +23,8 @@ const MOST: f64 = 0.97;
 /// constraints`: white noise is called coloured in none of a hundred).
 const PLAIN: f64 = 12.0;
 /// Misfits up to this above the least one are allowed. The differences at neighbouring distances share samples, so that their misfit scatters by
-/// more than its units: up to 12 the true variance is allowed, up to 4 it is missed in one of ten recordings with an autocorrelation of 0.9.
-const ALLOWED: f64 = 12.0;
+/// far more than its units: up to 40 the true variance is allowed in 15 of 16 recordings with an autocorrelation of 0.9, up to 12 in 11.
+const ALLOWED: f64 = 40.0;
 /// Mean squares over that of neighbours up to which the noise is seen beside the motion.
 const SEEN: f64 = 40.0;
 /// Fewest differences that tell.
@@ -163,10 +163,8 @@ mod tests {
                 let found = Colour::of(&tracks, 1, 0, white);
                 // What neighbours share hides behind the motion as soon as it is slow.
                 assert!((found.rho - rho).abs() < 0.1 && found.slack.sqrt() * found.sigma > 0.0095, "{rho}: {found:?}");
-                assert!(
-                    rho > 0.5 || ((found.sigma / 0.01 - 1.0).abs() < 0.15 && found.slack < 1.5),
-                    "{rho}: {found:?}"
-                );
+                assert!(rho > 0.5 || (found.sigma / 0.01 - 1.0).abs() < 0.15, "{rho}: {found:?}");
+                assert!(rho > 0.0 || found.slack == 1.0, "{rho}: {found:?}");
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use super::features::Features;
 use super::generators::{Generator, Limits, digits, reduce};
-use super::{ConstraintKind, FoundConstraint, MANY_PLACES, MotionSamples, beside, extend};
+use super::{ConstraintKind, FoundConstraint, MANY_PLACES, MotionSamples};
 use crate::linalg::{Workspace, dot, eigh};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -11,8 +11,8 @@ use std::f64::consts::{PI, TAU};
 /// Largest whole multiple of an angle that is looked at, and how near to one a ratio of gradients has to be.
 const MULTIPLES: std::ops::RangeInclusive<u32> = 1..=12;
 const WHOLE: f64 = 0.05;
-/// Share of the normal directions that have to agree for them to be the same everywhere.
-const ALIKE: f64 = 0.95;
+/// Share of the gradients that has to lie along the same directions everywhere.
+const ALIKE: f64 = 0.99;
 /// The smallest singular value of the gradients over the largest that it has along the motion, below which a second branch is met: half of
 /// what a motion that crosses one leaves between samples a hundredth of a radian apart.
 const BRANCH: f64 = 0.005;
@@ -37,29 +37,26 @@ pub(super) fn phases(
 
 /// Whole multiples of the coordinates that span the gradients of some functions everywhere, if there are such.
 fn directions(samples: &MotionSamples, features: &Features, functions: &[&Generator]) -> Option<Vec<Vec<i32>>> {
-    let (n, r) = (samples.n(), functions.len());
-    let (mut mean, mut count) = (vec![0.0; n * n], 0.0);
+    let (n, mut mean, mut count) = (samples.n(), vec![0.0; samples.n() * samples.n()], 0.0);
     for at in samples.places(MANY_PLACES) {
-        let mut basis = Vec::new();
-        for function in functions {
+        let rows = functions.iter().map(|function| {
             let row = features.gradient(samples, at, &function.weights);
-            let rest = beside(&basis, &row);
-            // Where a gradient nearly vanishes or follows from the others its direction is noise.
-            if dot(&rest, &rest) > 0.01 * dot(&row, &row) && dot(&row, &row) > 1e-2 * function.size().powi(2) {
-                extend(&mut basis, &row);
-            }
-        }
-        if basis.len() == r * n {
-            basis.chunks_exact(n).for_each(|u| (0..n * n).for_each(|k| mean[k] += u[k / n] * u[k % n]));
+            // Where a gradient nearly vanishes its direction is noise.
+            let seen = dot(&row, &row) > 1e-2 * function.size().powi(2);
+            if seen { row } else { vec![0.0; n] }
+        });
+        let rows: Vec<Vec<f64>> = rows.collect();
+        let size: f64 = rows.iter().map(|row| dot(row, row)).sum();
+        if size > 0.0 {
+            rows.iter().for_each(|row| (0..n * n).for_each(|k| mean[k] += row[k / n] * row[k % n] / size));
             count += 1.0;
         }
     }
     mean.iter_mut().for_each(|x| *x /= f64::max(count, 1.0));
     let (mut shares, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
     eigh(n, &mean, &mut shares, &mut vectors, &mut Workspace::new()).ok()?;
-    if r == 0 || r > n || shares[n - r] < ALIKE {
-        return None;
-    }
+    let alike = |r: &usize| shares[n - r..].iter().sum::<f64>() >= ALIKE;
+    let r = (1..=functions.len().min(n)).find(alike)?;
     let mut rows: Vec<Vec<f64>> = vectors.chunks_exact(n).skip(n - r).map(<[f64]>::to_vec).collect();
     reduce(&mut rows, &vec![1.0; n]);
     let whole = |row: &Vec<f64>| {

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 
 /// Most samples that are looked at, evenly spaced.
 const MOST_SAMPLES: usize = 60_000;
-/// A column moves if it scatters along some trajectory by more than so many standard deviations of its noise.
-const MOVES: f64 = 1.2;
+/// A column moves if it scatters along its trajectories by more than so many standard deviations of its noise: by less it would vanish itself,
+/// and every function of it with it.
+const MOVES: f64 = 2.0;
 
 /// Positions and velocities of trajectories, with standard deviations of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -226,5 +227,5 @@ fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> O
     }
     // A mean takes part of the noise that neighbours share.
     let still = resolved && square <= MOVES * MOVES * noise.sigma.powi(2) * noise.slack * count;
-    still.then(|| format!("does not move beyond its noise of {}", number(noise.sigma)))
+    still.then(|| format!("moves by no more than twice its noise of {}", number(noise.sigma)))
 }

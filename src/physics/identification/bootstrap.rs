@@ -13,13 +13,15 @@ use super::solve::Problem;
 use crate::linalg::dot;
 use crate::random::{RandomGenerator, RngStream};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
-use crate::recording::{RecordedTrajectory, Recording};
+use crate::recording::{RecordedTrajectory, Recording, deviation, rms};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Copies of the recording.
 pub(super) const COPIES: usize = 20;
 /// Degree of the polynomials of the true motion above those that are smoothed with: windows of that degree are wider.
 const MORE_DEGREES: usize = 2;
+/// Part of the spread of a coordinate by which integrated accelerations may be off.
+const ASTRAY: f64 = 0.1;
 
 /// What copies of the recording say.
 pub(super) struct Copies {
@@ -49,7 +51,8 @@ pub(super) fn copies(
         .tracks
         .iter()
         .map(|track| {
-            let motion = wider.apply(track).ok()?;
+            let mut motion = wider.apply(track).ok()?;
+            integrate(&mut motion, n);
             let force = asked(problem, x, &motion);
             Some((motion, force))
         })
@@ -93,6 +96,37 @@ pub(super) fn copies(
     });
     let (constants, residuals): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     (constants.len() == COPIES).then_some(Copies { constants, residuals })
+}
+
+/// Takes velocities and positions for integrals of the accelerations, which are straight lines between the samples: derivatives by local
+/// polynomials are not those of the positions, and smoothing would miss less of them than of the motion. The start is where the positions are met
+/// best. A coordinate that goes astray by that stays as it is.
+fn integrate(motion: &mut Smoothed, n: usize) {
+    let count = motion.times.len();
+    for i in 0..n {
+        let (mut q, mut v) = (vec![0.0; count], vec![0.0; count]);
+        for k in 1..count {
+            let h = motion.times[k] - motion.times[k - 1];
+            let [before, after] = [k - 1, k].map(|k| motion.a[k * n + i]);
+            v[k] = v[k - 1] + h * (before + after) / 2.0;
+            q[k] = q[k - 1] + h * v[k - 1] + h * h * (2.0 * before + after) / 6.0;
+        }
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / count as f64;
+        let positions: Vec<f64> = motion.q.iter().skip(i).step_by(n).copied().collect();
+        let off: Vec<f64> = positions.iter().zip(&q).map(|(position, q)| position - q).collect();
+        let (middle, level) = (mean(&motion.times), mean(&off));
+        let times = || motion.times.iter().map(|t| t - middle);
+        let slope = times().zip(&off).map(|(t, off)| t * off).sum::<f64>() / times().map(|t| t * t).sum::<f64>();
+        let left = rms(times().zip(&off).map(|(t, off)| off - level - slope * t));
+        if left > ASTRAY * deviation(positions.iter()) {
+            continue;
+        }
+        let lines: Vec<f64> = times().map(|t| level + slope * t).collect();
+        for (k, ((q, v), line)) in q.iter().zip(&v).zip(&lines).enumerate() {
+            motion.q[k * n + i] = q + line;
+            motion.v[k * n + i] = v + slope;
+        }
+    }
 }
 
 /// The forces that a motion asks for, `(samples, n)`.

@@ -18,8 +18,8 @@ use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::{Smoothing, noise};
 use crate::recording::{deviation, quantile, rms};
 
-/// How often coordinates are weighed anew at most, and relative change of all weights that ends it.
-const ROUNDS: usize = 6;
+/// How often coordinates are weighed anew at most, and relative change of all weights that ends it: one that is not reached is reported.
+const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.01;
 /// Residual over the spread of a force that is taken at least.
 const LEAST: f64 = 1e-9;

@@ -21,6 +21,11 @@ const LEAST: f64 = 1e-6;
 /// Spread of a coordinate over that of the others in which it stands still.
 const STILL: f64 = 1e-9;
 
+/// Kinds of numbers that are spread.
+const POSITION: usize = 0;
+const VELOCITY: usize = 1;
+const DRIVE: usize = 2;
+
 const MORE: &str = "more motion of this kind, or less noise";
 
 /// Looks for motion that would tell open directions.
@@ -55,10 +60,12 @@ pub(super) struct ByForces {
     pub here: Vec<Vec<f64>>,
 }
 
-/// Spreads coordinate `i` of states evenly over a range.
-fn spread((values, n): (&mut [f64], usize), i: usize, [low, high]: [f64; 2]) {
+/// Spreads coordinate `i` of states evenly over a range. Numbers of different `kind`, positions, velocities and what drives them, do not follow
+/// each other: these are multiples of different irrational numbers.
+fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize), [low, high]: [f64; 2]) {
+    let turn = ((kind * n + i + 2) as f64).powf(0.7);
     for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
-        *x = low + (high - low) * ((k + 1) as f64 * 0.618_033_988_749_895 * (i + 1) as f64).fract();
+        *x = low + (high - low) * ((k + 1) as f64 * turn).fract();
     }
 }
 
@@ -122,7 +129,7 @@ impl Examiner<'_> {
         follower.accelerate(&values, (&probe.q, &probe.v), &probe.force, &mut a);
         let slopes = follower.slopes(&values, (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
-        effects(&rows, &place.changes, |at| sizes[at % n])
+        effects((&rows, 1.0), &place.changes, |at| sizes[at % n])
     }
 
     /// Root mean square of the accelerations of every coordinate.
@@ -162,8 +169,8 @@ impl Examiner<'_> {
         let mut wild = recorded.clone();
         let [wide_q, wide_v] = self.ranges(&wild);
         for i in 0..n {
-            spread((&mut wild.q, n), i, wide_q[i].1);
-            spread((&mut wild.v, n), i, wide_v[i].1);
+            spread((&mut wild.q, n), (i, POSITION), wide_q[i].1);
+            spread((&mut wild.v, n), (i, VELOCITY), wide_v[i].1);
         }
         wild
     }
@@ -177,7 +184,9 @@ impl Examiner<'_> {
         follower.accelerate(&self.problem.parameters(x), (&driven.q, &driven.v), &[], &mut a);
         let push = |(at, mass): (usize, &f64)| mass.abs() * sizes[at % n];
         let rows = follower.mass().chunks_exact(n).map(|row| row.iter().enumerate().map(push).sum::<f64>());
-        driven.force = rows.enumerate().map(|(k, size)| if k % 3 == 0 { -size } else { size }).collect();
+        let mut shares = vec![0.0; driven.q.len()];
+        (0..n).for_each(|i| spread((&mut shares, n), (i, DRIVE), [-1.0, 1.0]));
+        driven.force = rows.zip(shares).map(|(size, share)| size * share).collect();
         driven
     }
 
@@ -245,11 +254,11 @@ impl Examiner<'_> {
         let range = |[low, high]: [f64; 2]| format!("{low:.3} .. {high:.3}");
         for (i, name) in self.coordinates.iter().enumerate() {
             let mut far = recorded.clone();
-            spread((&mut far.q, n), i, wide_q[i].1);
+            spread((&mut far.q, n), (i, POSITION), wide_q[i].1);
             let (now, then) = (range(wide_q[i].0), range(wide_q[i].1));
             let farther = (far, format!("motion in which {name} goes farther, over {then}, not {now}"));
             let mut fast = recorded.clone();
-            spread((&mut fast.v, n), i, wide_v[i].1);
+            spread((&mut fast.v, n), (i, VELOCITY), wide_v[i].1);
             let (now, then) = (range(wide_v[i].0), range(wide_v[i].1));
             let faster = (fast, format!("motion in which {name} is faster, with {name}_dot over {then}, not {now}"));
             for (probe, text) in [farther, faster] {
@@ -266,12 +275,13 @@ impl Examiner<'_> {
     pub fn by_forces(&self, x: &[f64], (changes, size): (&[Vec<f64>], &[f64])) -> ByForces {
         let (n, m) = (self.n(), self.problem.chosen.len());
         let probe = self.wild(&self.recorded(x));
-        let mut a = probe.v.clone();
-        a.iter_mut().enumerate().for_each(|(at, a)| *a *= if at % 3 == 0 { -1.7 } else { 1.3 });
+        let largest = probe.v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let mut a = vec![0.0; probe.v.len()];
+        (0..n).for_each(|i| spread((&mut a, n), (i, DRIVE), [-largest, largest]));
         let mut follower = Follower::new(&self.problem.course);
         let slopes = follower.force_slopes(&self.problem.parameters(x), (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
-        let (columns, apart) = effects(&rows, changes, |_| 1.0);
+        let (columns, apart) = effects((&rows, 0.0), changes, |_| 1.0);
         let (seen, unseen) = split(&scaled(columns, &apart));
         let basis = |rows: &[Vec<f64>]| {
             let own = if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &apart), rows) };
@@ -298,8 +308,13 @@ impl Examiner<'_> {
     }
 }
 
-/// Effects of changes by the slopes of equations, a column each, and those of their unknowns each for itself, the root of the sum of squares.
-fn effects(rows: &[&[f64]], changes: &[Vec<f64>], size: impl Fn(usize) -> f64) -> (Vec<Vec<f64>>, Vec<f64>) {
+/// Effects of changes by the slopes of equations, a column each, and those of their unknowns each for itself, the root of the sum of squares,
+/// of which every row has `least` at least.
+fn effects(
+    (rows, least): (&[&[f64]], f64),
+    changes: &[Vec<f64>],
+    size: impl Fn(usize) -> f64,
+) -> (Vec<Vec<f64>>, Vec<f64>) {
     let finite = |row: &&[f64]| row.iter().all(|x| x.is_finite());
     let of = |change: &Vec<f64>| {
         let (mut column, mut apart) = (Vec::with_capacity(rows.len()), 0.0);
@@ -308,7 +323,8 @@ fn effects(rows: &[&[f64]], changes: &[Vec<f64>], size: impl Fn(usize) -> f64) -
             column.push(parts().sum::<f64>());
             apart += parts().map(f64::abs).sum::<f64>().powi(2);
         }
-        (column, apart.sqrt())
+        let least = least * (column.len() as f64).sqrt();
+        (column, apart.sqrt().max(least))
     };
     changes.iter().map(of).unzip()
 }

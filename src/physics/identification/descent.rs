@@ -26,6 +26,8 @@ const ELIMINATION: f64 = 1e-14;
 const LIKE_STARTS: f64 = 1e-8;
 /// Effect of an unknown on the motion, over the motion itself and squared, that is rounding alone.
 const NO_EFFECT: f64 = 1e-22;
+/// The same while the search goes on, where a constant may be far smaller than it is to be.
+pub(super) const SILENT: f64 = 1e-26;
 const FIRST_DAMPING: f64 = 1e-4;
 pub(super) const LEAST_DAMPING: f64 = 1e-10;
 /// Damping beyond which nothing gets better.
@@ -107,8 +109,12 @@ impl Problem<'_> {
 
     /// Unknowns that the motion shows nothing of: their effect is rounding, or what other starts do as well.
     pub fn without_effect(&self, x: &[f64], normal: &Normal) -> Vec<bool> {
+        self.muted(x, normal, NO_EFFECT)
+    }
+
+    fn muted(&self, x: &[f64], normal: &Normal, part: f64) -> Vec<bool> {
         let m = x.len();
-        let mut muted = self.too_weak(x, normal, NO_EFFECT * self.size(normal.count));
+        let mut muted = self.too_weak(x, normal, part * self.size(normal.count));
         for (k, muted) in muted.iter_mut().enumerate() {
             *muted |= normal.matrix[k * m + k] <= LIKE_STARTS * normal.diagonal[k];
         }
@@ -146,7 +152,7 @@ impl Problem<'_> {
     pub fn fit(&self, x: &mut Vec<f64>, segments: &mut [Segment], iterations: usize) -> Normal {
         let mut best = self.all(x, segments);
         let mut normal = self.normal(&best, segments);
-        let mut muted = self.without_effect(x, &normal);
+        let mut muted = self.muted(x, &normal, SILENT);
         self.judge(x, &mut normal, &muted, false);
         let mut damping = FIRST_DAMPING;
         for _ in 0..iterations {
@@ -167,7 +173,7 @@ impl Problem<'_> {
             let after = self.normal(&tried, segments);
             if after.square < normal.square {
                 (*x, best, normal) = (moved, tried, after);
-                muted = self.without_effect(x, &normal);
+                muted = self.muted(x, &normal, SILENT);
                 self.judge(x, &mut normal, &muted, false);
                 damping = f64::max(damping / 10.0, LEAST_DAMPING);
             } else {

@@ -14,6 +14,8 @@ pub(super) const ROUNDING: f64 = 1e-8;
 const ALONE: f64 = 10.0;
 /// Part of the largest effect along a direction that is rounding of the eigenvectors; their unknowns are scaled to effects of at most 1e4.
 const PART: f64 = 1e-6;
+/// Relative error from which on the motion does not depend on a direction: what it shows is rounding.
+const NOTHING: f64 = 1e6;
 /// Part of the largest change from which on another one is as large.
 const EQUAL: f64 = 0.99;
 
@@ -49,8 +51,9 @@ impl Determined {
     pub fn new(problem: &Problem<'_>, (x, start): (&[f64], &[f64]), normal: &Normal, variance: f64) -> Self {
         let m = x.len();
         let variance = variance.max(f64::MIN_POSITIVE);
-        let information: Vec<f64> = normal.matrix.iter().map(|x| x / variance).collect();
         let muted = problem.without_effect(x, normal);
+        let known = |(at, x): (usize, &f64)| if muted[at / m] || muted[at % m] { 0.0 } else { x / variance };
+        let information: Vec<f64> = normal.matrix.iter().enumerate().map(known).collect();
         let effect: Vec<f64> =
             (0..m).map(|k| if muted[k] { 0.0 } else { information[k * m + k].max(0.0).sqrt() }).collect();
         let size = |k: usize| {
@@ -127,7 +130,7 @@ impl Determined {
         let rounding: f64 = change.iter().zip(&self.rounding).map(|(x, rounding)| x * x * rounding).sum();
         let size: f64 = change.iter().zip(&self.size).map(|(x, size)| (x / size).powi(2)).sum();
         let seen = quadratic(&self.information, change);
-        (seen > 10.0 * rounding && seen > 0.0).then(|| (size / seen).sqrt())
+        (seen > 10.0 * rounding && seen > size / (NOTHING * NOTHING)).then(|| (size / seen).sqrt())
     }
 
     /// Changes of all unknowns without an effect that is seen.

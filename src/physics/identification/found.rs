@@ -138,7 +138,7 @@ pub struct Identified {
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
     pub over_noise: f64,
-    /// What is to be known before all else: coordinates that stand still.
+    /// What is to be known before all else: coordinates that stand still, forces of which too little is known between the samples.
     pub obstacles: Vec<String>,
     /// `true` if the search arrived; if not, the constants are where it stopped.
     pub converged: bool,

@@ -16,21 +16,20 @@ use crate::recording::smooth::noise;
 const UNKNOWN: f64 = 100.0;
 /// Variance of an innovation over that of the noise up to which it tells of the noise: others tell of the start.
 const MOST_VARIANCE: f64 = 100.0;
-/// Innovations beyond so many standard deviations are those of outliers, which do not move the filter of an unknown start.
-const OUTLIER: f64 = 5.5;
 
 /// What moves the motion beside the equations.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Disturbances {
     /// Standard deviation of the noise of every known force; empty for forces that are exact.
     pub force: Vec<f64>,
-    /// `true` if the filter does not know the starts: innovations of the right form are then independent, those that tell of the start `NaN`.
-    pub unknown_start: bool,
+    /// Given if the filter does not know the starts: innovations of the right form are then independent, those that tell of the start `NaN`.
+    /// Innovations beyond so many standard deviations are those of outliers, `NaN` too, and do not move the filter.
+    pub unknown_start: Option<f64>,
 }
 
 /// The filter of one segment.
 pub(super) struct Filter {
-    unknown_start: bool,
+    unknown_start: Option<f64>,
     /// Variance of the start, `(2n, 2n)`.
     variance: Vec<f64>,
     /// Expected deviation of the start, of residuals and of each of their slopes: `(1 + width, 2n)`.
@@ -48,7 +47,7 @@ impl Filter {
         let variance = 1.0 + dot(&gain, &slopes);
         let root = variance.sqrt();
         let innovation = (residual - dot(&slopes, &self.expected[0])) / root;
-        if self.unknown_start && innovation.abs() > OUTLIER && variance < MOST_VARIANCE {
+        if self.unknown_start.is_some_and(|limit| innovation.abs() > limit) && variance < MOST_VARIANCE {
             return f64::NAN;
         }
         self.log_variance += variance.ln();
@@ -61,7 +60,7 @@ impl Filter {
         for (line, g) in self.variance.chunks_exact_mut(size).zip(&gain) {
             line.iter_mut().zip(&gain).for_each(|(x, other)| *x -= g * other / variance);
         }
-        if self.unknown_start && variance > MOST_VARIANCE { f64::NAN } else { innovation }
+        if self.unknown_start.is_some() && variance > MOST_VARIANCE { f64::NAN } else { innovation }
     }
 
     /// Lets errors of forces change the start, each by one row of `(n, 2n)`.
@@ -86,7 +85,8 @@ impl Problem<'_> {
     /// Estimates the noise of the known forces by the likelihood of the innovations, up to what their neighbouring samples show; `true` if that
     /// changes it.
     ///
-    /// Noise of the positions is taken out of the likelihood: its variance is the mean square innovation.
+    /// Noise of the positions is taken out of the likelihood: its variance is the mean square innovation. Starts are taken for unknown, as those
+    /// that are fitted take up much of what the forces do (Patterson and Thompson, Biometrika 58 (1971) 545).
     pub(super) fn estimate_force_noise(&mut self, x: &[f64], segments: &[Segment]) -> bool {
         let recording = self.course.recording;
         let forced = recording.tracks.iter().filter(|track| !track.force.is_empty());
@@ -97,13 +97,17 @@ impl Problem<'_> {
         let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
         probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
         let mut tried = self.clone();
+        tried.disturbances.unknown_start = Some(f64::INFINITY);
         let mut cost = |factor: f64| {
             tried.disturbances.force =
                 if factor > 0.0 { shown.iter().map(|s| factor * s).collect() } else { Vec::new() };
             let (mut square, mut count) = (0.0, 0.0);
             let logarithms = tried.residuals(x, &probes, false, |_, _, _, r, _| {
-                square += r * r;
-                count += 1.0;
+                // Those that tell of a start are missing.
+                if !r.is_nan() {
+                    square += r * r;
+                    count += 1.0;
+                }
             });
             let mean = square / f64::max(count, 1.0);
             let cost = count * f64::ln(mean) + logarithms;
@@ -137,11 +141,11 @@ impl Problem<'_> {
     pub(super) fn filters(&self, lanes: usize, width: usize) -> Vec<Filter> {
         let n = self.course.equations.n;
         let Disturbances { force, unknown_start } = &self.disturbances;
-        if force.is_empty() && !unknown_start {
+        if force.is_empty() && unknown_start.is_none() {
             return Vec::new();
         }
         let mut variance = vec![0.0; 4 * n * n];
-        for k in (0..2 * n).filter(|_| *unknown_start) {
+        for k in (0..2 * n).filter(|_| unknown_start.is_some()) {
             let time = if k < n { 1.0 } else { self.course.step };
             variance[k * (2 * n + 1)] = (UNKNOWN * self.sigma[k % n] / time).powi(2);
         }
@@ -196,7 +200,7 @@ mod tests {
             f64::from(u8::from(t == s)) + both.sum::<f64>()
         };
         let mut filter = Filter {
-            unknown_start: false,
+            unknown_start: None,
             variance: vec![0.0; 4],
             expected: vec![vec![0.0; 2]; 3 + STEPS],
             log_variance: 0.0,

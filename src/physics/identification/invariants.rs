@@ -121,7 +121,9 @@ pub(super) fn products(columns: &[&Column], x: &[f64], inside: &[usize]) -> Vec<
         return Vec::new();
     }
     let row = |&k: &usize| {
-        let own: Option<Vec<(i64, i64)>> = columns.iter().map(|column| fraction(exponent(column, k))).collect();
+        // A small exponent is no fraction.
+        let part = |column: &&Column| fraction(exponent(column, k)).filter(|(p, _)| *p != 0 || column.change[k] == 0.0);
+        let own: Option<Vec<(i64, i64)>> = columns.iter().map(part).collect();
         own.filter(|_| x[k] != 0.0).map(|own| (k, own))
     };
     let rows: Vec<(usize, Vec<(i64, i64)>)> = inside.iter().filter_map(row).collect();
@@ -145,6 +147,10 @@ pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invar
         factors[k] = 1.0;
         for column in columns {
             factors[column.pivot] = -near(column.change[k] / column.change[column.pivot]);
+        }
+        // The first has a positive factor, whichever the pivots are.
+        if factors.iter().find(|factor| **factor != 0.0).is_some_and(|first| *first < 0.0) {
+            factors.iter_mut().for_each(|factor| *factor = -*factor);
         }
         Invariant { kind: Kind::Sum, factors }
     };

@@ -51,6 +51,7 @@ mod stages;
 mod tests;
 mod unknowns;
 mod verdict;
+mod ways;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};

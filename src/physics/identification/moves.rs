@@ -8,8 +8,8 @@ use super::solve::{Normal, Problem};
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
-/// Factors by which a pivot is moved.
-const FACTORS: [f64; 2] = [2.0, 0.5];
+/// Factor by which a pivot is moved, either way.
+const FACTOR: f64 = 2.0;
 /// Steps of a fit with the pivots held, and halvings of each.
 const STEPS: usize = 12;
 const HALVINGS: usize = 5;
@@ -130,7 +130,7 @@ impl<'a> Moves<'a> {
             Kind::Sum => sums(&group.columns, &group.inside, x.len()),
         };
         let mut points = Vec::new();
-        for moves in moves_of(&group.columns) {
+        for moves in self.moves_of(x, &group.columns) {
             if left.is_empty() {
                 break;
             }
@@ -169,6 +169,19 @@ impl<'a> Moves<'a> {
         near.map_or_else(|| x.to_vec(), |(x, _)| x)
     }
 
+    /// Every direction alone, either way, and of several all together, alternately forth and back: what holds along each need not hold along
+    /// all. A pivot far below its size is moved up to this.
+    fn moves_of<'c>(&self, x: &[f64], columns: &[&'c Column]) -> Vec<Vec<(&'c Column, f64)>> {
+        let factors = |column: &'c Column| {
+            let far = self.determined.size[column.pivot] / x[column.pivot].abs();
+            [(column, FACTOR.max(far.min(f64::MAX))), (column, FACTOR.recip())]
+        };
+        let alone = columns.iter().copied().flat_map(|column| factors(column).map(|one| vec![one]));
+        let all =
+            |first: usize| columns.iter().enumerate().map(|(at, column)| factors(column)[(at + first) % 2]).collect();
+        alone.chain((0..2).filter(|_| columns.len() > 1).map(all)).collect()
+    }
+
     fn is_in_range(&self, x: &[f64]) -> bool {
         self.problem.chosen.iter().zip(x).all(|(&k, &x)| match self.problem.ranges[k] {
             Range::Positive => x > 0.0,
@@ -176,15 +189,6 @@ impl<'a> Moves<'a> {
             Range::Any => true,
         })
     }
-}
-
-/// Every direction alone, either way, and of several all together, alternately forth and back: what holds along each need not hold along
-/// all.
-fn moves_of<'a>(columns: &[&'a Column]) -> Vec<Vec<(&'a Column, f64)>> {
-    let alone = columns.iter().flat_map(|column| FACTORS.map(|factor| vec![(*column, factor)]));
-    let all =
-        |first: usize| columns.iter().enumerate().map(|(at, column)| (*column, FACTORS[(at + first) % 2])).collect();
-    alone.chain((0..2).filter(|_| columns.len() > 1).map(all)).collect()
 }
 
 /// Unknowns moved along directions until the pivot of each has changed by a factor.
@@ -196,7 +200,8 @@ fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
             match kind {
                 Kind::Product if x != 0.0 => *moved *= factor.powf(change / x * pivot / own),
                 Kind::Product => {}
-                Kind::Sum => *moved += (factor - 1.0) * change,
+                // The change is as large as the size already.
+                Kind::Sum => *moved += (factor.min(FACTOR) - 1.0) * change,
             }
         }
     }

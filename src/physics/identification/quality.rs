@@ -17,6 +17,10 @@ pub(super) const CHANCE: f64 = 0.01;
 const DIFFERENT: f64 = 0.005;
 /// Residual over the spread of what is met from which on there is more noise than anything else.
 const NOISY: f64 = 0.5;
+/// Times the precision of the integration that motion made by another integrator is off, and size of residuals over the noise up to which they may
+/// be its error: that is smooth, but no more so than what passes for noise in the differences of neighbouring samples.
+const COARSER: f64 = 40.0;
+const ALMOST_NOISE: f64 = 4.0;
 /// Share of samples that may stand out.
 const FEW: f64 = 0.01;
 /// Residuals this many times the usual one stand out.
@@ -80,7 +84,7 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
 pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<Vec<f64>>> {
     let n = problem.sigma.len();
     let mut open = problem.clone();
-    open.disturbances = Disturbances { unknown_start: true, ..problem.disturbances.clone() };
+    open.disturbances = Disturbances { unknown_start: Some(FAR), ..problem.disturbances.clone() };
     let runs = || segments.iter().map(|segment| vec![f64::NAN; segment.samples]).collect::<Vec<_>>();
     let mut found: Vec<Vec<Vec<f64>>> = (0..n).map(|_| runs()).collect();
     let mut order: Vec<usize> = (0..segments.len()).collect();
@@ -151,7 +155,21 @@ pub(super) struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
+    /// Nothing is held against residuals that are as small as integration and rounding let them be.
     pub fn verdict(&self) -> Verdict {
+        let all = |times: f64| self.sizes.iter().zip(&self.exact).all(|(size, exact)| *size <= times * exact);
+        let near = |(size, residual): (&f64, &Residual)| *size <= ALMOST_NOISE * residual.noise;
+        let refusal = self.refusal();
+        let exact = all(1.0) || refusal.is_some() && all(COARSER) && self.sizes.iter().zip(self.residuals).all(near);
+        match refusal {
+            Some(refusal) if !self.converged => refusal,
+            _ if exact => Verdict::Exact,
+            refusal => refusal.unwrap_or(Verdict::Explained),
+        }
+    }
+
+    /// What is held against the form first.
+    fn refusal(&self) -> Option<Verdict> {
         let share = |i: usize| {
             let spread = self.residuals[i].spread;
             if spread > 0.0 { self.sizes[i] / spread } else { 0.0 }
@@ -162,28 +180,25 @@ impl Evidence<'_> {
         let worst = all().max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
         let least = all().min_by(|&a, &b| self.probabilities[a].total_cmp(&self.probabilities[b])).unwrap_or(0);
         if !self.converged {
-            return Verdict::NotConverged;
-        }
-        if all().all(|i| self.sizes[i] <= self.exact[i]) {
-            return Verdict::Exact;
+            return Some(Verdict::NotConverged);
         }
         if let Some(i) = all().find(|&i| share(i) > NOISY && over(&i) <= EXPLAINED) {
-            return Verdict::Uninformative { coordinate: name(i), share: share(i) };
+            return Some(Verdict::Uninformative { coordinate: name(i), share: share(i) });
         }
         if over(&worst) > EXPLAINED {
-            return Verdict::Large { coordinate: name(worst), over_noise: over(&worst), share: share(worst) };
+            return Some(Verdict::Large { coordinate: name(worst), over_noise: over(&worst), share: share(worst) });
         }
         if self.outliers > FEW {
-            return Verdict::Outliers { share: self.outliers };
+            return Some(Verdict::Outliers { share: self.outliers });
         }
         if self.probabilities[least] < CHANCE {
             let probability = self.probabilities[least];
-            return Verdict::Correlated { coordinate: name(least), probability, share: share(least) };
+            return Some(Verdict::Correlated { coordinate: name(least), probability, share: share(least) });
         }
         if self.agreement < DIFFERENT {
-            return Verdict::Disagreement { probability: self.agreement };
+            return Some(Verdict::Disagreement { probability: self.agreement });
         }
-        Verdict::Explained
+        None
     }
 }
 

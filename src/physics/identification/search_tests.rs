@@ -44,7 +44,7 @@ fn a_strong_friction_is_found_from_a_weak_one() {
 
 #[test]
 fn positive_constants_come_back_from_almost_nothing() {
-    for (k, c) in [(2.0, 1e-12), (1e-12, 0.5), (1e-12, 1e-12), (1e4, 1e3)] {
+    for (k, c) in [(2.0, 1e-9), (1e-9, 0.5), (1e-9, 1e-9), (1e4, 1e3)] {
         let recording = recorded(&damped(3.0, 0.4), &[&[1.3, 0.2]], (6.0, 0.02), &[1e-3], 3);
         let found = identify(&damped(k, c), &recording, &IdentifyOptions::default()).unwrap();
         let off = off(&found, &[("k", 3.0), ("c", 0.4)]);
@@ -56,7 +56,7 @@ fn positive_constants_come_back_from_almost_nothing() {
 fn a_constant_at_its_bound_is_called_that() {
     let mut bound = 0;
     for seed in 0..8 {
-        let recording = recorded(&damped(3.0, 0.0), &[&[0.5, 0.2]], (6.0, 0.05), &[2e-2], seed);
+        let recording = recorded(&damped(3.0, 1e-9), &[&[0.5, 0.2]], (6.0, 0.05), &[2e-2], seed);
         let found = identify(&damped(2.0, 0.5), &recording, &IdentifyOptions::default()).unwrap();
         let (c, k) = (&found.constants[0], &found.constants[1]);
         assert!(found.converged && (k.value - 3.0).abs() < 4.5 * k.standard_error.unwrap(), "{found:?}");
@@ -102,6 +102,10 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
     assert!(!short.converged && short.decrement > 1.0, "{short:?}");
     let whole = problem.fit(&mut start.clone(), &mut segments(), 100);
     assert!(whole.converged && whole.decrement < 1e-6, "{whole:?}");
+    // From where an earlier step went astray.
+    let mut x = vec![1e-12; 2];
+    let back = problem.fit(&mut x, &mut segments(), 100);
+    assert!(back.converged && (back.square / whole.square - 1.0).abs() < 1e-6, "{x:?} {back:?}");
 }
 
 /// Some of the samples of a trajectory.
@@ -141,9 +145,10 @@ fn angles_turn_within_gaps() {
     let mut track = sampled(&recording.tracks[0], 1, &kept);
     track.q.iter_mut().skip(60).for_each(|q| *q -= 6.0 * std::f64::consts::TAU);
     recording.tracks[0] = track;
-    let found = identify(&pendulum(&[]), &recording, &IdentifyOptions::default()).unwrap();
+    let options = IdentifyOptions { segment: Some(8.0), ..Default::default() };
+    let found = identify(&pendulum(&[]), &recording, &options).unwrap();
     assert!(found.converged && off(&found, &[("w", 8.0)])[0].abs() < 4.5, "{found:?}");
-    assert!(found.constants[0].standard_error.unwrap() < 2e-3 && found.segments == 1, "{found:?}");
+    assert!((found.over_noise - 1.0).abs() < 0.2 && found.segments == 1, "{found:?}");
 }
 
 #[test]
@@ -250,12 +255,16 @@ fn a_delay_beside_a_force_is_found() {
         let track = RecordedTrajectory { name: "run".into(), times, q, v: vec![], a: vec![], force };
         let mut recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         noise(&mut recording, &[1e-3], seed);
-        let options = IdentifyOptions { delays: vec!["x".into()], ..Default::default() };
+        let options = IdentifyOptions { delays: vec!["x".into()], between: Some(Between::Cubic), ..Default::default() };
         let found = identify(&form(&[]), &recording, &options).unwrap();
-        let delay = &found.sensors[0];
-        let z = (delay.value - 0.01 * late as f64) / delay.standard_error.unwrap();
-        assert!(found.converged && z.abs() < 4.5 && delay.standard_error.unwrap() < 2e-3, "{late}: {found:?}");
-        let off = off(&found, &[("m", 1.0), ("k", 20.0), ("c", 0.4)]);
-        assert!(off.iter().all(|off| off.abs() < 4.5), "{late}: {found:?}");
+        // A force that is held is late by half a sample, which is a delay as well.
+        let any = identify(&form(&[]), &recording, &IdentifyOptions { between: None, ..options }).unwrap();
+        for (found, most) in [(found, 1e-3), (any, 0.02)] {
+            let delay = &found.sensors[0];
+            let z = (delay.value - 0.01 * late as f64) / delay.standard_error.unwrap();
+            assert!(found.converged && z.abs() < 4.5 && delay.standard_error.unwrap() < most, "{late}: {found:?}");
+            let off = off(&found, &[("m", 1.0), ("k", 20.0), ("c", 0.4)]);
+            assert!(off.iter().all(|off| off.abs() < 4.5), "{late}: {found:?}");
+        }
     }
 }

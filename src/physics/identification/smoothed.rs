@@ -1,6 +1,6 @@
 //! Constants by least squares on smoothed motion: on its accelerations, where the fit through the motion begins, or on known forces.
 
-use super::descent::{LEAST_DAMPING, MOST_DAMPING};
+use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
 use super::solve::{Normal, Problem};
 use crate::recording::smooth::Smoothed;
@@ -11,8 +11,6 @@ const MOST_STATES: usize = 12_000;
 /// Errors beyond so many standard deviations count linearly.
 const HUBER: f64 = 3.0;
 const ITERATIONS: usize = 60;
-/// Effect of a constant on accelerations, over these and squared, that is rounding alone.
-const NO_EFFECT: f64 = 1e-20;
 
 /// States with their accelerations, `(states, n)`, and the errors to expect of these.
 #[derive(Default)]
@@ -161,7 +159,7 @@ impl States {
         // Forces are often linear in the constants.
         let mut damping = if met == Met::Forces { 1e-9 } else { 1e-3 };
         for _ in 0..ITERATIONS {
-            let muted = problem.too_weak(x, &best, NO_EFFECT * size);
+            let muted = problem.too_weak(x, &best, SILENT * size);
             problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
             let residual = (best.square / best.count.max(1.0)).sqrt();
             if best.converged || damping > MOST_DAMPING || !problem.cancellation.iterate(residual) {

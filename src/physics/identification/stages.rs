@@ -12,6 +12,7 @@ use super::quality::{
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
+use super::ways::best_between;
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
@@ -34,7 +35,7 @@ const GAIN: f64 = 0.01;
 const MANY: usize = 8;
 /// Residual over the spread of a coordinate up to which it is that of the integration, a few times [`LEAST_NOISE`].
 const EXACT: f64 = 5.0 * LEAST_NOISE;
-const ITERATIONS: usize = 40;
+pub(super) const ITERATIONS: usize = 40;
 /// Samples of a trajectory that tell its own noise.
 const MANY_SAMPLES: usize = 40;
 /// Logarithm of the noise of a trajectory over that of all from which on it has a noise of its own.
@@ -83,10 +84,13 @@ impl Fitted {
         if plain { (square, 1.0) } else { (square * scatter, scatter) }
     }
 
-    /// Mean logarithm of the errors of the unknowns, each with the others fixed.
+    /// Mean logarithm of the errors of the unknowns, each with the others fixed; of those whose size is seen, since the others have rounding
+    /// for errors.
     fn spread(&self) -> f64 {
         let m = self.x.len();
-        let logarithms = (0..m).map(|k| self.normal.matrix[k * m + k]).filter(|x| *x > 0.0).map(f64::ln);
+        let own = |k: &usize| self.normal.matrix[k * m + k];
+        let is_seen = |k: &usize| own(k) > 0.0 && (self.x[*k] == 0.0 || own(k) * self.x[*k] * self.x[*k] > 1.0);
+        let logarithms = (0..m).filter(is_seen).map(|k| own(&k).ln());
         let (sum, count) = logarithms.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
         (self.inflation().0.ln() - sum / f64::max(count, 1.0)) / 2.0
     }
@@ -176,10 +180,13 @@ pub fn identify(
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
-    if forced && options.between.is_none() {
-        fitted = best_between(&mut problem, fitted);
-    }
     if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+        refit(&problem, &mut fitted, ITERATIONS);
+    }
+    // Noise of the forces is known by now: the smoothest curve through it does not pass for the best.
+    let (best, rivals) = best_between(&mut problem, fitted, options, forced);
+    fitted = best;
+    if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
         refit(&problem, &mut fitted, ITERATIONS);
     }
     if !known {
@@ -214,7 +221,9 @@ pub fn identify(
         let coordinate = recording.coordinates[0].clone();
         (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
     }
-    Ok(Identified { obstacles: pieces.still, ..found })
+    found.obstacles = pieces.still;
+    rivals.widen(&mut found);
+    Ok(found)
 }
 
 /// Standard deviation of a coordinate over all samples; 1 for one that rests.
@@ -307,7 +316,7 @@ fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     if better { tried } else { fitted }
 }
 
-fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
+pub(super) fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
     fitted.substeps = problem.course.substeps;
     fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
 }
@@ -345,23 +354,6 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     problem.course.substeps != before
 }
 
-/// The way between the samples of known forces that meets the motion best.
-fn best_between(problem: &mut Problem<'_>, fitted: Fitted) -> Fitted {
-    let mut best = (problem.course.between, fitted);
-    for between in [Between::Held, Between::Cubic, Between::BandLimited] {
-        problem.course.between = between;
-        let mut tried = best.1.clone();
-        problem.settle(&tried.x, &mut tried.segments, 3);
-        refit(problem, &mut tried, ITERATIONS);
-        tracing::debug!(?between, square = tried.mean_square(), "forces");
-        if tried.normal.square < best.1.normal.square {
-            best = (between, tried);
-        }
-    }
-    problem.course.between = best.0;
-    best.1
-}
-
 /// Weighs coordinates by the residuals that are left, and those of every trajectory by its own where trajectories plainly differ.
 fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
     let (n, tracks) = (problem.sigma.len(), problem.course.recording.tracks.len());
@@ -377,19 +369,30 @@ fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
     let mut of = vec![vec![0.0; n]; tracks];
     let mut unlike = false;
     for i in 0..n {
-        let least = LEAST_NOISE * problem.spread[i];
+        let least = (LEAST_NOISE * problem.spread[i]).max(1e-3 * problem.sigma[i]);
         let size = |values: Vec<f64>| (deviation_of(values, problem.robust) / taken.sqrt()).max(least);
         let whole = size(own.iter().skip(i).step_by(n).flatten().copied().collect());
-        problem.sigma[i] = whole.max(1e-3 * problem.sigma[i]);
+        // What integration leaves of exact motion is no noise.
+        let noisy = whole > EXACT * problem.spread[i];
+        problem.sigma[i] = whole;
         for (track, of) in of.iter_mut().enumerate() {
             let values = &own[track * n + i];
-            let count = values.len() as f64;
+            let count = independent(values);
             of[i] = if values.len() < MANY_SAMPLES { whole } else { size(values.clone()) };
             // The logarithm of a standard deviation scatters by the root of half a count.
-            unlike |= (of[i] / whole).ln().abs() > UNLIKE.max(5.0 / (2.0 * count).sqrt());
+            unlike |= noisy && (of[i] / whole).ln().abs() > UNLIKE.max(5.0 / (2.0 * count).sqrt());
         }
     }
     problem.sigma_of = if unlike { of } else { Vec::new() };
+}
+
+/// As many independent numbers as tell a mean square as well as these, by the correlation of neighbours.
+fn independent(values: &[f64]) -> f64 {
+    let square: f64 = values.iter().map(|x| x * x).sum();
+    let product: f64 = values.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let alike = (product / square).powi(2);
+    let share = (1.0 - alike) / (1.0 + alike);
+    if share.is_finite() { values.len() as f64 * share } else { 0.0 }
 }
 
 /// Root mean square, or what the median of the size says of normal numbers, which is 0.6745 of it.
@@ -527,7 +530,10 @@ fn result(
         size,
     };
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
-    let lags = follow.iter().filter(|of| !is_white(of)).map(|of| 2 * of.length).max();
+    // Where a correlation is not seen to end within segments it goes on in the next ones.
+    let longest = fitted.segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
+    let window = |of: &Correlation| if 4 * of.length >= longest { 4 * longest } else { 2 * of.length };
+    let lags = follow.iter().filter(|of| !is_white(of)).map(window).max();
     let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
     let (normal, inflation) = informed(problem, fitted, (weighing, lags), known);
     let verdict = Evidence {

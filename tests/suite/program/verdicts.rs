@@ -123,7 +123,7 @@ fn oscillators(joined: f64, seconds: f64) -> String {
 fn fitted(folder: &Folder, csv: String, more: &[&str]) -> (String, Value) {
     let (data, out) = (folder.file("motion.csv", csv), text(&folder.path("out")));
     let columns =
-        ["fit", &data, "--coords", "x,y", "--trajectory", "run", "--out", &out, "--overwrite", "--hidden", "16"];
+        ["fit", &data, "--coords", "x,y", "--trajectory", "run", "--out", &out, "--overwrite", "--hidden", "24,24"];
     let run = lnn(&[&columns[..], more].concat());
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     let summary = fs::read(folder.path("out").join("summary.json")).unwrap();
@@ -133,7 +133,7 @@ fn fitted(folder: &Folder, csv: String, more: &[&str]) -> (String, Value) {
 #[test]
 fn coordinates_that_move_by_themselves_are_named_and_give_no_good_model() {
     let folder = Folder::new();
-    let (told, found) = fitted(&folder, oscillators(0.0, 8.0), &["--epochs", "60"]);
+    let (told, found) = fitted(&folder, oscillators(0.0, 12.0), &["--epochs", "200"]);
     assert!(!told.starts_with("measured: good"), "{told}");
     let groups = found["groups"].as_array().unwrap();
     assert_eq!(
@@ -142,7 +142,7 @@ fn coordinates_that_move_by_themselves_are_named_and_give_no_good_model() {
         "{told}"
     );
     assert!(told.contains("y moves by itself"), "{told}");
-    let (_, found) = fitted(&folder, oscillators(3.0, 8.0), &["--epochs", "60"]);
+    let (_, found) = fitted(&folder, oscillators(3.0, 12.0), &["--epochs", "200"]);
     assert!(found.get("groups").is_none(), "{found}");
 }
 

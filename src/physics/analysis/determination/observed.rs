@@ -20,6 +20,9 @@ pub struct Observed {
     pub finer: Vec<f64>,
     /// Number of errors of the accelerations that are independent, of each coordinate, `(n)`.
     pub independent: Vec<f64>,
+    /// What the model misses of the accelerations of held-out motion, over their size, `(n)`, or nothing: the error of a network where it was
+    /// not fitted.
+    pub missed: Vec<f64>,
 }
 
 /// States that are looked at; of more, evenly spaced ones.
@@ -70,6 +73,7 @@ impl Observed {
             error: quality().map(|quality| if derived { quality.total(2) } else { 0.0 }).collect(),
             finer: Vec::new(),
             independent,
+            missed: Vec::new(),
         }
     }
 

@@ -25,6 +25,8 @@ pub(super) struct Data {
     /// Mean square of the observed accelerations, of their expected error, and the number of independent errors, of each
     /// coordinate.
     observed: Vec<[f64; 3]>,
+    /// [`Observed::missed`].
+    missed_elsewhere: Vec<f64>,
 }
 
 impl Data {
@@ -41,6 +43,7 @@ impl Data {
             inverse: vec![],
             mass: vec![],
             observed: vec![],
+            missed_elsewhere: observed.missed.clone(),
         };
         let mut terms = Terms::default();
         let mut workspace = Workspace::new();
@@ -101,17 +104,17 @@ impl Data {
     }
 
     /// Groups of coordinates that do not act on each other, as far as the model knows: an influence within what it misses beyond the error of
-    /// the data, or within a share [`COUPLED`] of the acceleration, is none.
+    /// the data, or twice what it misses of held-out motion, or a share [`COUPLED`] of the acceleration, is none.
     pub fn groups(&self, model: &dyn EulerLagrange<f64>) -> Vec<Vec<usize>> {
         let (n, stride) = (self.n, self.states().div_ceil(SHOWN).max(1));
         let some = |x: &[f64]| -> Vec<f64> { x.chunks_exact(n).step_by(stride).flatten().copied().collect() };
         let (q, v, force) = (some(&self.q), some(&self.v), some(&self.force));
-        let noise = mean_squares(n, &self.missed).into_iter().zip(&self.observed).map(
-            |(square, [size, error, independent])| {
-                let beyond = (square - error).max(0.0) + 2.0 * square * (2.0 / independent).sqrt();
-                beyond.max(COUPLED * COUPLED * size).sqrt()
-            },
-        );
+        let squares = mean_squares(n, &self.missed);
+        let noise = self.observed.iter().zip(&squares).enumerate().map(|(i, ([size, error, independent], square))| {
+            let beyond = (square - error).max(0.0) + 2.0 * square * (2.0 / independent).sqrt();
+            let share = self.missed_elsewhere.get(i).map_or(COUPLED, |missed| COUPLED.max(2.0 * missed));
+            beyond.max(share * share * size).sqrt()
+        });
         let accelerations = |q: &[f64], v: &[f64]| {
             let mut terms = Terms::default();
             // Places between which nothing was seen may have none.
@@ -208,8 +211,9 @@ impl Data {
 const OPEN: f64 = 0.5;
 /// Fewest states of a group.
 const LEAST: usize = 5;
-/// Share of an acceleration up to which the influence of another coordinate may be an error of the network: networks of motion without any
-/// coupling show influences of up to 0.06 (`cargo bench --bench rates -- --part readings`).
+/// Share of an acceleration up to which the influence of another coordinate may be an error of the network: small networks of motion without
+/// any coupling that miss 7 to 29 % of held-out accelerations show influences of 0.05 to 0.23, below twice what they miss, and networks of
+/// coupled motion that miss 4 to 11 % show 0.18 to 0.32 (as in `cargo bench --bench rates -- --part readings`).
 const COUPLED: f64 = 0.1;
 /// States at which couplings are looked for, at most.
 const SHOWN: usize = 500;

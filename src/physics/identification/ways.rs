@@ -1,0 +1,77 @@
+//! Known forces between the samples: the way that meets the motion best, and what the other ways that meet it as well say of the unknowns.
+
+use super::found::Identified;
+use super::solve::Problem;
+use super::stages::{Fitted, ITERATIONS, refit};
+use super::{Between, IdentifyOptions};
+
+/// Sum of squares, in units of the variance, by which a way may be worse and still not be excluded: three standard deviations.
+const RIVAL: f64 = 9.0;
+
+/// Ways that the motion does not exclude beside the best, and the farthest that unknowns are by one of them.
+#[derive(Default)]
+pub(super) struct Rivals {
+    names: Vec<&'static str>,
+    farthest: Vec<f64>,
+}
+
+/// The fit by the way that meets the motion best.
+pub(super) fn best_between(
+    problem: &mut Problem<'_>,
+    fitted: Fitted,
+    options: &IdentifyOptions,
+    forced: bool,
+) -> (Fitted, Rivals) {
+    if !forced || options.between.is_some() {
+        return (fitted, Rivals::default());
+    }
+    let mut best = 0;
+    let mut tried = vec![(problem.course.between, fitted)];
+    for between in [Between::Held, Between::Cubic, Between::BandLimited] {
+        problem.course.between = between;
+        let mut own = tried[best].1.clone();
+        problem.settle(&own.x, &mut own.segments, 3);
+        refit(problem, &mut own, ITERATIONS);
+        tracing::debug!(?between, square = own.normal.square, "forces");
+        if own.normal.square < tried[best].1.normal.square {
+            best = tried.len();
+        }
+        tried.push((between, own));
+    }
+    let (between, fitted) = tried.swap_remove(best);
+    problem.course.between = between;
+    let limit = fitted.normal.square + RIVAL * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
+    let mut rivals = Rivals { names: vec![between.name()], farthest: vec![0.0; fitted.x.len()] };
+    for (between, own) in tried.iter().filter(|(_, own)| own.normal.failed == 0 && own.normal.square < limit) {
+        rivals.names.push(between.name());
+        let off = own.x.iter().zip(&fitted.x).map(|(own, best)| (own - best).abs());
+        rivals.farthest.iter_mut().zip(off).for_each(|(most, off)| *most = most.max(off));
+    }
+    (fitted, rivals)
+}
+
+impl Rivals {
+    /// Widens the errors of the unknowns that rivals say otherwise, and says so of those that are doubled at least.
+    pub fn widen(&self, found: &mut Identified) {
+        let names = found.constants.iter().map(|c| c.symbol.clone());
+        let names: Vec<String> =
+            names.chain(found.sensors.iter().map(|s| format!("{} of {}", s.kind, s.coordinate))).collect();
+        let errors = found.constants.iter_mut().map(|c| &mut c.standard_error);
+        let errors = errors.chain(found.sensors.iter_mut().map(|s| &mut s.standard_error));
+        let mut doubled = Vec::new();
+        for ((error, off), name) in errors.zip(&self.farthest).zip(names) {
+            if let Some(error) = error {
+                if *off > 1.7 * *error {
+                    doubled.push(name);
+                }
+                *error = error.hypot(*off);
+            }
+        }
+        if !doubled.is_empty() {
+            let (ways, names) = (self.names.join(", "), doubled.join(", "));
+            found
+                .obstacles
+                .push(format!("forces between the samples may be {ways}: the error of {names} is what that changes"));
+        }
+    }
+}
