@@ -114,11 +114,9 @@ pub fn imply(layers: &mut Layers, path: &str, timed: bool) {
         let factor = Value::try_from(model.network.factor).unwrap_or_else(|_| "triangle".into());
         let mut also = vec![at("network.factor", factor)];
         if structure.is_some_and(|structure| structure != Structure::BlackBox) {
-            also.extend([
-                at("penalty.kind", "none".into()),
-                at("data.rescaled_fraction", 0.0.into()),
-                at("network.learn_alpha", false.into()),
-            ]);
+            also.extend([at("penalty.kind", "none".into()), at("network.learn_alpha", false.into())]);
+            // The states of a fit are those of its recording.
+            also.extend(path.is_empty().then(|| at("data.rescaled_fraction", 0.0.into())));
         }
         also
     });
