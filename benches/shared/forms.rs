@@ -1,4 +1,5 @@
 //! Random systems of ten kinds, in most of which some constants are known in combinations alone, with recorded motion.
+#![allow(dead_code, reason = "each program uses its part")]
 
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{Description, SystemInstance, configure_system};

@@ -292,13 +292,12 @@ impl Layers {
     pub fn overruled(&self, finished: &Value, decided: impl Fn(&str) -> bool, why: &str) -> Vec<Mistake> {
         let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
         let same = |entry: &Entry| {
-            let step = |value: Option<&'_ Value>, step: &Step| match step {
-                Step::Key(name) => value?.get(name).cloned(),
-                Step::Index(k) => value?.get(*k).cloned(),
-            };
-            let found = entry.path.iter().fold(Some(finished.clone()), |value, at| step(value.as_ref(), at));
-            found.as_ref() == Some(&entry.value)
-                || number(&entry.value).is_some_and(|given| found.as_ref().and_then(number) == Some(given))
+            let found = entry.path.iter().try_fold(finished, |value, step| match step {
+                Step::Key(name) => value.get(name),
+                Step::Index(k) => value.get(*k),
+            });
+            found == Some(&entry.value)
+                || number(&entry.value).is_some_and(|given| found.and_then(number) == Some(given))
         };
         let entries = self.entries.iter().filter(|entry| decided(&entry.key()) && !same(entry));
         entries.map(|entry| Mistake::new(entry.key(), why)).collect()

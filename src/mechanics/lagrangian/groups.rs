@@ -16,7 +16,7 @@ const STATES: usize = 64;
 pub(crate) fn acting_groups<S: Scalar>(
     n: usize,
     (q, v): (&[S], &[S]),
-    accelerations: &dyn Fn(&[S], &[S]) -> Vec<f64>,
+    accelerations: impl Fn(&[S], &[S]) -> Vec<f64>,
     noise: &[f64],
 ) -> Vec<Vec<usize>> {
     let states = q.len() / n.max(1);

@@ -64,7 +64,7 @@ impl Link {
     fn is_body(&self, x: &[f64]) -> bool {
         let matrix = self.matrix(x);
         let root: [f64; 4] = std::array::from_fn(|i| matrix[5 * i].sqrt());
-        if root.iter().any(|root| !(*root > 0.0)) {
+        if !root.iter().all(|root| *root > 0.0) {
             return false;
         }
         let scaled: Vec<f64> = matrix.iter().enumerate().map(|(at, x)| x / (root[at / 4] * root[at % 4])).collect();

@@ -400,7 +400,7 @@ fn independent(values: &[f64]) -> f64 {
 /// Root mean square, or what the median of the size says of normal numbers, which is 0.6745 of it.
 fn deviation_of(mut values: Vec<f64>, robust: bool) -> f64 {
     if !robust {
-        return rms(values.into_iter());
+        return rms(values);
     }
     values.iter_mut().for_each(|x| *x = x.abs());
     values.sort_by(f64::total_cmp);

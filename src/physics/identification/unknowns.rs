@@ -21,6 +21,9 @@ struct Names<'a> {
     units: Vec<&'a str>,
 }
 
+/// Normal equations at other unknowns; `None` where there are none.
+pub(super) type NormalAt<'a> = &'a dyn Fn(&[f64]) -> Option<Normal>;
+
 /// Constants and sensors of a fit that ended at `fitted`; the caller adds the residuals. `normal_at` gives the normal equations at other
 /// unknowns.
 pub(super) fn unknowns(
@@ -28,7 +31,7 @@ pub(super) fn unknowns(
     problem: &Problem<'_>,
     fitted: &Fitted,
     (start, variance): (&[f64], f64),
-    (met, normal_at): (Met, &dyn Fn(&[f64]) -> Option<Normal>),
+    (met, normal_at): (Met, NormalAt<'_>),
 ) -> Identified {
     let (n, m) = (problem.sigma.len(), fitted.x.len());
     let recording = problem.course.recording;
