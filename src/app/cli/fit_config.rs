@@ -251,7 +251,10 @@ impl<'a> Plan<'a> {
         let decided = |key: &str| {
             let Some(key) = key.strip_prefix(TRAINING) else { return false };
             let bounds = [".position", ".velocity", ".log_uniform"];
-            (key.starts_with("data.") && key != "data.acceleration_weighting")
+            // A configuration that was written counts the states of its parts, which depend on other keys.
+            let follows = ["training", "validation", "test"].map(|part| format!("data.{part}"));
+            let free = key == "data.acceleration_weighting" || follows.iter().any(|part| part == key);
+            (key.starts_with("data.") && !free)
                 || (key.starts_with("phase[") && bounds.iter().any(|end| key.ends_with(end)))
                 || ["parameters", "description"].iter().any(|name| key.split('.').next() == Some(name))
         };

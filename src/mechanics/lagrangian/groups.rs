@@ -8,6 +8,9 @@ use crate::scalar::Scalar;
 /// States that show what acts on what, at most.
 const STATES: usize = 64;
 
+/// Accelerations of states, `(states, n)` each.
+pub(crate) type Accelerations<'a, S> = &'a dyn Fn(&[S], &[S]) -> Vec<f64>;
+
 /// Groups of `n` coordinates that act on each other, given the `accelerations` of states, `(states, n)`; those that are not finite say
 /// nothing.
 ///
@@ -16,7 +19,7 @@ const STATES: usize = 64;
 pub(crate) fn acting_groups<S: Scalar>(
     n: usize,
     (q, v): (&[S], &[S]),
-    accelerations: impl Fn(&[S], &[S]) -> Vec<f64>,
+    accelerations: Accelerations<'_, S>,
     noise: &[f64],
 ) -> Vec<Vec<usize>> {
     let states = q.len() / n.max(1);

@@ -11,6 +11,8 @@ use crate::scalar::{Real, Scalar};
 const BRANCH: f64 = 1e-3;
 /// A step is looked into if a row turns by more than this cosine, or the singular value is below this share of the largest.
 const LOOKED_INTO: (f64, f64) = (0.9, 0.3);
+/// Parts of a step between which rows are compared: adaptive methods take steps in which wheels turn around.
+const PARTS: usize = 8;
 /// Places of a step that are looked at first, and divisions of the interval around the least of them.
 const PLACES: usize = 16;
 const DIVISIONS: usize = 40;
@@ -82,11 +84,19 @@ impl<'a, S: Scalar> Regularity<'a, S> {
     pub fn step(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
         let n = q.len();
         let matrix = self.matrix_at(q);
-        let turned = self
-            .matrix
-            .chunks_exact(n)
-            .zip(matrix.chunks_exact(n))
-            .any(|(a, b)| dot(a, b) < S::of_f64(LOOKED_INTO.0) * Real::sqrt(dot(a, a) * dot(b, b)));
+        let turns = |before: &[S], after: &[S]| {
+            let mut rows = before.chunks_exact(n).zip(after.chunks_exact(n));
+            rows.any(|(a, b)| dot(a, b) < S::of_f64(LOOKED_INTO.0) * Real::sqrt(dot(a, a) * dot(b, b)))
+        };
+        let mut last = self.matrix.clone();
+        let mut turned = false;
+        for k in 1..PARTS {
+            let place = self.place(k as f64 / PARTS as f64, h, q, v);
+            let next = self.matrix_at(&place);
+            turned |= turns(&last, &next);
+            last = next;
+        }
+        turned |= turns(&last, &matrix);
         let (value, _) = self.least(&matrix);
         if turned || value < S::of_f64(LOOKED_INTO.1) * self.largest {
             self.look_into(h, q, v)?;
@@ -99,17 +109,19 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         Ok(())
     }
 
+    /// Coordinates at the share `x` of a step of length `h` that ends at `(q, v)`, by Hermite's polynomial.
+    fn place(&self, x: f64, h: S, q: &[S], v: &[S]) -> Vec<S> {
+        let (x, one, two, signed) = (S::of_f64(x), <S as Real>::one(), S::of_f64(2.0), h * self.direction);
+        let (y, all) = (one - x, x * x * (S::of_f64(3.0) - two * x));
+        let at = |i: usize| self.q[i] * (one - all) + q[i] * all + signed * x * y * (self.v[i] * y - v[i] * x);
+        (0..q.len()).map(at).collect()
+    }
+
     /// Looks for the least singular value within a step.
     fn look_into(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
-        let start = [self.q.clone(), self.v.clone()];
         let signed = h * self.direction;
         let mut at = |x: f64| {
-            // By Hermite's polynomial.
-            let (x, one, two) = (S::of_f64(x), <S as Real>::one(), S::of_f64(2.0));
-            let (y, all) = (one - x, x * x * (S::of_f64(3.0) - two * x));
-            let place: Vec<S> = (0..q.len())
-                .map(|i| start[0][i] * (one - all) + q[i] * all + signed * x * y * (start[1][i] * y - v[i] * x))
-                .collect();
+            let place = self.place(x, h, q, v);
             let matrix = self.matrix_at(&place);
             self.least(&matrix)
         };

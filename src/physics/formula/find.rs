@@ -112,7 +112,8 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     stop.stage("smoothed motion");
     let data = Prepared::new(recording, options)?;
     stop.check()?;
-    let held = constrained(recording, options.noise.as_ref())?;
+    let held = constrained(recording, options.noise.as_ref(), stop)?;
+    stop.check()?;
     let judges = held_out(&data, options.seed);
     let (mut searched, mut refused) = (Vec::new(), None);
     let mut best: Option<FoundFormula> = None;

@@ -1,6 +1,7 @@
 //! Motion that no law can be read off: coordinates that stand still, copies, steps, rows that belong to no motion, constraints.
 
 use super::error::FormulaError;
+use crate::cancellation::Cancellation;
 use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
 use crate::names::pluralize;
 use crate::recording::Recording;
@@ -74,12 +75,16 @@ fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, F
 ///
 /// # Errors
 /// [`FormulaError::Constrained`] if several trajectories keep to it: of a Lagrangian of these coordinates they say too little.
-pub(super) fn constrained(recording: &Recording, noise: Option<&Vec<f64>>) -> Result<Option<String>, FormulaError> {
+pub(super) fn constrained(
+    recording: &Recording,
+    noise: Option<&Vec<f64>>,
+    cancellation: &Cancellation,
+) -> Result<Option<String>, FormulaError> {
     if recording.n() < 2 {
         return Ok(None);
     }
     let options = SmoothOptions { noise: noise.cloned(), ..SmoothOptions::default() };
-    let samples = MotionSamples::of(recording, &options)?;
+    let samples = MotionSamples::of(recording, &options)?.watched(cancellation);
     // A search that is too large, or too few samples, says nothing against a formula.
     let Ok(found) = find_constraints(&samples, ConstraintSearch::default()) else { return Ok(None) };
     let held = found.constraints.into_iter().filter(|c| c.kind == ConstraintKind::Holonomic).map(|c| c.formula);

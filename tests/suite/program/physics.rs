@@ -91,7 +91,7 @@ fn a_fit_has_the_part_of_the_model() {
     let folder = Folder::new();
     let data = folder.file("data.csv", pendulum(4, false, 1e-4));
     let out = text(&folder.path("fitted"));
-    let fit = ["fit", &data, "--hidden", "8", "--epochs", "2", "--shooting-epochs", "1", "--out", &out];
+    let fit = ["fit", &data, "--hidden", "8", "--epochs", "2", "--out", &out];
     let run = lnn(&[&fit[..], &COLUMNS].concat());
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     let summary: Value =

@@ -101,7 +101,7 @@ fn lines_fit_headers_have_units_and_numbers_are_plain() {
         ("train ads4-geodesic --config ads.toml --out ads".into(), 3),
         // Models this small state no ranges.
         (format!("fit {long} {pendulum} {small} --friction --out fitted"), 2),
-        (format!("fit swings.csv {swings} {small} --targets smoothed --hold-out 0 --out all"), 1),
+        (format!("fit swings.csv {swings} --hidden 8 --epochs 2 --targets smoothed --hold-out 0 --out all"), 1),
         ("evaluate double_pendulum.safetensors --until 3 --out evaluation".into(), 3),
         ("experiment".into(), 1),
         ("experiment quick --scale smoke --only triple --out experiments".into(), 2),

@@ -229,7 +229,7 @@ fn searches_show_life_and_end_at_once() {
     let out = text(&folder.path("found.toml"));
     let columns = ["--coords", "q1,q2,q3,q4,q5,q6,q7"];
     let identify = ["identify", &data, "--system", arm, "--targets", "motion", "--threads", "1", "--out", &out];
-    let formula = ["formula", &data, "--basis", "polynomial:3", "--threads", "1", "--out", &out];
+    let formula = ["formula", &data, "--basis", "polynomial:1", "--threads", "1", "--out", &out];
     for arguments in [&identify[..], &[&formula[..], &columns].concat()] {
         let began = Instant::now();
         let mut child = start(arguments);
