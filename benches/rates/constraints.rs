@@ -8,6 +8,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
+/// Draws a motion of a system.
+type Draw = Box<dyn Fn(&mut ChaCha8Rng) -> Motion>;
+
 /// Coordinates of one motion at a time in s.
 type Motion = Box<dyn Fn(f64) -> Vec<f64>>;
 /// A kind of system: the names of its coordinates, which are angles, and motions of a system that is drawn once.
@@ -15,7 +18,7 @@ struct Kind {
     names: &'static [&'static str],
     angles: bool,
     /// A system drawn at random, as a maker of motions.
-    system: fn(&mut ChaCha8Rng) -> Box<dyn Fn(&mut ChaCha8Rng) -> Motion>,
+    system: fn(&mut ChaCha8Rng) -> Draw,
     /// How many constraints it has.
     constraints: usize,
 }

@@ -43,6 +43,9 @@ const SAMPLES: usize = 160;
 const STEP: f64 = 0.025;
 const NOISE: f64 = 1e-3;
 
+/// What is recorded of the coordinates of a law.
+type Seen = fn(&[f64]) -> Vec<f64>;
+
 /// A system with what is true of it.
 struct System {
     coordinates: &'static [&'static str],
@@ -53,7 +56,7 @@ struct System {
     /// Terms of its Lagrangian.
     terms: &'static [&'static str],
     /// What is seen of its coordinates; themselves if none.
-    seen: Option<fn(&[f64]) -> Vec<f64>>,
+    seen: Option<Seen>,
 }
 
 impl System {
@@ -196,7 +199,7 @@ fn beside(draw: &mut Draw) -> System {
 fn constrained(seed: u64, draw: &mut Draw) -> System {
     let a = draw.between(0.5, 2.0);
     let names: &'static [&'static str] = &["x", "y"];
-    let (law, seen): (Law, fn(&[f64]) -> Vec<f64>) = match seed % 2 {
+    let (law, seen): (Law, Seen) = match seed % 2 {
         0 => (Box::new(move |_, q, _| vec![-4.0 * a * q[0].sin()]), |q| vec![q[0].sin(), -q[0].cos()]),
         _ => (
             Box::new(move |_, q, v| vec![-(4.0 * q[0] * v[0] * v[0] + 8.0 * a * q[0]) / (1.0 + 4.0 * q[0] * q[0])]),

@@ -173,7 +173,7 @@ fn arm(truth: &Constants, (encoder, repeat): (f64, f64), rng: &mut RandomGenerat
         .map(|_| {
             let tone = |rng: &mut RandomGenerator| {
                 let rate = std::f64::consts::TAU * rng.random_range(0.1..1.2);
-                [rng.random_range(0.2..0.5) / (1.0 + rate / 4.0), rate, rng.random_range(0.0..6.28)]
+                [rng.random_range(0.2..0.5) / (1.0 + rate / 4.0), rate, rng.random_range(0.0..std::f64::consts::TAU)]
             };
             (0..5).map(|_| tone(rng)).collect()
         })
