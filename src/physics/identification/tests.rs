@@ -404,7 +404,7 @@ fn errors_under_correlated_noise_are_those_of_the_scatter() {
         ((found.constants[0].value - 0.7) / found.constants[0].standard_error.unwrap()).powi(2)
     };
     let mean = (0..12).map(off).sum::<f64>() / 12.0;
-    // Measured: 2.74, errors that are 1.7 times too small under noise this slow; 10 and more by the normal equations alone.
+    // Errors are 1.7 times too small under noise this slow (2.74 measured over these seeds); 1 would be right.
     assert!((0.3..3.0).contains(&mean), "{mean}");
 }
 
