@@ -304,7 +304,7 @@ pub fn fit(
 /// The fit with its choices; a change that the configuration refuses is put into `refused`.
 fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, out: Option<Target>) -> Fit {
     let mut task = match source {
-        Source::Files(files, columns) => Fit::files(files).columns(|own| *own = columns),
+        Source::Files(files, columns) => Fit::files(files).columns(|own| *own = *columns),
         Source::Memory(recording) => Fit::recording(recording),
     };
     task = task.friction(choices.friction).precision(choices.precision).threads(choices.threads);

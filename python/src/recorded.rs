@@ -26,7 +26,7 @@ struct Meaning {
 
 /// Origin of recorded motion.
 pub enum Source {
-    Files(Vec<PathBuf>, Columns),
+    Files(Vec<PathBuf>, Box<Columns>),
     Memory(Recording),
 }
 
@@ -81,7 +81,7 @@ impl Source {
                 _ => return Err(value(format_args!("columns: no such key, {key:?}"))),
             }
         }
-        Ok(Self::Files(files, columns))
+        Ok(Self::Files(files, Box::new(columns)))
     }
 
     /// The recording with the rows of its samples, read from its files if it has some.
