@@ -219,6 +219,10 @@ fn arm(truth: &Constants, (encoder, repeat): (f64, f64), rng: &mut RandomGenerat
 /// What was said in a case: of the form, and of the ranges.
 #[derive(Default)]
 struct Tally {
+    /// What is to be said of the form.
+    right: bool,
+    /// Seeds of which the other is said, with the verdict.
+    missed: Vec<(u64, String)>,
     explained: usize,
     systems: usize,
     held: usize,
@@ -227,8 +231,15 @@ struct Tally {
 }
 
 impl Tally {
-    fn count(&mut self, found: &Identified, truth: &[(&str, f64)]) {
+    fn of(right: bool) -> Self {
+        Self { right, ..Self::default() }
+    }
+
+    fn count(&mut self, seed: u64, found: &Identified, truth: &[(&str, f64)]) {
         self.systems += 1;
+        if found.explained != self.right {
+            self.missed.push((seed, format!("{} (left to gain {:.1e})", found.verdict, found.decrement)));
+        }
         self.explained += usize::from(found.explained);
         let errors = found.constants.iter().filter_map(|c| {
             let (_, truth) = truth.iter().find(|(name, _)| *name == c.symbol)?;
@@ -243,6 +254,9 @@ impl Tally {
     }
 
     fn explained(&self, case: &'static str, limits: RangeInclusive<f64>) -> Rate {
+        for (seed, says) in &self.missed {
+            eprintln!("{case}, seed {seed}: {says}");
+        }
         Rate { verdict: "explained", case, said: self.explained, of: self.systems, limits }
     }
 
@@ -263,41 +277,67 @@ fn free(
     options: &IdentifyOptions,
     spoil: impl Fn(&mut Recording, &mut RandomGenerator),
 ) -> Outcome<Tally> {
-    let mut tally = Tally::default();
+    let mut tally = Tally::of(right);
     for seed in 0..seeds {
         let (form, mut rng) = (&FORMS[seed as usize % FORMS.len()], RngStream::Test.generator(seed));
         let truth = form.drawn(&mut rng);
         let mut recording = form.free(&truth, 2, &mut rng)?;
         add(&mut recording, (SIZE, memory), &mut rng);
         spoil(&mut recording, &mut rng);
-        tally.count(&identify(&form.system(right, &[])?, &recording, options)?, &truth);
+        tally.count(seed, &identify(&form.system(right, &[])?, &recording, options)?, &truth);
+    }
+    Ok(tally)
+}
+
+/// Free motion with friction of so many of its standard errors, which the form does not have.
+fn missing(seeds: u64, errors: f64) -> Outcome<Tally> {
+    let mut tally = Tally::of(false);
+    for seed in 0..seeds {
+        let form = &FORMS[seed as usize % FORMS.len()];
+        let measured = |friction: Option<f64>| -> Outcome<_> {
+            let mut rng = RngStream::Test.generator(3000 + seed);
+            let mut truth = form.drawn(&mut rng);
+            if let (Some(friction), Some((_, last))) = (friction, truth.last_mut()) {
+                *last = friction;
+            }
+            let mut recording = form.free(&truth, 2, &mut rng)?;
+            add(&mut recording, (SIZE, 0.0), &mut rng);
+            Ok((recording, truth))
+        };
+        let found = |right: bool, recording: &Recording| -> Outcome<Identified> {
+            Ok(identify(&form.system(right, &[])?, recording, &IdentifyOptions::default())?)
+        };
+        let known = found(true, &measured(None)?.0)?;
+        let error = known.constants.last().and_then(|friction| friction.standard_error);
+        let (recording, truth) = measured(Some(errors * error.ok_or("the friction is not determined")?))?;
+        tally.count(seed, &found(false, &recording)?, &truth);
     }
     Ok(tally)
 }
 
 /// Driven oscillators.
 fn forced(seeds: u64, force_noise: f64, right: bool) -> Outcome<Tally> {
-    let mut tally = Tally::default();
+    let mut tally = Tally::of(right);
     for seed in 0..seeds {
         let mut rng = RngStream::Test.generator(1000 + seed);
         let truth = DUFFING.drawn(&mut rng);
         let mut recording = driven(&truth, force_noise, &mut rng)?;
         add(&mut recording, (SIZE, 0.0), &mut rng);
-        tally.count(&identify(&DUFFING.system(right, &[])?, &recording, &IdentifyOptions::default())?, &truth);
+        tally.count(seed, &identify(&DUFFING.system(right, &[])?, &recording, &IdentifyOptions::default())?, &truth);
     }
     Ok(tally)
 }
 
 /// Arms by their torques.
 fn arms(seeds: u64, reading: (f64, f64), right: bool) -> Outcome<Tally> {
-    let mut tally = Tally::default();
+    let mut tally = Tally::of(right);
     let options = IdentifyOptions { targets: Some(Targets::Forces), threads: 2, ..IdentifyOptions::default() };
     // Each is fitted 21 times.
     for seed in 0..seeds.div_ceil(2) {
         let mut rng = RngStream::Test.generator(2000 + seed);
         let truth = ARM.drawn(&mut rng);
         let recording = arm(&truth, reading, &mut rng);
-        tally.count(&identify(&ARM.system(right, &[])?, &recording, &options)?, &truth);
+        tally.count(seed, &identify(&ARM.system(right, &[])?, &recording, &options)?, &truth);
     }
     Ok(tally)
 }
@@ -321,9 +361,28 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
         recording.tracks[1].q.iter_mut().for_each(|q| *q += 5.0 * SIZE * normal(rng));
     };
     let mut rates = Vec::new();
-    let of_noise = free(seeds, (0.0, true), &plain, noise)?;
+    let of_noise = Tally { missed: Vec::new(), ..free(seeds, (0.0, true), &plain, noise)? };
     rates.push(of_noise.explained("noise instead of motion", WRONG));
     rates.push(free(seeds, (0.0, false), &plain, nothing)?.explained("friction missing, white noise", WRONG));
+    // Without any the form is right.
+    let without = missing(seeds, 0.0)?;
+    rates.push(Rate {
+        verdict: "explained",
+        case: "friction of 0 standard errors missing",
+        said: without.explained,
+        of: without.systems,
+        limits: RIGHT,
+    });
+    for (errors, case) in [
+        (3.0, "friction of 3 standard errors missing"),
+        (6.0, "friction of 6 standard errors missing"),
+        (12.0, "friction of 12 standard errors missing"),
+        (25.0, "friction of 25 standard errors missing"),
+    ] {
+        // How small a term may be is what is measured.
+        let Tally { explained, systems, .. } = missing(seeds, errors)?;
+        rates.push(Rate { verdict: "explained", case, said: explained, of: systems, limits: 0.0..=1.0 });
+    }
     rates.push(forced(seeds, 0.0, false)?.explained("cubic force missing, driven", WRONG));
     rates.push(arms(seeds, (2e-4, 0.0), false)?.explained("weight of a link missing, by forces", WRONG));
     rates.push(arms(seeds, (2e-4, 0.125), false)?.explained("the same, one reading in eight repeated", WRONG));

@@ -17,6 +17,7 @@
 
 mod clock;
 mod columns;
+mod held;
 mod hermite;
 mod hold_out;
 #[cfg(feature = "data")]
@@ -35,6 +36,7 @@ pub(crate) use clock::Clock;
 pub use columns::Columns;
 #[doc(hidden)]
 pub use columns::ColumnsError;
+pub(crate) use held::{Filled, filled, marks};
 pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
 #[doc(hidden)]

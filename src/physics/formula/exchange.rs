@@ -8,8 +8,10 @@ use crate::identification::linear::{inverse_with, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
 
-/// Exchanges that are followed through the motion each time, and how often.
+/// Exchanges that are followed through the motion each time: so many, and others that promise more than the best of them gains, up to the most.
 const TRIED: usize = 3;
+const MOST_TRIED: usize = 10;
+/// How often terms are exchanged.
 const ROUNDS: usize = 4;
 /// Exchanges whose mass matrices are looked at.
 const LOOKED_AT: usize = 100;
@@ -41,22 +43,28 @@ impl Search<'_> {
             let Some((proposals, noise)) = self.proposals(model, segments, blocks) else { break };
             let before = self.motion.settle(model, segments, 1).0;
             let mut best: Option<(Exchanged, Vec<Segment>)> = None;
-            rival = proposals.get(TRIED).cloned();
-            for Exchanged { model: mut tried, .. } in proposals.into_iter().take(TRIED) {
+            rival = None;
+            for (at, proposal) in proposals.into_iter().enumerate() {
+                let gained = best.as_ref().map_or(0.0, |(best, _)| best.cost.min(0.0));
+                if at >= MOST_TRIED || (at >= TRIED && proposal.cost >= gained) {
+                    rival = Some(proposal);
+                    break;
+                }
+                let mut tried = proposal.model;
                 let mut starts = segments.clone();
-                // The exchange may make other terms superfluous.
-                self.converge(&mut tried, &mut starts, CHOICES);
-                if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
-                    continue;
-                }
-                let square = self.motion.settle(&tried, &mut starts, 1).0;
-                let longer = tried.terms.len() as f64 - model.terms.len() as f64;
-                let cost = (square - before) / noise + THRESHOLD * longer;
-                if !self.regular(model, (&tried.terms, &tried.coefficients)) {
-                    continue;
-                }
-                if best.as_ref().is_none_or(|(best, _)| cost < best.cost) {
-                    best = Some((Exchanged { model: tried, cost }, starts));
+                for rounds in [0, CHOICES] {
+                    // As it is, and without what the exchange has made superfluous.
+                    self.converge(&mut tried, &mut starts, rounds);
+                    if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
+                        break;
+                    }
+                    let square = self.motion.settle(&tried, &mut starts, 1).0;
+                    let longer = tried.terms.len() as f64 - model.terms.len() as f64;
+                    let cost = (square - before) / noise + THRESHOLD * longer;
+                    let better = best.as_ref().is_none_or(|(best, _)| cost < best.cost);
+                    if better && self.regular(model, (&tried.terms, &tried.coefficients)) {
+                        best = Some((Exchanged { model: tried.clone(), cost }, starts.clone()));
+                    }
                 }
             }
             let Some((found, starts)) = best else { break };
@@ -120,7 +128,7 @@ impl Search<'_> {
         }
         proposals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let regular = |tried: &Exchanged| self.regular(model, (&tried.model.terms, &tried.model.coefficients));
-        Some((proposals.into_iter().take(LOOKED_AT).filter(regular).take(TRIED + 1).collect(), noise))
+        Some((proposals.into_iter().take(LOOKED_AT).filter(regular).take(MOST_TRIED + 1).collect(), noise))
     }
 }
 

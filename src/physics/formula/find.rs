@@ -326,11 +326,7 @@ impl WeakForm {
             (model, learned) = before;
             (blocks, chosen) = search.converge(&mut model, &mut learned, 0);
         }
-        let terms = model.terms.clone();
         let rival = search.exchange(&mut model, &mut learned, &mut blocks);
-        if model.terms != terms {
-            (blocks, chosen) = search.converge(&mut model, &mut learned, ROUNDS);
-        }
         search.motion.settle(&model, &mut judges, 6);
         let mut judges = data.joined(&judges);
         stop.check()?;

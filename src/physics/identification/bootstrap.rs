@@ -1,7 +1,7 @@
 //! Errors of constants that are fitted to forces, by a parametric bootstrap.
 //!
-//! Smoothed accelerations have errors that neighbours share and that are regressors themselves, so that least squares are biased and their own
-//! errors are too small by factors. The recording is therefore made anew: the motion by polynomials of a higher degree, and the forces that the
+//! Smoothed accelerations have errors that neighbours share and that are regressors themselves, so that the errors of least squares are too small
+//! by factors and something of a bias is left. The recording is therefore made anew: the motion by polynomials of a higher degree, and the forces that the
 //! fitted constants ask for along it, are the truth; noise of encoders and of forces is drawn anew, everything is smoothed and fitted again.
 //! The mean change of the constants is their bias, which is subtracted; the scatter is their error (Efron and Tibshirani, An Introduction to the
 //! Bootstrap, 1993, sections 6.5 and 10.2). Residuals of the copies say what the right form leaves at every sample.
@@ -13,7 +13,7 @@ use super::solve::Problem;
 use crate::linalg::dot;
 use crate::random::{RandomGenerator, RngStream};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
-use crate::recording::{RecordedTrajectory, Recording, deviation, rms};
+use crate::recording::{RecordedTrajectory, Recording, deviation, marks, rms};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Copies of the recording.
@@ -31,20 +31,25 @@ pub(super) struct Copies {
     residuals: Vec<Vec<Vec<f64>>>,
 }
 
-/// Fits copies of the recording; `None` if the motion cannot be smoothed by polynomials of a higher degree.
+/// Smoothing of the motion that copies are made of; `None` if it cannot be smoothed by polynomials of a higher degree.
+pub(super) fn wider(recording: &Recording, smoothing: &Smoothing) -> Option<Smoothing> {
+    let given = smoothing.coordinates.iter().map(|chosen| chosen.noise.sigma).collect();
+    let options =
+        SmoothOptions { degree: smoothing.degree + MORE_DEGREES, noise: Some(given), ..SmoothOptions::default() };
+    Smoothing::choose(recording, &options).ok()
+}
+
+/// Fits copies of the recording; `None` if one of them fails.
 ///
-/// `usual` are the sizes of the residuals: the noise of a force is not larger.
+/// `usual` are the sizes of the residuals: the noise of a force is not larger. `share` gives the weights of equations in averages.
 pub(super) fn copies(
     problem: &Problem<'_>,
-    smoothing: &Smoothing,
+    [smoothing, wider]: [&Smoothing; 2],
     (states, x, usual): (&States, &[f64], &[f64]),
+    share: &(impl Fn(&States) -> Vec<f64> + Sync),
 ) -> Option<Copies> {
     let recording = problem.course.recording;
     let n = recording.n();
-    let given = || smoothing.coordinates.iter().map(|chosen| chosen.noise.sigma).collect();
-    let options =
-        SmoothOptions { degree: smoothing.degree + MORE_DEGREES, noise: Some(given()), ..SmoothOptions::default() };
-    let wider = Smoothing::choose(recording, &options).ok()?;
     let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
     let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma.min(usual[i])).collect();
     let truth: Vec<Option<(Smoothed, Vec<f64>)>> = recording
@@ -57,10 +62,11 @@ pub(super) fn copies(
             Some((motion, force))
         })
         .collect();
+    let marks: Vec<Option<f64>> = (0..n).map(|i| marks(recording, i)).collect();
     let one = |copy: usize| {
         let mut rng = RngStream::Copies.generator(copy as u64);
         let again = |(track, truth): (&RecordedTrajectory, &Option<(Smoothed, Vec<f64>)>)| match truth {
-            Some((motion, force)) => drawn(track, motion, force, (smoothing, &of_force), &mut rng),
+            Some((motion, force)) => drawn(track, motion, force, (smoothing, &of_force, &marks), &mut rng),
             None => track.clone(),
         };
         let tracks = recording.tracks.iter().zip(&truth).map(again).collect();
@@ -72,13 +78,14 @@ pub(super) fn copies(
         let mut course = problem.course.clone();
         course.recording = &copied;
         let problem = Problem { course, ..problem.clone() };
-        let mut own = States::new(&problem, &smoothed);
+        let mut own = States { averaged: states.averaged, ..States::new(&problem, &smoothed) };
+        own.share = share(&own);
         let weights = states.weight.iter().take(n).copied().collect::<Vec<_>>();
         own.weight = (0..own.places.len() * n).map(|at| weights[at % n]).collect();
         let mut constants = x.to_vec();
         own.fit(&problem, &mut constants, Met::Forces);
         let mut residuals: Vec<Vec<f64>> = recording.tracks.iter().map(|t| vec![f64::NAN; t.len() * n]).collect();
-        let found = own.force_residuals(&problem, &constants);
+        let [_, found] = own.force_residuals(&problem, &constants);
         for ((track, sample), row) in own.places.iter().zip(found.chunks_exact(n)) {
             residuals[*track][sample * n..(sample + 1) * n].copy_from_slice(row);
         }
@@ -150,12 +157,12 @@ fn asked(problem: &Problem<'_>, x: &[f64], motion: &Smoothed) -> Vec<f64> {
     force
 }
 
-/// A trajectory with new noise. A reading that repeats the one before, as encoders do, repeats it again.
+/// A trajectory with new noise.
 fn drawn(
     track: &RecordedTrajectory,
     motion: &Smoothed,
     force: &[f64],
-    (smoothing, of_force): (&Smoothing, &[f64]),
+    (smoothing, of_force, marks): (&Smoothing, &[f64], &[Option<f64>]),
     rng: &mut RandomGenerator,
 ) -> RecordedTrajectory {
     let n = of_force.len();
@@ -163,10 +170,15 @@ fn drawn(
     let mut copy = track.clone();
     for at in 0..track.q.len() {
         let chosen = &smoothing.coordinates[at % n];
-        copy.q[at] = motion.q[at] + chosen.noise.sigma * normal();
-        if at >= n && track.q[at] == track.q[at - n] {
-            copy.q[at] = copy.q[at - n];
-        }
+        let mut noise = |sigma: f64| sigma * normal();
+        copy.q[at] = match marks[at % n] {
+            // Rounding to marks makes up a part of the noise, and hardly any where the motion is slow.
+            Some(mark) => {
+                let beside = (chosen.noise.sigma.powi(2) - mark * mark / 12.0).max(0.0).sqrt();
+                mark * ((motion.q[at] + noise(beside)) / mark).round()
+            }
+            None => motion.q[at] + noise(chosen.noise.sigma),
+        };
         if let (Some(noise), Some(v)) = (chosen.velocity_noise, copy.v.get_mut(at)) {
             *v = motion.v[at] + noise.sigma * normal();
         }

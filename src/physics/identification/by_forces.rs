@@ -9,18 +9,20 @@ use super::bootstrap::{self, COPIES};
 use super::covariance::Root;
 use super::follow::{Follower, LANES, Segment};
 use super::found::{Identified, Outlier, Residual};
-use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
+use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, tail, usual};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::stages::Fitted;
 use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
-use crate::recording::smooth::{Smoothing, noise};
+use crate::recording::smooth::{Smoothed, Smoothing, noise};
 use crate::recording::{deviation, quantile, rms};
 
 /// How often coordinates are weighed anew at most, and relative change of all weights that ends it: one that is not reached is reported.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.01;
+/// Parts of a smoothing window over which, to either side and twice, equations are averaged: two thirds of a window in all.
+const AVERAGED: usize = 6;
 /// Residual over the spread of a force that is taken at least.
 const LEAST: f64 = 1e-9;
 /// Change of slopes, relative to them, that is rounding.
@@ -30,12 +32,21 @@ const ROUNDING: f64 = 1e-9;
 pub(super) fn identify(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
-    (smoothing, states): (&Smoothing, &mut States),
+    smoothing: &Smoothing,
     (mut x, segments): (Vec<f64>, Vec<Segment>),
 ) -> Result<Identified, IdentifyError> {
     let n = problem.course.equations.n;
     let recording = problem.course.recording;
     let start = x.clone();
+    let sharper = smoothing.sharper();
+    let smoothed: Vec<Option<Smoothed>> = recording.tracks.iter().map(|track| sharper.apply(track).ok()).collect();
+    let mut states = States::new(problem, &smoothed);
+    problem.cancellation.check()?;
+    let wider = bootstrap::wider(recording, smoothing);
+    if wider.is_some() {
+        let window: usize = smoothing.coordinates.iter().map(|chosen| chosen.quality.window).sum();
+        states.averaged = window / (AVERAGED * n * states.stride);
+    }
     let count = states.places.len();
     if count == 0 {
         return Err(IdentifyError::Lost);
@@ -52,8 +63,15 @@ pub(super) fn identify(
         let fitted = states.fit(problem, &mut x, Met::Forces);
         problem.cancellation.check()?;
         search = fitted.ok_or(IdentifyError::Singular)?;
-        let residuals = [states.force_residuals(problem, &x)];
-        let left: Vec<f64> = (0..n).map(|i| usual(&residuals, n, i).max(least[i])).collect();
+        let [raw, averages] = states.force_residuals(problem, &x);
+        let errors = errors(problem, &states, &x, &least);
+        let own: Vec<f64> = raw.iter().zip(&errors).map(|(r, error)| r / error).collect();
+        states.share = shares(&errors, n);
+        let far: Vec<f64> = (0..n).map(|i| FAR * usual(std::slice::from_ref(&own), n, i)).collect();
+        let spoilt = own.iter().enumerate().filter(|(at, z)| z.abs() > far[at % n]).map(|(at, _)| at);
+        spoilt.for_each(|at| states.share[at] = 0.0);
+        let averages = [averages];
+        let left: Vec<f64> = (0..n).map(|i| usual(&averages, n, i).max(least[i])).collect();
         let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
         sigma = left;
         tracing::debug!(?sigma, "residuals of force");
@@ -67,19 +85,25 @@ pub(super) fn identify(
     problem.cancellation.check()?;
     let mut normal = normal.ok_or(IdentifyError::Singular)?;
     (normal.converged, normal.decrement, normal.held) = (search.converged, search.decrement, search.held);
-    let residuals = states.force_residuals(problem, &x);
-    let copies = bootstrap::copies(problem, smoothing, (states, &x, &sigma));
+    let [raw, residuals] = states.force_residuals(problem, &x);
+    let errors = errors(problem, &states, &x, &least);
+    let of_coordinate = |values: &[f64], i: usize| values.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>();
+    // Of every equation, in units of its error.
+    let own: Vec<f64> = raw.iter().zip(&errors).map(|(r, error)| r / error).collect();
+    let usual_raw: Vec<f64> = (0..n).map(|i| usual(std::slice::from_ref(&raw), n, i).max(least[i])).collect();
+    let of_copies = |states: &States| shares(&self::errors(problem, states, &x, &least), n);
+    let copies =
+        wider.and_then(|wider| bootstrap::copies(problem, [&sharper, &wider], (&states, &x, &usual_raw), &of_copies));
     let expected: Vec<Vec<f64>> = match &copies {
         Some(copies) => (0..n).map(|i| copies.squares(&states.places, (n, i))).collect(),
-        None => noises(problem, states, &x).iter().map(|noise| vec![noise * noise; count]).collect(),
+        None => (0..n).map(|i| of_coordinate(&errors, i).iter().map(|error| error * error).collect()).collect(),
     };
     let over = |residuals: &[f64], i: usize| {
         let of = |(r, square): (&f64, &f64)| if *square > 0.0 { r / square.sqrt().max(least[i]) } else { f64::NAN };
         residuals.iter().zip(&expected[i]).map(of).collect::<Vec<f64>>()
     };
-    // Residuals over the errors of their samples, by coordinate.
-    let own = |i: usize| over(&residuals.iter().skip(i).step_by(n).copied().collect::<Vec<_>>(), i);
-    let scaled: Vec<Vec<f64>> = (0..n).map(own).collect();
+    // Averages over the errors of their samples, by coordinate.
+    let scaled: Vec<Vec<f64>> = (0..n).map(|i| over(&of_coordinate(&residuals, i), i)).collect();
     let size = |i: usize| {
         let far = FAR * usual(std::slice::from_ref(&scaled[i]), 1, 0);
         rms(scaled[i].iter().copied().filter(|z| z.abs() <= far))
@@ -92,10 +116,13 @@ pub(super) fn identify(
     };
     let probabilities: Vec<f64> = (0..n).map(|i| (n as f64 * probability(i)).min(1.0)).collect();
     let left = |i: usize| {
-        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
-        let autocorrelation = correlation(std::slice::from_ref(&scaled[i])).neighbours;
+        let noise = quantile(&mut of_coordinate(&errors, i), 0.5);
+        let own = of_coordinate(&own, i);
+        let autocorrelation = correlation(std::slice::from_ref(&own)).neighbours;
         let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= CHANCE);
-        Residual { coordinate, rms: sizes[i] * noise, noise, spread: spread[i], autocorrelation, white }
+        let kept = own.iter().zip(states.share.iter().skip(i).step_by(n)).filter(|(_, share)| **share > 0.0);
+        let rms = noise * rms(kept.map(|(z, _)| *z));
+        Residual { coordinate, rms, noise, spread: spread[i], autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(left).collect();
     let whole = Segment { track: 0, first: 0, samples: count, start: Vec::new() };
@@ -105,19 +132,25 @@ pub(super) fn identify(
         Outlier { track, sample, time, coordinate, size }
     };
     // States of all trajectories in a row.
-    let together: Vec<f64> = (0..count * n).map(|at| scaled[at % n][at / n]).collect();
-    let (outliers, outlier_count) = outliers((&[whole], &[together]), n, far);
+    let (outliers, outlier_count) = outliers((&[whole], &[own]), n, far);
+    // Averages are what is judged.
+    let averaged = by_coordinate.iter().enumerate().map(|(i, residual)| {
+        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
+        Residual { noise, rms: sizes[i] * noise, ..residual.clone() }
+    });
+    let averaged: Vec<Residual> = averaged.collect();
     let verdict = Evidence {
         converged: normal.converged,
-        residuals: &by_coordinate,
-        sizes: by_coordinate.iter().map(|r| r.rms).collect(),
+        residuals: &averaged,
+        sizes: averaged.iter().map(|r| r.rms).collect(),
         exact: least.clone(),
         probabilities,
         outliers: outlier_count as f64 / (count * n) as f64,
         agreement: 1.0,
+        continuation: (1.0, 0.0),
     }
     .verdict();
-    let over_noise = over_noise(&by_coordinate);
+    let over_noise = rms(sizes.iter().copied());
     let (normal, inflation) = match &copies {
         Some(copies) => {
             let root = Root::of(x.len(), &normal.matrix);
@@ -177,24 +210,30 @@ fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -
     (BLOCKS.iter().map(of).fold(1.0, f64::min) * BLOCKS.len() as f64).min(1.0)
 }
 
-/// Standard deviation of the residual of every force that noise alone leaves: that of the force itself, and what the errors of the
-/// accelerations come to.
-fn noises(problem: &Problem<'_>, states: &States, x: &[f64]) -> Vec<f64> {
+/// Weights of equations by their errors: those of the usual error or a smaller one have 1.
+fn shares(errors: &[f64], n: usize) -> Vec<f64> {
+    let usual: Vec<f64> =
+        (0..n).map(|i| quantile(&mut errors.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>(), 0.5)).collect();
+    errors.iter().enumerate().map(|(at, error)| (usual[at % n] / error).powi(2).min(1.0)).collect()
+}
+
+/// Error of every equation of force that noise alone leaves, `(states, n)`: that of the force itself, and what the errors of the accelerations
+/// come to.
+fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
     let n = problem.course.equations.n;
     let tracks =
         || problem.course.recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
-    let mut squares = vec![0.0; n];
+    let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma).collect();
+    let mut all = vec![0.0; states.q.len()];
     states.batches(problem, x, |follower, range, _| {
-        let errors = states.a_error[range].chunks_exact(n);
-        for (mass, errors) in follower.mass().chunks_exact(n * n).zip(errors) {
-            for (square, row) in squares.iter_mut().zip(mass.chunks_exact(n)) {
-                *square += row.iter().zip(errors).map(|(m, e)| (m * e).powi(2)).sum::<f64>();
-            }
+        let rows = follower.mass().chunks_exact(n).zip(&mut all[range.clone()]).enumerate();
+        for (at, (row, error)) in rows {
+            let first = range.start + at / n * n;
+            let square: f64 = row.iter().zip(&states.a_error[first..first + n]).map(|(m, e)| (m * e).powi(2)).sum();
+            *error = of_force[at % n].hypot(square.sqrt()).max(least[at % n]);
         }
     });
-    let of =
-        |(i, square): (usize, f64)| noise(tracks(), n, i).sigma.hypot((square / states.places.len() as f64).sqrt());
-    squares.into_iter().enumerate().map(of).collect()
+    all
 }
 
 impl Problem<'_> {

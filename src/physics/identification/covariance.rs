@@ -1,7 +1,7 @@
 //! Covariance of the unknowns where residuals are correlated, or are weighed by their size.
 //!
 //! With scores `u_t`, the gradient of the sum of squares at a sample once starts are eliminated, the covariance is `S^-1 B S^-1`, `S` the normal
-//! matrix and `B` the long-run covariance of the scores: the mean of the outer products of their sums over all windows of one length, which is
+//! matrix and `B` the long-run covariance of the scores: from the mean of the outer products of their sums over all windows of one length, which is
 //! Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
 use super::determined::ROUNDING;
@@ -9,10 +9,13 @@ use super::follow::{LANES, Segment};
 use super::linear::times;
 use super::quality::tail;
 use super::solve::{HUBER, Normal, Problem};
+use super::stages::{Fitted, choose_steps, joined};
 use crate::linalg::{Workspace, dot, eigh};
 
 /// Eigenvalue of a segment's matrix of correlations from which on it tells its own constants.
 const TOLD: f64 = 1e-6;
+/// Newton decrement for each number of the starts up to which they have arrived.
+const ARRIVED: f64 = 0.01;
 /// Share of the samples that a window of correlated residuals has at most.
 const MOST_WINDOW: f64 = 0.25;
 
@@ -152,6 +155,33 @@ impl Root {
         let images: Vec<Vec<f64>> = self.back.iter().map(|row| times(m, covariance, row)).collect();
         self.back.iter().flat_map(|row| images.iter().map(|image| dot(row, image))).collect()
     }
+}
+
+/// Probability that noise keeps segments from continuing each other as they do: the sum of squares that is gained by a start of its own for every
+/// second one, over that of the residuals, which has the F distribution for the right form.
+///
+/// Starts take up much of what a missing term does, over a short segment nearly all of it; what they cannot do is to follow each other.
+pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighing: Weighing) -> f64 {
+    let longer = joined(&fitted.segments);
+    if longer.len() == fitted.segments.len() {
+        return 1.0;
+    }
+    let mut problem = problem.clone();
+    choose_steps(&mut problem, &fitted.x, &longer);
+    let [apart, together] = [&fitted.segments, &longer].map(|segments| problem.normal_at(&fitted.x, segments));
+    let freedom = together.count - apart.count;
+    // Where motion is too chaotic for the starts to arrive nothing is seen.
+    if together.failed + apart.failed > 0 || together.of_starts > ARRIVED || freedom < 1.0 {
+        return 1.0;
+    }
+    // What the best constants would still take off, to first order.
+    let least = |normal: &Normal| {
+        let root = Root::of(fitted.x.len(), &normal.matrix);
+        let gained: f64 = root.back.iter().map(|row| dot(row, &normal.right).powi(2)).sum();
+        normal.square - gained
+    };
+    let ratio = (least(&together) - least(&apart)) / freedom / weighing.square;
+    tail(ratio, freedom, (apart.count - fitted.x.len() as f64).max(1.0))
 }
 
 /// Probability that noise makes the constants of segments differ as much as they do: the score test of constants of each segment's own, whose

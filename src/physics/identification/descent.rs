@@ -18,6 +18,9 @@ use crate::linalg::{Workspace, dot, eigh};
 const ARRIVED: f64 = 1e-6;
 /// The same where no step, however short, gains anything: what rounding and the steps of the integrator leave.
 const STUCK: f64 = 1e-3;
+/// The same where forces have noise: how the filter depends on the unknowns is no part of the slopes, and the least sum of squares lies off by a
+/// tenth of a standard error.
+const STUCK_FILTERED: f64 = 1e-2;
 /// Part of the diagonal that keeps normal equations regular.
 pub(super) const RIDGE: f64 = 1e-11;
 /// Rounding of an eliminated diagonal, over the diagonal before starts were eliminated.
@@ -145,7 +148,15 @@ impl Problem<'_> {
         let variance = (normal.square / normal.count.max(1.0)).max(1.0);
         normal.held = step.held;
         normal.decrement = step.decrement.max(normal.of_starts) / variance;
-        normal.converged = normal.failed == 0 && normal.decrement < if stuck { STUCK } else { ARRIVED };
+        let filtered = !self.disturbances.force.is_empty();
+        let left = if !stuck {
+            ARRIVED
+        } else if filtered {
+            STUCK_FILTERED
+        } else {
+            STUCK
+        };
+        normal.converged = normal.failed == 0 && normal.decrement < left;
     }
 
     /// Fits unknowns and starts; the normal equations at the end, undamped, say whether the search has converged.

@@ -8,7 +8,7 @@ use super::{IdentifyError, IdentifyOptions};
 use crate::linalg::{self, Workspace};
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise as estimated};
 use crate::recording::survey::{Stillness, stillness};
-use crate::recording::{Clock, RecordedTrajectory, Recording};
+use crate::recording::{Clock, Filled, RecordedTrajectory, Recording};
 use std::ops::Range;
 
 /// Samples that are needed of all trajectories together.
@@ -50,7 +50,12 @@ pub(super) struct Pieces<'a> {
 }
 
 impl<'a> Pieces<'a> {
-    pub fn new(recording: &'a Recording, options: &IdentifyOptions) -> Result<Self, IdentifyError> {
+    /// Of a recording, whose held readings are `filled` in.
+    pub fn new(
+        recording: &'a Recording,
+        filled: Option<&Filled>,
+        options: &IdentifyOptions,
+    ) -> Result<Self, IdentifyError> {
         let n = recording.n();
         let (mut all, mut parts) = (Vec::new(), Vec::new());
         for (track, recorded) in recording.tracks.iter().enumerate().filter(|(_, t)| t.len() >= LEAST_TRACK) {
@@ -106,7 +111,17 @@ impl<'a> Pieces<'a> {
             still.map(|(i, how)| format!("{} {how}; nothing can be learned of it", recording.coordinates[i])).collect();
         let smooth =
             |track: &RecordedTrajectory| smoothing.as_ref().map(|smoothing| smoothing.apply(track)).transpose();
-        let smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        let mut smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        if let Some(filled) = filled {
+            // Smoothed values weigh the readings around held ones as if these were missing.
+            for ((track, smoothed), (from, samples)) in long.tracks.iter_mut().zip(&smoothed).zip(&origin) {
+                let held = samples.iter().flat_map(|k| &filled.held[*from][k * n..(k + 1) * n]);
+                let values = smoothed.iter().flat_map(|smoothed| &smoothed.q);
+                let held = track.q.iter_mut().zip(values).zip(held).filter(|(_, held)| **held);
+                held.for_each(|((q, value), _)| *q = *value);
+            }
+            smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        }
         Ok(Self { recording, all, long, origin, smoothing, smoothed, step, noise, noise_of, still })
     }
 

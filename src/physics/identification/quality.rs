@@ -13,8 +13,8 @@ pub(super) const EXPLAINED: f64 = 1.3;
 /// Probability below which independent residuals of the right form are not believed to be as correlated as those that were found. Of right
 /// forms this test and that of [`DIFFERENT`] refuse one and a half in a hundred.
 pub(super) const CHANCE: f64 = 0.01;
-/// Probability below which parts of a recording are not believed to have the same constants.
-const DIFFERENT: f64 = 0.005;
+/// Probability below which parts of a recording are not believed to have the same constants, nor to continue each other.
+const DIFFERENT: f64 = 0.0025;
 /// Residual over the spread of what is met from which on there is more noise than anything else.
 const NOISY: f64 = 0.5;
 /// Times the precision of the integration that motion made by another integrator is off, and size of residuals over the noise up to which they may
@@ -152,6 +152,8 @@ pub(super) struct Evidence<'a> {
     pub outliers: f64,
     /// Probability that noise makes parts of the recording differ as much.
     pub agreement: f64,
+    /// Probability that noise keeps segments from continuing each other as they do, and their usual length in s.
+    pub continuation: (f64, f64),
 }
 
 impl Evidence<'_> {
@@ -197,6 +199,10 @@ impl Evidence<'_> {
         }
         if self.agreement < DIFFERENT {
             return Some(Verdict::Disagreement { probability: self.agreement });
+        }
+        let (probability, seconds) = self.continuation;
+        if probability < DIFFERENT {
+            return Some(Verdict::Discontinuous { probability, seconds });
         }
         None
     }

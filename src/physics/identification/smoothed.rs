@@ -24,6 +24,12 @@ pub(super) struct States {
     pub places: Vec<(usize, usize)>,
     /// One over the errors of what is met: of the accelerations, or of the forces.
     pub weight: Vec<f64>,
+    /// Samples from a state to the next one.
+    pub stride: usize,
+    /// States to either side over which equations of forces are averaged, twice: weights are a triangle.
+    pub averaged: usize,
+    /// Weights of the equations of forces in averages, `(states, n)`; empty for equal ones.
+    pub share: Vec<f64>,
 }
 
 /// What is met.
@@ -41,6 +47,7 @@ impl States {
         let full = |s: &Smoothed| s.interior().filter(|&at| s.is_full(at)).collect::<Vec<_>>();
         let all: usize = smoothed.iter().flatten().map(|s| full(s).len()).sum();
         let stride = all.div_ceil(MOST_STATES).max(1);
+        states.stride = stride;
         for (at, (track, smoothed)) in problem.course.recording.tracks.iter().zip(smoothed).enumerate() {
             let Some(smoothed) = smoothed else { continue };
             for sample in full(smoothed).into_iter().step_by(stride) {
@@ -92,26 +99,75 @@ impl States {
         }
     }
 
-    /// Residuals of what is met with their slopes by the constants, batch by batch: `visit(first number, residuals, slopes)`.
+    /// Residuals of what is met with their slopes by the constants, some states at a time: `visit(first number, residuals, slopes)`.
     fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
-        let values = problem.parameters(x);
-        let mut residual = Vec::new();
+        let (n, values) = (problem.course.equations.n, problem.parameters(x));
+        let width = 2 * n + problem.course.chosen;
+        let (mut residual, mut rows) = (Vec::new(), Vec::new());
         self.batches(problem, x, |follower, range, a| {
             let (first, measured) = (range.start, &self.a[range.clone()]);
             let (q, v) = (&self.q[range.clone()], &self.v[range]);
-            residual.resize(a.len(), 0.0);
-            let slopes = match met {
+            match met {
                 Met::Accelerations => {
-                    residual.iter_mut().zip(measured.iter().zip(a)).for_each(|(r, (measured, a))| *r = measured - a);
-                    follower.slopes(&values, (q, v, a))
+                    residual.clear();
+                    residual.extend(measured.iter().zip(a).map(|(measured, a)| measured - a));
+                    visit(first, &residual, follower.slopes(&values, (q, v, a)));
                 }
                 Met::Forces => {
+                    residual.resize(a.len(), 0.0);
                     follower.lacking_forces(measured, &mut residual);
-                    follower.force_slopes(&values, (q, v, measured))
+                    let slopes = follower.force_slopes(&values, (q, v, measured)).chunks_exact(width);
+                    residual.iter().zip(slopes).for_each(|(r, slopes)| {
+                        rows.push(*r);
+                        rows.extend_from_slice(slopes);
+                    });
                 }
-            };
-            visit(first, &residual, slopes);
+            }
         });
+        self.average(n, &mut rows);
+        for (part, rows) in rows.chunks(LANES * n * (width + 1)).enumerate() {
+            let [residual, slopes] = [0..1, 1..width + 1].map(|range| {
+                rows.chunks_exact(width + 1).flat_map(|row| &row[range.clone()]).copied().collect::<Vec<_>>()
+            });
+            visit(part * LANES * n, &residual, &slopes);
+        }
+    }
+
+    /// Means over neighbouring states of every trajectory, of what has as many numbers for each equation of force, `(states, n, numbers)`.
+    ///
+    /// What is averaged are the equations, forces and all, which hold as well as each of them does: the noise of accelerations is gone from
+    /// the regressors before these are squared, so that least squares are hardly biased by it, and polynomials may be of a degree that misses
+    /// nothing. Robots are identified like this ("parallel filtering", Gautier, IEEE ICRA 1997).
+    fn average(&self, n: usize, values: &mut [f64]) {
+        let (states, half) = (self.places.len(), self.averaged);
+        if half == 0 || values.is_empty() {
+            return;
+        }
+        let (size, width) = (values.len() / states, values.len() / (states * n));
+        let mut weights = if self.share.is_empty() { vec![1.0; states * n] } else { self.share.clone() };
+        let mut failed = Vec::new();
+        for (at, (row, weight)) in values.chunks_exact_mut(width).zip(&mut weights).enumerate() {
+            if row.iter().all(|x| x.is_finite()) {
+                row.iter_mut().for_each(|x| *x *= *weight);
+            } else {
+                failed.push(at);
+                (*weight, _) = (0.0, row.fill(0.0));
+            }
+        }
+        let mut first = 0;
+        let next = |a: &(usize, usize), b: &(usize, usize)| a.0 == b.0 && b.1 <= a.1 + self.stride;
+        for run in self.places.chunk_by(next) {
+            let end = first + run.len();
+            for _ in 0..2 {
+                sums(&mut values[first * size..end * size], size, half);
+                sums(&mut weights[first * n..end * n], n, half);
+            }
+            first = end;
+        }
+        for (row, weight) in values.chunks_exact_mut(width).zip(&weights) {
+            row.iter_mut().for_each(|x| *x = if *weight > 0.0 { *x / weight } else { 0.0 });
+        }
+        failed.into_iter().for_each(|at| values[at * width..(at + 1) * width].fill(f64::NAN));
     }
 
     /// Normal equations of what is met, with the right-hand sides of batches of states; `None` where no residual is finite.
@@ -145,11 +201,13 @@ impl States {
         (normal.count > 0.0).then_some(normal)
     }
 
-    /// Residuals of force, `(states, n)`.
-    pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<f64> {
+    /// Residuals of force, `(states, n)`, and their averages.
+    pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> [Vec<f64>; 2] {
         let mut all = vec![0.0; self.q.len()];
         self.batches(problem, x, |follower, range, _| follower.lacking_forces(&self.a[range.clone()], &mut all[range]));
-        all
+        let mut averages = all.clone();
+        self.average(problem.course.equations.n, &mut averages);
+        [all, averages]
     }
 
     /// Moves constants to where smoothed motion is met best; the normal equations there, `None` if no residual is finite.
@@ -176,5 +234,62 @@ impl States {
             }
         }
         Some(best)
+    }
+}
+
+/// Sums over `half` rows of so many numbers to either side.
+fn sums(rows: &mut [f64], size: usize, half: usize) {
+    let given = rows.to_vec();
+    let row = |at: usize| given.get(at * size..(at + 1) * size);
+    let count = rows.len() / size;
+    let mut sum = vec![0.0; size];
+    for at in 0..count + half {
+        if let Some(row) = row(at) {
+            sum.iter_mut().zip(row).for_each(|(s, x)| *s += x);
+        }
+        if let Some(row) = at.checked_sub(2 * half + 1).and_then(row) {
+            sum.iter_mut().zip(row).for_each(|(s, x)| *s -= x);
+        }
+        if let Some(middle) = at.checked_sub(half) {
+            rows[middle * size..(middle + 1) * size].copy_from_slice(&sum);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equations_are_averaged_along_their_trajectory_by_their_weights() {
+        // Two trajectories, the second with a sample missing between its parts; one equation takes no part, one has failed.
+        let places: Vec<(usize, usize)> =
+            (0..9).map(|k| (0, k)).chain((0..4).map(|k| (1, k))).chain((5..9).map(|k| (1, k))).collect();
+        let mut states = States { places, stride: 1, averaged: 1, share: vec![1.0; 17], ..States::default() };
+        states.share[2] = 0.0;
+        let given: Vec<f64> = (0..34).map(|k| f64::from(k * k % 11)).collect();
+        let mut found = given.clone();
+        found[2 * 15] = f64::NAN;
+        states.average(1, &mut found);
+        let runs = [0..9, 9..13, 13..17];
+        for (at, row) in found.chunks_exact(2).enumerate() {
+            let run = runs.iter().find(|run| run.contains(&at)).unwrap();
+            let near = |k: &usize| run.contains(k) && *k != 2 && *k != 15;
+            let weight = |k: usize| [3.0, 2.0, 1.0, 0.0][k.abs_diff(at).min(3)];
+            // At the ends a first average of two counts once more.
+            let twice = |k: usize| {
+                let inner = at.saturating_sub(1).max(run.start)..(at + 2).min(run.end);
+                inner.filter(|middle| middle.abs_diff(k) <= 1).count() as f64
+            };
+            let all = || (0..17).filter(near);
+            let mean = all().map(|k| twice(k) * given[2 * k + 1]).sum::<f64>() / all().map(twice).sum::<f64>();
+            match at {
+                15 => assert!(row[0].is_nan() && row[1].is_nan()),
+                _ => assert!((row[1] - mean).abs() < 1e-12, "{at}: {row:?} {mean}"),
+            }
+            if at == 6 {
+                assert!((4..9).all(|k| twice(k) == weight(k)));
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! From smoothed accelerations to longer and longer segments of motion.
 
 use super::choices::{check_errors, chosen, met, sensors};
-use super::covariance::{Root, Weighing, agreement, long_run, scores};
+use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual};
 use super::innovations::Disturbances;
@@ -16,8 +16,10 @@ use super::ways::best_between;
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
-use crate::recording::{Recording, deviation, rms};
+use crate::recording::{Filled, Recording, deviation, filled, rms};
 
+/// Share of independent numbers that starts and constants leave at least.
+const LEAST_LEFT: f64 = 0.25;
 /// Times in which the motion changes that a first segment lasts.
 const PACES: f64 = 2.5;
 /// Samples that are followed at most.
@@ -112,6 +114,9 @@ pub fn identify(
     }
     recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;
     check_errors(recording, &options.errors)?;
+    let filled = filled(recording);
+    let repeated = filled.as_ref().map_or_else(Vec::new, repeated);
+    let recording = filled.as_ref().map_or(recording, |filled| &filled.recording);
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
     let met = met(instance, recording, options)?;
@@ -121,7 +126,7 @@ pub fn identify(
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
     stop.check()?;
     stop.stage("smoothed motion");
-    let pieces = Pieces::new(recording, options)?;
+    let pieces = Pieces::new(recording, filled.as_ref(), options)?;
     let spread: Vec<f64> = (0..n).map(|i| spread_of(recording, i)).collect();
     let least: Vec<f64> = spread.iter().map(|spread| LEAST_NOISE * spread).collect();
     let known = options.noise.is_some() || !options.errors.is_empty();
@@ -160,16 +165,16 @@ pub fn identify(
     stop.check()?;
     let mut x = given.clone();
     let on_pieces = Problem { course: Course { recording: &pieces.long, ..problem.course.clone() }, ..problem.clone() };
-    let mut states = States::new(&on_pieces, &pieces.smoothed);
     if met == Met::Forces {
         stop.stage("forces");
         let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
-        let mut found = by_forces::identify(instance, &on_pieces, (smoothing, &mut states), (x, pieces.cut_long()))?;
+        let mut found = by_forces::identify(instance, &on_pieces, smoothing, (x, pieces.cut_long()))?;
         for outlier in &mut found.outliers {
             (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
         }
-        return Ok(Identified { obstacles: pieces.still, ..found });
+        return Ok(Identified { obstacles: [pieces.still, repeated].concat(), ..found });
     }
+    let states = States::new(&on_pieces, &pieces.smoothed);
     let fitted = states.len(n) == 0 || states.fit(&on_pieces, &mut x, met).is_some();
     stop.check()?;
     if !fitted {
@@ -199,7 +204,10 @@ pub fn identify(
     stop.stage("longer segments");
     fitted = grown(&mut problem, fitted, options.segment);
     if forced {
-        problem.estimate_force_noise(&fitted.x, &fitted.segments);
+        // Errors of forces add up: longer segments show them best.
+        let mut longer = joined(&fitted.segments);
+        problem.settle(&fitted.x, &mut longer, 6);
+        problem.estimate_force_noise(&fitted.x, &longer);
     }
     if !known {
         weigh(&mut problem, &fitted);
@@ -223,9 +231,20 @@ pub fn identify(
         let coordinate = recording.coordinates[0].clone();
         (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
     }
-    found.obstacles = pieces.still;
+    found.obstacles = [pieces.still, repeated].concat();
     rivals.widen(&mut found);
     Ok(found)
+}
+
+/// What is to be said of the readings that a sensor repeated.
+fn repeated(filled: &Filled) -> Vec<String> {
+    let recording = &filled.recording;
+    let of = |(i, name): (usize, &String)| {
+        let (held, samples) = (filled.count(i), recording.samples());
+        let says = "readings repeat the one before while the motion goes on; they are filled in from those around them";
+        (held > 0).then(|| format!("{name}: {held} of {samples} {says}"))
+    };
+    recording.coordinates.iter().enumerate().filter_map(of).collect()
 }
 
 /// Standard deviation of a coordinate over all samples; 1 for one that rests.
@@ -537,6 +556,8 @@ fn result(
     let window = |of: &Correlation| if 4 * of.length >= longest { 4 * longest } else { 2 * of.length };
     let lags = follow.iter().filter(|of| !is_white(of)).map(window).max();
     let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
+    let segment_seconds = usual_samples(&fitted.segments) as f64 * problem.course.step;
+    let continuation = (continuation(problem, fitted, weighing), segment_seconds);
     let (normal, inflation) = informed(problem, fitted, (weighing, lags), known);
     let verdict = Evidence {
         converged: fitted.normal.converged,
@@ -546,6 +567,7 @@ fn result(
         probabilities: follow.iter().map(|of| (of.probability * n as f64).min(1.0)).collect(),
         outliers: outlier_count as f64 / numbers,
         agreement,
+        continuation,
     }
     .verdict();
     Identified {
@@ -561,7 +583,7 @@ fn result(
         force_noise: problem.disturbances.force.clone(),
         samples: fitted.segments.iter().map(|segment| segment.samples).sum(),
         segments: fitted.segments.len(),
-        segment_seconds: usual_samples(&fitted.segments) as f64 * problem.course.step,
+        segment_seconds,
         substeps: fitted.substeps,
         between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
         ..unknowns(
@@ -593,8 +615,19 @@ fn informed(
         return (root.informed(&fitted.normal, &unit, least), 1.0);
     };
     let scores = scores(problem, &fitted.x, &fitted.segments);
-    let mut seen = root.seen(m, &long_run(&scores, &fitted.segments, m, lags));
+    let [wide, narrow] = [lags, lags / 2].map(|lags| long_run(&scores, &fitted.segments, m, lags));
+    // A kernel that is 1 over the first half of the lags: noise that is still correlated there counts whole (Politis and Romano, J. Time Series
+    // Analysis 16 (1995) 67).
+    let flat: Vec<f64> = wide.iter().zip(&narrow).map(|(wide, narrow)| 2.0 * wide - narrow).collect();
+    let mut seen = root.seen(m, &flat);
     seen.iter_mut().for_each(|x| *x *= bread);
     let mean = mean_eigenvalue(&seen, root.forward.len());
-    (root.informed(&fitted.normal, &seen, least), (mean / plain).max(1.0))
+    let inflation = (mean / plain).max(1.0);
+    // Starts and constants take as much from a few independent numbers as from many: correlated residuals are smaller than the noise by more than
+    // independent ones.
+    let numbers: f64 = fitted.segments.iter().map(|segment| (segment.samples * problem.sigma.len()) as f64).sum();
+    let taken = (numbers - fitted.normal.count + m as f64) / numbers;
+    let hidden = (1.0 - taken) / (1.0 - taken * inflation).max(LEAST_LEFT);
+    seen.iter_mut().for_each(|x| *x *= hidden);
+    (root.informed(&fitted.normal, &seen, least), inflation * hidden)
 }

@@ -404,8 +404,8 @@ fn errors_under_correlated_noise_are_those_of_the_scatter() {
         ((found.constants[0].value - 0.7) / found.constants[0].standard_error.unwrap()).powi(2)
     };
     let mean = (0..12).map(off).sum::<f64>() / 12.0;
-    // Errors are 1.7 times too small under noise this slow (2.74 measured over these seeds); 1 would be right.
-    assert!((0.3..3.0).contains(&mean), "{mean}");
+    // Errors are 1.5 times too small under noise this slow (2.22 measured over these seeds); 1 would be right.
+    assert!((0.3..2.5).contains(&mean), "{mean}");
 }
 
 #[test]
@@ -429,4 +429,27 @@ fn a_verdict_says_why() {
     assert!(!noise.explains(), "{noise:?}");
     let far = verdict(1e-3, &|q, draw| *q += if draw.abs() > 2.2 { 0.05 * draw.signum() } else { 0.0 });
     assert!(!far.explains(), "{far:?}");
+}
+
+#[test]
+fn a_slow_term_is_missed_where_segments_do_not_continue_each_other() {
+    let swing = |damped: bool| {
+        let text = format!(
+            r#"{{"name": "swing", "lagrangian": "a_dot^2/2 + w*cos(a)", "dissipation": "{}",
+            "coordinates": [{{"name": "a", "periodic": true, "velocity_bounds": [-3, 3]}}], "parameters": {{"w": 9}}}}"#,
+            if damped { "0.01*a_dot^2/2" } else { "0*a_dot^2" }
+        );
+        described(&text, &[])
+    };
+    // Each segment alone can be met without friction.
+    let options = IdentifyOptions { segment: Some(0.5), ..Default::default() };
+    let verdicts = (0..4).map(|seed| {
+        let recording = recorded(&swing(true), &[&[1.0, 0.0]], (20.0, 0.02), &[1e-3], seed);
+        let right = identify(&swing(true), &recording, &options).unwrap();
+        assert!(right.explained && right.segments > 10, "{right:?}");
+        identify(&swing(false), &recording, &options).unwrap().verdict
+    });
+    let verdicts: Vec<Verdict> = verdicts.collect();
+    let broken = verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Discontinuous { .. })).count();
+    assert!(broken > 1 && !verdicts.iter().any(Verdict::explains), "{verdicts:?}");
 }

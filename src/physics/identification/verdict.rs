@@ -8,7 +8,8 @@ use std::fmt::{Display, Formatter, Result};
 ///
 /// A form explains a recording if all of this holds; the first that does not is named:
 /// the search has converged; residuals are below half of the motion; they are as large as the noise; at most one sample in a hundred lies far
-/// from the motion; residuals do not follow from the earlier ones; all parts of the recording ask for the same constants.
+/// from the motion; residuals do not follow from the earlier ones; all parts of the recording ask for the same constants, and each goes on where
+/// the one before ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -55,6 +56,13 @@ pub enum Verdict {
         /// Probability that noise makes them differ as much.
         probability: f64,
     },
+    /// Parts of the recording do not continue each other.
+    Discontinuous {
+        /// Probability that noise makes their ends and starts differ as much.
+        probability: f64,
+        /// Their usual length in s.
+        seconds: f64,
+    },
 }
 
 impl Verdict {
@@ -96,6 +104,12 @@ impl Display for Verdict {
             Self::Disagreement { probability } => write!(
                 f,
                 "parts of the recording ask for different constants (probability by chance {}).",
+                rounded(*probability, 2)
+            ),
+            Self::Discontinuous { probability, seconds } => write!(
+                f,
+                "motion is followed over {} s each, but not on from there (probability by chance {}): a slow term is missing.",
+                rounded(*seconds, 2),
                 rounded(*probability, 2)
             ),
         }

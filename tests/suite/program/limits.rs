@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 /// Values of every numeric option: the ends of floats and of integers, and what is none of their ranges.
 const VALUES: [&str; 7] = ["0", "-1", "1e308", "1e-308", "4294967296", "18446744073709551615", "nan"];
 
-/// The program with no more than 2 GB of address space and 10 s of time.
+/// The program with no more than 2 GB of address space and 20 s of time, on cores that it shares with other tests.
 fn bounded(arguments: &[&str]) -> Run {
-    let script = "ulimit -v 2097152; exec timeout -s KILL 10 \"$0\" \"$@\"";
+    let script = "ulimit -v 2097152; exec timeout -s KILL 20 \"$0\" \"$@\"";
     Run::of(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_lnn")]).args(arguments).env_remove("LNN_LOG"))
 }
 

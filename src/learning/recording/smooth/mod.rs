@@ -105,6 +105,8 @@ pub struct Smoothing {
     /// `true` if windows are shorter than usual where the motion is fast, and longer where it is slow; `false` if their length
     /// was given.
     pub varying: bool,
+    /// Degrees by which polynomials are above `degree`, for which the windows were chosen.
+    pub more: usize,
 }
 
 /// A trajectory with derivatives; all arrays are `(samples, n)`.
@@ -201,7 +203,12 @@ impl Smoothing {
             });
         let coordinates = chosen.collect::<Result<_, _>>()?;
         let own = windows.into_iter().map(|(_, own)| own).collect();
-        Ok(Self { degree: options.degree, coordinates, own, step, varying: options.window.is_none() })
+        Ok(Self { degree: options.degree, coordinates, own, step, varying: options.window.is_none(), more: 0 })
+    }
+
+    /// The same windows with polynomials of two more degrees: more noise and hardly any bias, for what is averaged afterwards.
+    pub(crate) fn sharper(&self) -> Self {
+        Self { more: self.more + 2, ..self.clone() }
     }
 
     /// The signal of coordinate `i` on trajectories with their clocks.
@@ -246,7 +253,7 @@ impl Smoothing {
 
     /// Window of coordinate `i` in samples of a trajectory: as many seconds as chosen, at most all of the trajectory.
     fn samples(&self, i: usize, track: &RecordedTrajectory, clock: &Clock) -> usize {
-        let least = (self.degree + 3) | 1;
+        let least = (self.degree + self.more + 3) | 1;
         let samples = (self.coordinates[i].seconds / clock.step).round() as usize;
         let most = track.len() - (track.len() + 1) % 2;
         (samples | 1).clamp(least, most.max(least))
@@ -258,7 +265,7 @@ impl Smoothing {
     /// [`SmoothError`] for a trajectory of fewer samples than coefficients, or of another shape than the recording's.
     pub fn apply(&self, track: &RecordedTrajectory) -> Result<Smoothed, SmoothError> {
         let (n, length) = (self.coordinates.len(), track.len());
-        let needed = (self.degree + 3) | 1;
+        let needed = (self.degree + self.more + 3) | 1;
         if length < needed {
             return Err(SmoothError::Short { track: track.name.clone(), samples: length, needed });
         }
@@ -282,12 +289,14 @@ impl Smoothing {
             .collect();
         let windows =
             if self.varying { pace::windows(&usual) } else { usual.iter().map(|u| vec![u.window; length]).collect() };
-        for (usual, windows) in usual.iter().zip(&windows) {
+        for (mut usual, mut windows) in usual.into_iter().zip(windows) {
+            usual.signal.degree += self.more;
+            windows.iter_mut().for_each(|window| *window = (*window).max(needed));
             let surrounded = |at: usize| clock.surrounds(&track.times, at, windows[at]);
             let before = (0..length).find(|&at| surrounded(at)[0]).unwrap_or(length);
             let after = (0..length).find(|&left| surrounded(length - 1 - left)[1]).unwrap_or(length);
             smoothed.margins = [smoothed.margins[0].max(before), smoothed.margins[1].max(after)];
-            smooth(usual, windows, &mut smoothed);
+            smooth(&usual, &windows, &mut smoothed);
         }
         let inside = smoothed.interior();
         smoothed.lacking.sort_unstable();

@@ -1,0 +1,184 @@
+//! Readings that a sensor held while the motion went on.
+//!
+//! A driver that misses a new reading repeats the one before, digit by digit. Such a reading is late by a step, an error of the motion's
+//! velocity times the step, which no average takes out. It is taken for missing and filled in from the readings around it.
+
+use super::{Recording, quantile};
+
+/// Repetitions in a row from which on a motion may rest, and at most.
+const MANY: usize = 4;
+const MOST_HELD: usize = 12;
+/// Change after many repetitions over that of a motion that goes on as it did before.
+const GOES_ON: f64 = 0.5;
+/// Change of a reading over the smallest one of its sensor from which on a reading between does not stay the same.
+const MOVING: f64 = 3.0;
+/// The usual change over the smallest one from which on readings are hardly ever the same by chance, and the share of repetitions from which
+/// on it was not chance.
+const FINE: f64 = 20.0;
+const OFTEN: f64 = 0.01;
+/// Marks up to which changes are looked at, how far a whole number of them may be off, so many changes at least, and the share that is whole: others
+/// are readings that were filled in.
+const FEW_MARKS: f64 = 8.0;
+const WHOLE: f64 = 0.05;
+const ENOUGH: usize = 20;
+const MOSTLY: f64 = 0.7;
+/// Fresh readings on either side that a polynomial goes through.
+const AROUND: usize = 2;
+
+/// A recording without held readings.
+pub(crate) struct Filled {
+    pub recording: Recording,
+    /// `true` for readings that were held, `(samples, n)` by trajectory.
+    pub held: Vec<Vec<bool>>,
+}
+
+impl Filled {
+    /// Number of held readings of coordinate `i`.
+    pub fn count(&self, i: usize) -> usize {
+        let n = self.recording.n();
+        self.held.iter().flat_map(|track| track.iter().skip(i).step_by(n)).filter(|held| **held).count()
+    }
+}
+
+/// Fills in held readings; `None` if there are none. Trajectories that measure a state more than once hold what they measured.
+pub(crate) fn filled(recording: &Recording) -> Option<Filled> {
+    let n = recording.n();
+    let mut filled = recording.clone();
+    let mut held: Vec<Vec<bool>> = recording.tracks.iter().map(|track| vec![false; track.q.len()]).collect();
+    for i in 0..n {
+        let scale = Scale::of(recording, i);
+        for ((track, filled), held) in recording.tracks.iter().zip(&mut filled.tracks).zip(&mut held) {
+            let values: Vec<f64> = track.q.iter().skip(i).step_by(n).copied().collect();
+            let fresh = scale.fresh(&track.times, &values);
+            for sample in (0..values.len()).filter(|&k| !fresh[k]) {
+                held[sample * n + i] = true;
+                filled.q[sample * n + i] = between(&track.times, &values, &fresh, sample);
+            }
+        }
+    }
+    held.iter().flatten().any(|held| *held).then_some(Filled { recording: filled, held })
+}
+
+/// What a sensor tells apart.
+struct Scale {
+    /// Smallest change of a reading.
+    smallest: f64,
+    /// `true` if the sensor holds readings however slow the motion is.
+    holds: bool,
+}
+
+impl Scale {
+    fn of(recording: &Recording, i: usize) -> Self {
+        let n = recording.n();
+        let changes = recording.tracks.iter().flat_map(|track| {
+            let values = || track.q.iter().skip(i).step_by(n);
+            values().zip(values().skip(1)).map(|(a, b)| (b - a).abs())
+        });
+        let (repeated, mut changes): (Vec<f64>, Vec<f64>) = changes.partition(|change| *change == 0.0);
+        let often = repeated.len() as f64 > OFTEN * changes.len() as f64;
+        let smallest = changes.iter().copied().fold(f64::INFINITY, f64::min);
+        Self { smallest, holds: often && quantile(&mut changes, 0.5) > FINE * smallest }
+    }
+
+    /// `false` for held readings.
+    fn fresh(&self, times: &[f64], values: &[f64]) -> Vec<bool> {
+        let mut fresh = vec![true; values.len()];
+        if times.windows(2).any(|pair| pair[1] <= pair[0]) {
+            return fresh;
+        }
+        let least = MOVING * self.smallest;
+        let mut last = 0;
+        for next in (1..values.len()).filter(|&k| values[k] != values[k - 1]) {
+            // `last` begins the run that ends before `next`.
+            let (first, held) = (last, next - last - 1);
+            last = next;
+            if held == 0 || held > MOST_HELD || first == 0 {
+                continue;
+            }
+            let (before, after) = (values[first] - values[first - 1], values[next] - values[first]);
+            let steps = (held + 1) as f64;
+            let goes_on = before * after > 0.0 && before.abs() >= least && after.abs() >= least * steps;
+            let rests = held >= MANY && after.abs() < GOES_ON * steps * before.abs();
+            if goes_on && !rests || self.holds && held < MANY {
+                fresh[first + 1..next].fill(false);
+            }
+        }
+        fresh
+    }
+}
+
+/// Distance of the marks of coordinate `i`, if its sensor has some: small changes are whole numbers of them.
+pub(crate) fn marks(recording: &Recording, i: usize) -> Option<f64> {
+    let Scale { smallest, .. } = Scale::of(recording, i);
+    let n = recording.n();
+    let changes = recording.tracks.iter().flat_map(|track| {
+        let values = || track.q.iter().skip(i).step_by(n);
+        values().zip(values().skip(1)).map(|(a, b)| ((b - a) / smallest).abs())
+    });
+    let small: Vec<f64> = changes.filter(|marks| *marks > 0.5 && *marks < FEW_MARKS).collect();
+    let whole = small.iter().filter(|marks| (*marks - marks.round()).abs() < WHOLE).count();
+    (small.len() >= ENOUGH && whole as f64 > MOSTLY * small.len() as f64).then_some(smallest)
+}
+
+/// Value at a held reading of the polynomial through the fresh ones around it.
+fn between(times: &[f64], values: &[f64], fresh: &[bool], sample: usize) -> f64 {
+    let before = (0..sample).rev().filter(|&k| fresh[k]).take(AROUND);
+    let after = (sample + 1..values.len()).filter(|&k| fresh[k]).take(AROUND);
+    let around: Vec<usize> = before.chain(after).collect();
+    let weight = |k: usize| {
+        let others = around.iter().filter(|&&other| other != k);
+        others.map(|&other| (times[sample] - times[other]) / (times[k] - times[other])).product::<f64>()
+    };
+    around.iter().map(|&k| weight(k) * values[k]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::RngStream;
+    use crate::recording::RecordedTrajectory;
+    use rand::Rng;
+
+    fn recording(q: Vec<f64>) -> Recording {
+        let times = (0..q.len()).map(|k| 0.005 * k as f64).collect();
+        let track =
+            RecordedTrajectory { name: "run".into(), times, q, v: Vec::new(), a: Vec::new(), force: Vec::new() };
+        Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] }
+    }
+
+    #[test]
+    fn held_readings_are_filled_in_and_others_are_kept() {
+        let mut rng = RngStream::Test.generator(3);
+        let exact: Vec<f64> = (0..800).map(|k| (0.02 * f64::from(k)).sin()).collect();
+        let noisy: Vec<f64> = exact.iter().map(|x| x + 1e-4 * rng.random_range(-1.0..1.0)).collect();
+        let mut held = noisy.clone();
+        for k in 1..held.len() {
+            if rng.random_bool(0.125) {
+                held[k] = held[k - 1];
+            }
+        }
+        let found = filled(&recording(held.clone())).unwrap();
+        let repeated = held.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        assert!(found.count(0) <= repeated && repeated - found.count(0) < 5, "{repeated} {}", found.count(0));
+        let worst = |values: &[f64]| {
+            // At its ends a run has no reading on either side of it.
+            let far = exact.iter().zip(values).skip(5).take(790).filter(|(x, _)| x.abs() < 0.9);
+            far.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+        };
+        let now = worst(&found.recording.tracks[0].q);
+        assert!(worst(&held) > 0.015 && now < 1e-3, "{now}");
+        // Motion without them, a scale whose marks are passed slowly or fast, rest, and rest that ends at once.
+        let marks = |size: f64| exact.iter().map(|x| (x / size).round() * size).collect::<Vec<f64>>();
+        let rest: Vec<f64> = exact.iter().map(|x| x.max(0.3)).collect();
+        for kept in [exact.clone(), noisy.clone(), marks(1e-3), marks(1e-2), marks(0.1), rest, vec![1.0; 50]] {
+            assert!(filled(&recording(kept)).is_none());
+        }
+        for (readings, distance) in
+            [(marks(1e-3), Some(1e-3)), (marks(1e-2), Some(1e-2)), (exact, None), (noisy, None), (held, None)]
+        {
+            let found = super::marks(&recording(readings), 0);
+            assert!(found.zip(distance).is_none_or(|(a, b): (f64, f64)| (a / b - 1.0).abs() < 1e-6));
+            assert_eq!(found.is_some(), distance.is_some(), "{found:?} {distance:?}");
+        }
+    }
+}
