@@ -168,6 +168,23 @@ fn inside(seed: u64, draw: &mut Draw) -> System {
     }
 }
 
+/// A planet around a body whose attraction has a small term beside that of Newton.
+fn precessing(draw: &mut Draw) -> System {
+    let (a, b) = (draw.between(0.9, 1.2), draw.between(0.01, 0.03));
+    System {
+        terms: &["x_dot^2", "y_dot^2", "sqrt(x^2 + y^2)^(-1)", "sqrt(x^2 + y^2)^(-3)"],
+        ..System::new(
+            &["x", "y"],
+            vec![[0.8, 1.2], [-0.3, 0.3], [-0.3, 0.3], [0.7, 1.0]],
+            Box::new(move |_, q, _| {
+                let r = q[0].hypot(q[1]);
+                let pull = a / r.powi(3) + 3.0 * b / r.powi(5);
+                vec![-pull * q[0], -pull * q[1]]
+            }),
+        )
+    }
+}
+
 /// A system that no library holds.
 fn outside(seed: u64, draw: &mut Draw) -> System {
     let a = draw.between(0.8, 1.6);
@@ -295,6 +312,17 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
             right
         });
     }
+    let small = |seed: u64| {
+        let mut draw = Draw::of(seed, 15);
+        let system = precessing(&mut draw);
+        let found = search(&system.record(EVEN, &mut draw), seed);
+        let right = is_right(&found, system.terms);
+        report(right, "1/r + 1/r^3", seed, &found);
+        (right, found.is_ok_and(|found| found.verdict == Verdict::Found && !found.several) && !right)
+    };
+    let small: Vec<(bool, bool)> = (0..seeds).map(small).collect();
+    add("right terms, no other", "1/r with 1 to 3 % of 1/r^3", [0.3, 1.0], &|seed| small[seed as usize].0);
+    add("found, other terms", "1/r with 1 to 3 % of 1/r^3", [0.0, 0.1], &|seed| small[seed as usize].1);
     add("found", "laws in none of them", [0.0, 0.05], &|seed| {
         let mut draw = Draw::of(seed, 12);
         let found = search(&outside(seed, &mut draw).record(EVEN, &mut draw), seed);

@@ -107,7 +107,7 @@ impl Compared<'_> {
         if !found.group_factors.is_empty() {
             let factors = found.group_factors.iter().map(|factor| rounded(*factor, 6)).collect::<Vec<_>>().join(", ");
             text += &format!(
-                "coordinates that do not act on each other have factors of their own, which no motion tells: {factors} were taken into B first\n"
+                "coordinates that do not act on each other have factors of their own, which no motion determines: {factors} were taken into B first\n"
             );
         }
         if found.motionless_states > 0 {

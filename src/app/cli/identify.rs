@@ -322,7 +322,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         text += &format!("\n{}", text_table(&["combination", "value", "standard error", "unit"], &known));
     }
     for Undetermined { text: open, cure, .. } in &found.undetermined {
-        text += &format!("\n{open}\n  it takes {cure}\n");
+        text += &format!("\n{open}\n  what would determine it: {cure}\n");
     }
     text += &found.bodies.as_ref().map(bodies).unwrap_or_default();
     let m = found.constants.len() + found.sensors.len();
@@ -348,7 +348,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
         ]
     });
     let what = if found.segments == 0 { "force on" } else { "coordinate" };
-    let headers = [what, "residual", "noise", "spread", "of neighbours", ""];
+    let headers = [what, "residual", "noise", "spread", "autocorrelation", ""];
     text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
     text += &format!("{}\n", found.verdict);
     if !found.converged {
@@ -361,7 +361,7 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
     }
     if let Some(between) = found.between {
         let way = between.name();
-        text += &format!(", forces {way} between the samples");
+        text += &format!(", forces {way} between the samples (roll-outs: --between {way})");
     }
     if !found.force_noise.is_empty() {
         let sizes: Vec<String> = found.force_noise.iter().map(|size| rounded(*size, 2)).collect();
@@ -373,8 +373,8 @@ fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
             let (trajectory, row) = place(reading, o.track, o.sample);
             vec![trajectory, row.to_string(), rounded(o.time, 6), o.coordinate.clone(), rounded(o.size, 3)]
         });
-        let headers = ["trajectory", "row", "t", "coordinate", "over usual"];
-        let advice = if args.robust || found.segments == 0 { "" } else { "; --robust lets them move little" };
+        let headers = ["trajectory", "row", "t", "coordinate", "residual / typical"];
+        let advice = if args.robust || found.segments == 0 { "" } else { "; --robust limits their influence" };
         let samples = pluralize(found.outlier_count, "sample", "samples");
         text +=
             &format!("\n{samples} far from the motion{advice}\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));

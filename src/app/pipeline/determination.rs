@@ -149,7 +149,7 @@ impl Determined {
             groups: Vec::new(),
             misfit: BTreeMap::new(),
             outside: None,
-            withheld: Some("across the constraints no motion tells the mass matrix".to_string()),
+            withheld: Some("across the constraints no motion determines the mass matrix".to_string()),
             constant_ranges: BTreeMap::new(),
             energy_loss: None,
             decay: None,
@@ -235,7 +235,7 @@ impl Determined {
         }
     }
 
-    /// A remark on groups of coordinates whose masses have a factor that no motion tells.
+    /// A remark on groups of coordinates whose masses have a factor that no motion determines.
     fn apart(&self) -> Option<String> {
         let free = self.groups.iter().filter(|group| !group.unit_known);
         let free: Vec<String> = free.map(|group| group.coordinates.join(", ")).collect();
@@ -243,7 +243,7 @@ impl Determined {
         let parts: Vec<String> = free.iter().map(|one| format!("{one} {}", move_by(one))).collect();
         (!parts.is_empty()).then(|| {
             format!(
-                "{}: no motion tells the factor of that part of L, and its learned masses, friction and energy are arbitrary by one factor \
+                "{}: no motion determines the factor of that part of L, and its learned masses, friction and energy are arbitrary by one factor \
                  beside those of the other coordinates.",
                 parts.join("; ")
             )

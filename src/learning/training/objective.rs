@@ -331,7 +331,7 @@ impl<S: Scalar> Shard<S> {
                 right.fill(zero);
                 continue;
             }
-            // What the constraints can carry is no residual: no motion tells it.
+            // What the constraints can carry is no residual: no motion determines it.
             let carried = if held { self.held.carried(state, &units) } else { Vec::new() };
             right.iter_mut().zip(&units).for_each(|(r, &unit)| *r *= unit);
             take_out(right, &carried);

@@ -220,7 +220,7 @@ impl Examiner<'_> {
         if by_force > 0 {
             cures.push(match forced {
                 true => MORE.to_string(),
-                false => "motion under a known force (--force), without which no motion depends on it".to_string(),
+                false => "motion under a known force (--force), without which nothing depends on it".to_string(),
             });
         }
         if !by_motion.is_empty() {
@@ -230,10 +230,10 @@ impl Examiner<'_> {
         match (never, cures.is_empty()) {
             (0, _) => {}
             (_, true) => {
-                return "none: whatever the motion, the equations hold them in these combinations alone; give one of them its value".into();
+                return "no motion, the equations contain these combinations alone; fix one of the constants".into();
             }
-            (1, _) => cures.push("the value of one of them, which no motion tells".to_string()),
-            (never, _) => cures.push(format!("the values of {never} of them, which no motion tells")),
+            (1, _) => cures.push("the value of one of them, which no motion determines".to_string()),
+            (never, _) => cures.push(format!("the values of {never} of them, which no motion determines")),
         }
         cures.dedup();
         cures.join("; ")

@@ -217,7 +217,7 @@ fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undeter
         [single] => format!("motion of {single}, which stands still; else motion that goes farther or faster"),
         many => format!("motion of {}, which stand still; else motion that goes farther or faster", listed(many)),
     };
-    let always = "none: their sums are all that the forces depend on".to_string();
+    let always = "no motion, the forces depend on their sums alone".to_string();
     let told = |(changes, text, cure): (&Vec<Vec<f64>>, &str, String)| {
         let inside = |k: &usize| changes.iter().any(|change| change[*k] != 0.0);
         let constants = names.of(&(0..names.all.len()).filter(inside).collect::<Vec<_>>());
@@ -228,10 +228,10 @@ fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undeter
         (
             &open.silent,
             "have no effect on the forces, whatever the motion",
-            "none: nothing depends on them".to_string(),
+            "no motion, nothing depends on it".to_string(),
         ),
-        (&open.always, "are held together by the equations, whatever the motion", always),
-        (&open.here, "are not told apart by this motion", here),
+        (&open.always, "appear in the equations in sums alone", always),
+        (&open.here, "cannot be separated by this motion", here),
     ];
     all.into_iter().filter(|(changes, ..)| !changes.is_empty()).map(told).collect()
 }

@@ -1,4 +1,4 @@
-//! What the program says where the right answer is "no" or "not yet": motion that is no motion, factors that no motion tells, quantities that
+//! What the program says where the right answer is "no" or "not yet": motion that is no motion, factors that no motion determines, quantities that
 //! are not conserved.
 #![cfg(feature = "cli")]
 
@@ -72,7 +72,7 @@ fn a_metric_that_is_none_at_the_present_time_is_refused_for_its_time() {
     }
 }
 
-/// Masses of groups that do not act on each other have factors that no motion tells, one each and of either sign.
+/// Masses of groups that do not act on each other have factors that no motion determines, one each and of either sign.
 #[test]
 fn lagrangians_are_compared_up_to_a_factor_of_every_group() {
     let folder = Folder::new();
