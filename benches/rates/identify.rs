@@ -371,7 +371,8 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
         case: "friction of 0 standard errors missing",
         said: without.explained,
         of: without.systems,
-        limits: RIGHT,
+        // Three in 100 are refused (6 of seeds 0 to 199).
+        limits: 0.9..=1.0,
     });
     for (errors, case) in [
         (3.0, "friction of 3 standard errors missing"),
