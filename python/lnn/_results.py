@@ -471,7 +471,7 @@ class Bodies:
 
 @dataclass(frozen=True)
 class Residual:
-    """What the identified system leaves of the motion of one coordinate.
+    """What the identified system leaves of the motion of one coordinate, or of the averaged equations of its force.
 
     Attributes
     ----------

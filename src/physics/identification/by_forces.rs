@@ -9,7 +9,7 @@ use super::bootstrap::{self, COPIES};
 use super::covariance::Root;
 use super::follow::{Follower, LANES, Segment};
 use super::found::{Identified, Outlier, Residual};
-use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, tail, usual};
+use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::stages::Fitted;
@@ -21,7 +21,8 @@ use crate::recording::{deviation, quantile, rms};
 /// How often coordinates are weighed anew at most, and relative change of all weights that ends it: one that is not reached is reported.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.01;
-/// Parts of a smoothing window over which, to either side and twice, equations are averaged: two thirds of a window in all.
+/// Parts of a smoothing window over which, to either side and twice, equations are averaged: two thirds of a window in all, with which ranges of
+/// constants hold (`cargo bench --bench rates -- --part identify`).
 const AVERAGED: usize = 6;
 /// Residual over the spread of a force that is taken at least.
 const LEAST: f64 = 1e-9;
@@ -54,56 +55,24 @@ pub(super) fn identify(
     let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
     // A coordinate that nothing drives is weighed as the others are.
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let mut sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
+    let sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
-    let mut search = Normal::default();
-    for _ in 0..ROUNDS {
-        states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
-        problem.cancellation.check()?;
-        let fitted = states.fit(problem, &mut x, Met::Forces);
-        problem.cancellation.check()?;
-        search = fitted.ok_or(IdentifyError::Singular)?;
-        let [raw, averages] = states.force_residuals(problem, &x);
-        let errors = errors(problem, &states, &x, &least);
-        let own: Vec<f64> = raw.iter().zip(&errors).map(|(r, error)| r / error).collect();
-        states.share = shares(&errors, n);
-        let far: Vec<f64> = (0..n).map(|i| FAR * usual(std::slice::from_ref(&own), n, i)).collect();
-        let spoilt = own.iter().enumerate().filter(|(at, z)| z.abs() > far[at % n]).map(|(at, _)| at);
-        spoilt.for_each(|at| states.share[at] = 0.0);
-        let averages = [averages];
-        let left: Vec<f64> = (0..n).map(|i| usual(&averages, n, i).max(least[i])).collect();
-        let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
-        sigma = left;
-        tracing::debug!(?sigma, "residuals of force");
-        search.converged &= settled;
-        if settled {
-            break;
-        }
-    }
-    states.weight = (0..count * n).map(|at| sigma[at % n].recip()).collect();
-    let normal = states.normal(problem, &x, Met::Forces);
-    problem.cancellation.check()?;
-    let mut normal = normal.ok_or(IdentifyError::Singular)?;
-    (normal.converged, normal.decrement, normal.held) = (search.converged, search.decrement, search.held);
-    let [raw, residuals] = states.force_residuals(problem, &x);
-    let errors = errors(problem, &states, &x, &least);
-    let of_coordinate = |values: &[f64], i: usize| values.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>();
-    // Of every equation, in units of its error.
-    let own: Vec<f64> = raw.iter().zip(&errors).map(|(r, error)| r / error).collect();
+    let normal = weighed(problem, (&mut states, &mut x), (sigma, &least))?;
+    let ForceResiduals { raw, averages, errors, scaled: single } = ForceResiduals::of(problem, &states, &x, &least);
     let usual_raw: Vec<f64> = (0..n).map(|i| usual(std::slice::from_ref(&raw), n, i).max(least[i])).collect();
     let of_copies = |states: &States| shares(&self::errors(problem, states, &x, &least), n);
     let copies =
         wider.and_then(|wider| bootstrap::copies(problem, [&sharper, &wider], (&states, &x, &usual_raw), &of_copies));
     let expected: Vec<Vec<f64>> = match &copies {
         Some(copies) => (0..n).map(|i| copies.squares(&states.places, (n, i))).collect(),
-        None => (0..n).map(|i| of_coordinate(&errors, i).iter().map(|error| error * error).collect()).collect(),
+        None => (0..n).map(|i| column(&errors, (n, i)).iter().map(|error| error * error).collect()).collect(),
     };
     let over = |residuals: &[f64], i: usize| {
         let of = |(r, square): (&f64, &f64)| if *square > 0.0 { r / square.sqrt().max(least[i]) } else { f64::NAN };
         residuals.iter().zip(&expected[i]).map(of).collect::<Vec<f64>>()
     };
     // Averages over the errors of their samples, by coordinate.
-    let scaled: Vec<Vec<f64>> = (0..n).map(|i| over(&of_coordinate(&residuals, i), i)).collect();
+    let scaled: Vec<Vec<f64>> = (0..n).map(|i| over(&column(&averages, (n, i)), i)).collect();
     let size = |i: usize| {
         let far = FAR * usual(std::slice::from_ref(&scaled[i]), 1, 0);
         rms(scaled[i].iter().copied().filter(|z| z.abs() <= far))
@@ -116,13 +85,11 @@ pub(super) fn identify(
     };
     let probabilities: Vec<f64> = (0..n).map(|i| (n as f64 * probability(i)).min(1.0)).collect();
     let left = |i: usize| {
-        let noise = quantile(&mut of_coordinate(&errors, i), 0.5);
-        let own = of_coordinate(&own, i);
-        let autocorrelation = correlation(std::slice::from_ref(&own)).neighbours;
+        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
+        // Of single equations: averages of neighbours are alike.
+        let autocorrelation = correlation(&[column(&single, (n, i))]).neighbours;
         let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= CHANCE);
-        let kept = own.iter().zip(states.share.iter().skip(i).step_by(n)).filter(|(_, share)| **share > 0.0);
-        let rms = noise * rms(kept.map(|(z, _)| *z));
-        Residual { coordinate, rms, noise, spread: spread[i], autocorrelation, white }
+        Residual { coordinate, rms: sizes[i] * noise, noise, spread: spread[i], autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(left).collect();
     let whole = Segment { track: 0, first: 0, samples: count, start: Vec::new() };
@@ -132,17 +99,11 @@ pub(super) fn identify(
         Outlier { track, sample, time, coordinate, size }
     };
     // States of all trajectories in a row.
-    let (outliers, outlier_count) = outliers((&[whole], &[own]), n, far);
-    // Averages are what is judged.
-    let averaged = by_coordinate.iter().enumerate().map(|(i, residual)| {
-        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
-        Residual { noise, rms: sizes[i] * noise, ..residual.clone() }
-    });
-    let averaged: Vec<Residual> = averaged.collect();
+    let (outliers, outlier_count) = outliers((&[whole], &[single]), n, far);
     let verdict = Evidence {
         converged: normal.converged,
-        residuals: &averaged,
-        sizes: averaged.iter().map(|r| r.rms).collect(),
+        residuals: &by_coordinate,
+        sizes: by_coordinate.iter().map(|r| r.rms).collect(),
         exact: least.clone(),
         probabilities,
         outliers: outlier_count as f64 / (count * n) as f64,
@@ -150,7 +111,7 @@ pub(super) fn identify(
         continuation: (1.0, 0.0),
     }
     .verdict();
-    let over_noise = rms(sizes.iter().copied());
+    let over_noise = over_noise(&by_coordinate);
     let (normal, inflation) = match &copies {
         Some(copies) => {
             let root = Root::of(x.len(), &normal.matrix);
@@ -180,6 +141,65 @@ pub(super) fn identify(
         samples: count,
         ..unknowns(instance, problem, &fitted, (&start, 1.0), (Met::Forces, &normal_at))
     })
+}
+
+/// Fits the constants, coordinates weighed by the sizes of their averages, until these stay the same; the normal equations there.
+fn weighed(
+    problem: &Problem<'_>,
+    (states, x): (&mut States, &mut Vec<f64>),
+    (mut sigma, least): (Vec<f64>, &[f64]),
+) -> Result<Normal, IdentifyError> {
+    let n = sigma.len();
+    let weights = |states: &States, sigma: &[f64]| (0..states.q.len()).map(|at| sigma[at % n].recip()).collect();
+    let mut search = Normal::default();
+    for _ in 0..ROUNDS {
+        states.weight = weights(states, &sigma);
+        problem.cancellation.check()?;
+        let fitted = states.fit(problem, x, Met::Forces);
+        problem.cancellation.check()?;
+        search = fitted.ok_or(IdentifyError::Singular)?;
+        let ForceResiduals { averages, errors, scaled, .. } = ForceResiduals::of(problem, states, x, least);
+        states.share = shares(&errors, n);
+        let [averages, scaled] = [[averages], [scaled]];
+        let far: Vec<f64> = (0..n).map(|i| FAR * usual(&scaled, n, i)).collect();
+        let stands_out = scaled[0].iter().enumerate().filter(|(at, z)| z.abs() > far[at % n]);
+        stands_out.for_each(|(at, _)| states.share[at] = 0.0);
+        let left: Vec<f64> = (0..n).map(|i| usual(&averages, n, i).max(least[i])).collect();
+        let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
+        sigma = left;
+        tracing::debug!(?sigma, "residuals of force");
+        search.converged &= settled;
+        if settled {
+            break;
+        }
+    }
+    states.weight = weights(states, &sigma);
+    let normal = states.normal(problem, x, Met::Forces);
+    problem.cancellation.check()?;
+    let normal = normal.ok_or(IdentifyError::Singular)?;
+    Ok(Normal { converged: search.converged, decrement: search.decrement, held: search.held, ..normal })
+}
+
+/// Residuals of the equations of force, `(states, n)`: of single ones, of averages, and the single ones in units of their errors.
+struct ForceResiduals {
+    raw: Vec<f64>,
+    averages: Vec<f64>,
+    errors: Vec<f64>,
+    scaled: Vec<f64>,
+}
+
+impl ForceResiduals {
+    fn of(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Self {
+        let [raw, averages] = states.force_residuals(problem, x);
+        let errors = errors(problem, states, x, least);
+        let scaled = raw.iter().zip(&errors).map(|(r, error)| r / error).collect();
+        Self { raw, averages, errors, scaled }
+    }
+}
+
+/// Column `i` of `(states, n)`.
+fn column(values: &[f64], (n, i): (usize, usize)) -> Vec<f64> {
+    values.iter().skip(i).step_by(n).copied().collect()
 }
 
 /// Samples over which residuals are added up to see slow ones.
@@ -212,8 +232,7 @@ fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -
 
 /// Weights of equations by their errors: those of the usual error or a smaller one have 1.
 fn shares(errors: &[f64], n: usize) -> Vec<f64> {
-    let usual: Vec<f64> =
-        (0..n).map(|i| quantile(&mut errors.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>(), 0.5)).collect();
+    let usual: Vec<f64> = (0..n).map(|i| quantile(&mut column(errors, (n, i)), 0.5)).collect();
     errors.iter().enumerate().map(|(at, error)| (usual[at % n] / error).powi(2).min(1.0)).collect()
 }
 

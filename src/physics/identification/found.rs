@@ -87,7 +87,7 @@ pub struct Bodies {
     pub exist: bool,
 }
 
-/// What is left of the motion of one coordinate, or of the force on it.
+/// What is left of the motion of one coordinate, or of the force on it: of forces what is left of the averages of neighbouring equations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residual {
     /// The coordinate.

@@ -432,7 +432,7 @@ fn a_verdict_says_why() {
 }
 
 #[test]
-fn a_slow_term_is_missed_where_segments_do_not_continue_each_other() {
+fn a_slow_term_that_is_missing_shows_where_segments_meet() {
     let swing = |damped: bool| {
         let text = format!(
             r#"{{"name": "swing", "lagrangian": "a_dot^2/2 + w*cos(a)", "dissipation": "{}",

@@ -8,8 +8,8 @@ use std::fmt::{Display, Formatter, Result};
 ///
 /// A form explains a recording if all of this holds; the first that does not is named:
 /// the search has converged; residuals are below half of the motion; they are as large as the noise; at most one sample in a hundred lies far
-/// from the motion; residuals do not follow from the earlier ones; all parts of the recording ask for the same constants, and each goes on where
-/// the one before ends.
+/// from the motion; residuals do not follow from the earlier ones; segments of the motion agree about the constants, and every second one can start
+/// where the one before it ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -108,7 +108,8 @@ impl Display for Verdict {
             ),
             Self::Discontinuous { probability, seconds } => write!(
                 f,
-                "motion is followed over {} s each, but not on from there (probability by chance {}): a slow term is missing.",
+                "motion is followed over {} s each, but not on from there (probability by chance {}): \
+                 a slow term is missing, or the noise itself is slow.",
                 rounded(*seconds, 2),
                 rounded(*probability, 2)
             ),
