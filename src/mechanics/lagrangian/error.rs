@@ -2,7 +2,7 @@
 
 use super::{Request, Terms};
 use crate::linalg::{Failure, Workspace};
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, vectorized};
 
 /// Why terms could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -191,6 +191,21 @@ fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, fou
 /// `true` if every number is finite; no branch before the end.
 #[inline(always)]
 fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    if numbers.len() < WIDE {
+        finite(numbers)
+    } else {
+        vectorized(
+            #[inline(always)]
+            || finite(numbers),
+        )
+    }
+}
+
+/// From so many numbers on the widest vectors are worth a call.
+const WIDE: usize = 64;
+
+#[inline(always)]
+fn finite<S: Scalar>(numbers: &[S]) -> bool {
     let mut all = true;
     for x in numbers {
         all &= x.is_finite();

@@ -1,26 +1,27 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
 use super::derivatives::{StateTerms, evaluate};
+use super::programs::program_of_terms;
 use super::taylor::Taylor;
-use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
+use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Solved, Terms, metric_jets};
 use crate::linalg::Workspace;
 use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
-use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError, Tracer};
+use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError};
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Batches from this size on are replayed from a recorded program; a chunk of lanes is not worth it below.
-const REPLAY_FROM: usize = 24;
-/// More coordinates are left to the engine's sweeps, whose cost grows with `n` where second derivatives one by one grow with
-/// `n^2`.
-const REPLAY_COORDINATES: usize = 4;
-
+/// Up to so many coordinates few states are evaluated by forward numbers on the stack; a call of the interpreter is not worth it.
+const STACK_COORDINATES: usize = 2;
+/// Batches from this size on, a chunk of lanes, are replayed all the same.
+const REPLAY_FROM: usize = 8;
+/// More coordinates take curvature in their own numbers, not wider ones.
+const WIDE_COORDINATES: usize = 4;
 /// A Lagrangian and the values of its parameters.
 ///
-/// Of up to four coordinates few states are evaluated one at a time by forward numbers on the stack, and large batches replay a
-/// program recorded on first use, its lanes side by side; more coordinates take `n + 3` sweeps of a
-/// [`tape::Recorded`] function. All give the same numbers up to rounding. A Lagrangian that branches on its data cannot be
-/// recorded and is always evaluated state by state.
+/// Few states of up to two coordinates are evaluated by forward numbers on the stack. Everything else replays a program of
+/// the derivatives that is recorded on first use, without what is zero: a single state as it is, several side by side. Where
+/// that program would be too large, some hundreds of coupled coordinates, `n + 3` sweeps of a [`tape::Recorded`] function stand for it. All give
+/// the same numbers up to rounding. A Lagrangian that branches on its data cannot be recorded and is always evaluated state by state.
 #[derive(Debug)]
 pub struct Mechanics<L, S> {
     system: L,
@@ -93,6 +94,8 @@ struct Evaluator<S> {
     engine: OnceLock<Option<Arc<tape::Recorded<S>>>>,
     /// One program per combination of needed terms.
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
+    /// The program of the accelerations alone.
+    solved: OnceLock<Option<Solved<S>>>,
     /// Buffers not in use; as many as there were callers at a time.
     #[allow(clippy::vec_box)] // They go in and out at every call.
     pool: Mutex<Vec<Box<Scratch<S>>>>,
@@ -115,6 +118,7 @@ impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
             value: OnceLock::new(),
             engine: OnceLock::new(),
             programs: [const { OnceLock::new() }; 32],
+            solved: OnceLock::new(),
             pool: Mutex::new(Vec::new()),
         };
         Self { system, evaluator }
@@ -153,15 +157,16 @@ impl<S: Scalar> Evaluator<S> {
 
     /// The program that computes what is needed, recorded on first use.
     fn program(&self, form: &dyn Form<S>, need: Request) -> Option<Arc<Program<S>>> {
-        let (value, count) = (self.value(form)?, self.parameters.len());
-        let recorded = self.programs[need.index()].get_or_init(|| {
-            let n = Lagrangian::coordinates(value);
-            let record = Program::record(2 * n, count, |inputs, parameters| {
-                record(value, parameters, &inputs[..n], &inputs[n..], need)
-            });
-            record.ok().map(Arc::new)
-        });
+        let value = self.value(form)?;
+        let recorded = self.programs[need.index()].get_or_init(|| program_of_terms(&value.value, need).map(Arc::new));
         recorded.clone()
+    }
+
+    /// The program of the accelerations alone, recorded on first use.
+    fn solved(&self, form: &dyn Form<S>) -> Option<Solved<S>> {
+        self.require_parameters(form).ok()?;
+        let record = || Solved::record(&self.value(form)?.value, &self.parameters);
+        self.solved.get_or_init(record).clone()
     }
 
     /// Fills the needed fields of a batch by the engine's sweeps; whether that was possible.
@@ -249,10 +254,9 @@ impl<S: Scalar> Evaluator<S> {
         terms.dl_dq.resize(size(request.includes(Request::DL_DQ), n), S::nan());
         terms.mass_matrix.resize(size(request.includes(Request::MASS_MATRIX), n * n), S::nan());
         terms.coriolis.resize(size(request.includes(Request::CORIOLIS), n), S::nan());
-        let done = match (n > REPLAY_COORDINATES, batch >= REPLAY_FROM) {
-            (true, _) => self.sweep(form, (q, v), request, terms, scratch),
-            (false, large) => large && self.replay(form, (q, v), request, terms, scratch),
-        };
+        let done = (n > STACK_COORDINATES || batch >= REPLAY_FROM)
+            && (self.replay(form, (q, v), request, terms, scratch)
+                || self.sweep(form, (q, v), request, terms, scratch));
         if !done {
             form.states(&self.parameters, q, v, request, terms);
         }
@@ -275,43 +279,27 @@ impl<S: Scalar> Evaluator<S> {
     }
 }
 
-/// The needed terms of one state, one after the other.
-fn record<'t, S: Scalar>(
-    system: &RecordedValue<S>,
-    parameters: &[Tracer<'t, S>],
-    q: &[Tracer<'t, S>],
-    v: &[Tracer<'t, S>],
-    need: Request,
-) -> Vec<Tracer<'t, S>> {
-    let n = q.len();
-    let field = |needed: bool, width: usize| vec![Tracer::zero(); if needed { width } else { 0 }];
-    let mut fields = [
-        field(need.includes(Request::LAGRANGIAN), 1),
-        field(need.includes(Request::MOMENTUM), n),
-        field(need.includes(Request::DL_DQ), n),
-        field(need.includes(Request::MASS_MATRIX), n * n),
-        field(need.includes(Request::CORIOLIS), n),
-    ];
-    let [lagrangian, momentum, dl_dq, mass_matrix, coriolis] = &mut fields;
-    evaluate(system, parameters, q, v, need, &mut StateTerms { lagrangian, momentum, dl_dq, mass_matrix, coriolis });
-    fields.concat()
-}
-
 /// The code of an [`Evaluator`], which this crate compiles once for each scalar: a crate with a Lagrangian of its own compiles the code of
 /// that Lagrangian alone.
 #[derive(Clone, Copy, Debug)]
 struct Routines<S> {
     terms: TermsOf<S>,
+    solved: SolvedOf<S>,
     metric_jets: JetsOf<S, S>,
     wide_metric_jets: JetsOf<S, Dd>,
 }
 
 type TermsOf<S> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
+type SolvedOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Solved<S>>;
 type JetsOf<S, T> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<T>>, MechanicsError>;
 
 impl<S: Scalar> Routines<S> {
-    const ALL: Self =
-        Self { terms: Evaluator::terms, metric_jets: Evaluator::metric_jets, wide_metric_jets: Evaluator::metric_jets };
+    const ALL: Self = Self {
+        terms: Evaluator::terms,
+        solved: Evaluator::solved,
+        metric_jets: Evaluator::metric_jets,
+        wide_metric_jets: Evaluator::metric_jets,
+    };
 
     fn get() -> Self {
         *S::routines().downcast_ref().expect("every scalar holds its own routines")
@@ -346,13 +334,110 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
         (self.evaluator.routines.terms)(&self.evaluator, &self.system, q, v, request, terms)
     }
 
+    fn solved(&self) -> Option<Solved<S>> {
+        (self.evaluator.routines.solved)(&self.evaluator, &self.system)
+    }
+
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         (self.evaluator.routines.metric_jets)(&self.evaluator, &self.system, q, v)
     }
 
     fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
-        let worth = S::epsilon().to_f64() > Dd::epsilon().to_f64()
-            && Lagrangian::coordinates(&self.system) <= REPLAY_COORDINATES;
+        let worth =
+            S::epsilon().to_f64() > Dd::epsilon().to_f64() && Lagrangian::coordinates(&self.system) <= WIDE_COORDINATES;
         worth.then(|| (self.evaluator.routines.wide_metric_jets)(&self.evaluator, &self.system, q, v)).transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pendula in absolute angles, `n` of them, with a spring that a branch gives another stiffness and a damper-like product.
+    struct Chain(usize);
+
+    impl Lagrangian for Chain {
+        fn coordinates(&self) -> usize {
+            self.0
+        }
+        fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+            let (mut x, mut y, mut l) = (R::zero(), R::zero(), R::zero());
+            for i in 0..q.len() {
+                let (sin, cos) = q[i].sin_cos();
+                (x, y) = (x + v[i] * cos, y + v[i] * sin);
+                l += (x.sqr() + y * y) * R::half() + p[0] * cos / (R::two() + q[i].sqr()) - (v[i] / R::of(9.0)).powi(4);
+                l += q[i].select(q[i].sqr(), q[i].exp()) * v[0].atan2(R::of(3.0)) - (q[i] * v[i]).tanh().abs();
+            }
+            l
+        }
+    }
+
+    fn states(n: usize, batch: usize) -> (Vec<f64>, Vec<f64>) {
+        let number = |k: usize, by: f64| (by * k as f64 + 0.3).sin();
+        ((0..n * batch).map(|k| number(k, 0.37)).collect(), (0..n * batch).map(|k| 2.0 * number(k, 0.71)).collect())
+    }
+
+    #[test]
+    fn programs_sweeps_and_forward_numbers_agree() {
+        let close = |a: &[f64], b: &[f64]| {
+            assert_eq!(a.len(), b.len());
+            a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{a} {b}"));
+        };
+        for n in [1, 2, 3, 5, 9] {
+            let model = Mechanics::<_, f64>::new(Chain(n), [9.8]);
+            let (q, v) = states(n, 75);
+            let request =
+                Request::LAGRANGIAN | Request::MOMENTUM | Request::DL_DQ | Request::MASS_MATRIX | Request::CORIOLIS;
+            let (mut program, mut sweep, mut forward) = (Terms::default(), Terms::default(), Terms::default());
+            model.terms(&q, &v, request, &mut program).unwrap();
+            sweep.clone_from(&program);
+            forward.clone_from(&program);
+            let evaluator = &model.evaluator;
+            assert!(evaluator.program(&model.system, request).is_some());
+            assert!(evaluator.sweep(&model.system, (&q, &v), request, &mut sweep, &mut Scratch::default()));
+            model.system.states(&evaluator.parameters, &q, &v, request, &mut forward);
+            for other in [&sweep, &forward] {
+                close(&program.lagrangian, &other.lagrangian);
+                close(&program.momentum, &other.momentum);
+                close(&program.dl_dq, &other.dl_dq);
+                close(&program.mass_matrix, &other.mass_matrix);
+                close(&program.coriolis, &other.coriolis);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_asked_for_is_not_computed() {
+        let model = Mechanics::<_, f64>::new(Chain(6), [9.8]);
+        let operations = |need: Request| model.evaluator.program(&model.system, need).unwrap().lane_operations();
+        let all = operations(Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ);
+        assert!(operations(Request::MASS_MATRIX) < all && operations(Request::DL_DQ) < all);
+        assert!(operations(Request::LAGRANGIAN) < operations(Request::DL_DQ));
+    }
+
+    /// Masses of different sizes and springs to the neighbours.
+    struct Lattice;
+
+    impl Lagrangian for Lattice {
+        fn coordinates(&self) -> usize {
+            100
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let kinetic = v.iter().enumerate().fold(R::zero(), |l, (i, v)| l + v.sqr() * R::of(1.0 + i as f64));
+            q.windows(2).fold(kinetic, |l, q| l - (q[1] - q[0]).sqr().sqr())
+        }
+    }
+
+    #[test]
+    fn zeros_and_constants_take_no_operations() {
+        let model = Mechanics::<_, f64>::new(Lattice, []);
+        let program = model.evaluator.program(&model.system, Request::MASS_MATRIX | Request::CORIOLIS).unwrap();
+        // The mass matrix is diagonal and constant, and no term of L joins coordinates and velocities.
+        assert_eq!(program.lane_operations(), 0);
+        let (q, v) = states(100, 1);
+        let mass = model.mass_matrix(&q, &v).unwrap();
+        for (k, &m) in mass.iter().enumerate() {
+            assert_eq!(m, if k % 101 == 0 { 2.0 * (1.0 + (k / 101) as f64) } else { 0.0 });
+        }
     }
 }

@@ -3,6 +3,7 @@
 //! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
 //! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
 
+mod accelerations;
 mod configure;
 mod constrained_systems;
 mod constraints;
@@ -15,6 +16,7 @@ mod expression;
 #[cfg(feature = "rollout")]
 mod groups;
 mod mechanics;
+mod programs;
 #[doc(hidden)]
 pub mod system;
 #[doc(hidden)]
@@ -23,6 +25,9 @@ mod taylor;
 mod terms;
 mod wrappers;
 
+pub use accelerations::Accelerations;
+#[doc(hidden)]
+pub use accelerations::Solved;
 pub(crate) use configure::{LagrangianVisitor, resolve};
 pub use configure::{SystemError, SystemInstance, build, configure, systems};
 #[doc(hidden)]

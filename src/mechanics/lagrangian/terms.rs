@@ -1,5 +1,6 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
+use super::Solved;
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
 use super::error::MechanicsError;
@@ -252,6 +253,12 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.inner().is_none_or(|inner| inner.conserves_energy())
     }
 
+    /// The program of the accelerations alone, for [`Accelerations`](super::Accelerations); `None` of a model that has none.
+    #[doc(hidden)]
+    fn solved(&self) -> Option<Solved<S>> {
+        None
+    }
+
     /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {
         self.inner().is_some_and(|inner| inner.prefers_batches())
@@ -267,6 +274,10 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
         (**self).terms(q, v, request, terms)
     }
 
+    fn solved(&self) -> Option<Solved<S>> {
+        (**self).solved()
+    }
+
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         Some(&**self)
     }
@@ -279,6 +290,10 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         (**self).terms(q, v, request, terms)
+    }
+
+    fn solved(&self) -> Option<Solved<S>> {
+        (**self).solved()
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

@@ -267,7 +267,8 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             let found = &self.terms.momentum;
             let defect = Defect::of(n, &residual, |i| p[i].abs() + found[i].abs());
             // Before the verdict: a momentum that does not depend on the velocity agrees with any.
-            linalg::solve(n, &self.terms.mass_matrix, &residual, &mut change, &mut self.workspace).map_err(singular)?;
+            linalg::solve_symmetric(n, &self.terms.mass_matrix, &residual, &mut change, &mut self.workspace)
+                .map_err(singular)?;
             if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
                 return Ok(());
             }

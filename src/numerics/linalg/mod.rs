@@ -22,6 +22,7 @@ mod batch;
 mod compiled;
 mod components;
 mod condition;
+mod definite;
 mod eigen;
 mod elimination;
 mod inertia;
@@ -53,9 +54,10 @@ pub use signature::{
 pub(crate) use singular::singular;
 #[doc(hidden)]
 pub use singular::{MinimumNorm, minimum_norm};
+pub(crate) use solve::SMALL_PIVOT;
 #[doc(hidden)]
 pub use solve::inverse;
-pub use solve::solve;
+pub use solve::{solve, solve_symmetric};
 
 use serde::{Deserialize, Serialize};
 

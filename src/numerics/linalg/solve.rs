@@ -4,7 +4,7 @@ use super::batch::{Aligned, LANES, Lane, Retry, with_size};
 use super::{Failure, LinalgError, Workspace, condition, elimination, expect_length};
 use crate::scalar::{Real, Scalar, in_lanes};
 
-/// Solves `M_b x_b = r_b` for a batch of symmetric matrices, definite or not.
+/// Solves `M_b x_b = r_b` for a batch of square matrices.
 ///
 /// Gaussian elimination with partial pivoting, on lanes or, for large matrices of `f32` and `f64`, faer's; one step of
 /// iterative refinement where a pivot is small or elements grow. `matrices` is `(batch, n, n)`, `rhs` and `solution` are
@@ -21,11 +21,39 @@ pub fn solve<S: Scalar>(
     solution: &mut [S],
     workspace: &mut Workspace<S>,
 ) -> Result<(), LinalgError> {
-    let batch = rhs.len() / n.max(1);
-    expect_length("right-hand sides", batch * n, rhs.len())?;
-    expect_length("matrices", batch * n * n, matrices.len())?;
-    expect_length("solutions", batch * n, solution.len())?;
-    Systems { n, m: 1, matrices, right: Some(rhs) }.solve(solution, workspace);
+    Systems::of(n, matrices, rhs, solution)?.solve(solution, workspace);
+    workspace.outcome()
+}
+
+/// [`solve`](fn@super::solve) for symmetric matrices, such as mass matrices: of five rows and more each is first taken to be positive
+/// definite, `L D L^T` in half the work, and only where it is not safely so a pivot is searched for. Of the matrices the upper triangle counts.
+///
+/// # Errors
+/// As [`solve`](fn@super::solve).
+pub fn solve_symmetric<S: Scalar>(
+    n: usize,
+    matrices: &[S],
+    rhs: &[S],
+    solution: &mut [S],
+    workspace: &mut Workspace<S>,
+) -> Result<(), LinalgError> {
+    let systems = Systems::of(n, matrices, rhs, solution)?;
+    workspace.clear_failures();
+    match systems.solve_definite(solution, workspace) {
+        Some(refused) if refused.len() * n < solution.len() => {
+            for row in refused {
+                let one = Systems {
+                    matrices: &matrices[row * n * n..][..n * n],
+                    right: Some(&rhs[row * n..][..n]),
+                    ..systems
+                };
+                let before = workspace.failures().len();
+                one.solve_pivoted(&mut solution[row * n..][..n], workspace);
+                workspace.failures_mut()[before..].iter_mut().for_each(|(failed, _)| *failed = row);
+            }
+        }
+        _ => systems.solve_pivoted(solution, workspace),
+    }
     workspace.outcome()
 }
 
@@ -63,7 +91,7 @@ pub(super) struct Systems<'a, S> {
 }
 
 /// Below this ratio of smallest pivot to largest element a solution is refined.
-const SMALL_PIVOT: f64 = 1.0 / 1024.0;
+pub(crate) const SMALL_PIVOT: f64 = 1.0 / 1024.0;
 /// Above this ratio of the largest element of the triangular factor to that of the matrix as well.
 const GROWTH: f64 = 4.0;
 
@@ -72,10 +100,24 @@ pub(super) fn suspicious<S: Scalar>(n: usize) -> S {
     S::epsilon() * S::of_f64(1024.0 * (n * n) as f64)
 }
 
-impl<S: Scalar> Systems<'_, S> {
+impl<'a, S: Scalar> Systems<'a, S> {
+    /// Of one right-hand side each.
+    fn of(n: usize, matrices: &'a [S], rhs: &'a [S], solution: &[S]) -> Result<Self, LinalgError> {
+        let batch = rhs.len() / n.max(1);
+        expect_length("right-hand sides", batch * n, rhs.len())?;
+        expect_length("matrices", batch * n * n, matrices.len())?;
+        expect_length("solutions", batch * n, solution.len())?;
+        Ok(Self { n, m: 1, matrices, right: Some(rhs) })
+    }
+
     /// Solves all; `solutions` is `(batch, n, m)`, `NaN` in the rows that fail.
     pub fn solve(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
         workspace.clear_failures();
+        self.solve_pivoted(solutions, workspace);
+    }
+
+    /// The same, failures added to those that are known.
+    fn solve_pivoted(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
         if self.solve_large(solutions, workspace) {
             return;
         }
@@ -239,7 +281,7 @@ fn store<S: Scalar, const W: usize>(
 
 /// Writes the solutions of a block out; returns zero where all of a solution is finite, `NaN` otherwise.
 #[inline(always)]
-fn finish<S: Scalar, const W: usize>(
+pub(super) fn finish<S: Scalar, const W: usize>(
     (n, m): (usize, usize),
     system: &mut [Lane<S, W>],
     symmetric: bool,

@@ -1,7 +1,9 @@
 //! The tape: reverse mode, and recorded programs.
 //!
-//! Three ways to derivatives, all generic over the number:
+//! Ways to derivatives, all generic over the number:
 //!
+//! - [`Function`] records a function of several numbers once and gives its values, gradients, Hessians, dense or by their pattern, and
+//!   products of Hessians with vectors, of single points and of batches. It is the one to start with.
 //! - [`Tape`] records while it computes; one reverse sweep gives the gradient at those very numbers. The code under
 //!   it may branch on values. Elements are any [`Real`](crate::scalar::Real): a tape over forward numbers gives
 //!   Hessians.
@@ -16,7 +18,8 @@
 //! variable and one per operation on two variables; functions of one variable, constant factors and constant summands
 //! need none. The sweep holds `s` bytes per node besides, in [`Adjoints`]. A reset keeps the memory and costs nothing per
 //! node (the one after a recording that outgrew the room allocates room for it); the next sweep clears one adjoint per
-//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row and lane of one chunk of 64 states.
+//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row and
+//! lane of one chunk of 64 states, of 8 for large programs and of one for a single state.
 //!
 //! In all of them constants are never recorded and variables of two recordings never mix silently. On the [`Tape`] a zero
 //! adjoint times an infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`; a [`Recorded`]
@@ -41,6 +44,7 @@
 
 mod eager;
 mod engine;
+mod function;
 mod program;
 mod var;
 
@@ -49,8 +53,12 @@ pub use eager::{Adjoints, Tape, TapeSize};
 pub use engine::{Depth, Evaluation, Recorded};
 #[doc(hidden)]
 pub use engine::{MixedDirections, STATES};
+pub use function::Function;
+pub(crate) use function::{ROWS, TANGENTS};
+pub(crate) use program::Directions;
+pub use program::Tracer;
 #[doc(hidden)]
-pub use program::{Listing, Operation, Program, Replay, Tracer};
+pub use program::{Listing, Operation, Program, Replay};
 #[doc(hidden)]
 pub use var::Var;
 

@@ -32,7 +32,7 @@ pub fn accelerate<S: Scalar>(
         constrained(motion, force, (acceleration, multipliers), workspace, failures);
     } else if n == 1 {
         divide(motion.mass, force, acceleration, failures);
-    } else if linalg::solve(n, motion.mass, force, acceleration, workspace).is_err() {
+    } else if linalg::solve_symmetric(n, motion.mass, force, acceleration, workspace).is_err() {
         failures.extend(workspace.failures().iter().map(|&(row, failure)| MechanicsError::unsolved(row, failure)));
     }
 }

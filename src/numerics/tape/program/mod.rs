@@ -1,33 +1,35 @@
 //! Programs: recorded once, replayed over the lanes of a batch.
 //!
-//! A row is one expression for [`LANES`] states side by side; rows that depend on parameters and constants alone are
-//! uniform and computed once for the batch. The interpreter visits one operation at a time for one chunk of lanes, so
-//! its cost per operation is shared by the lanes and the loops are SIMD. The chunk does not depend on the number of
+//! A row is one expression for some states side by side; rows that depend on parameters and constants alone are
+//! uniform and computed once for the batch. The interpreter visits one run of like operations at a time for one chunk of lanes:
+//! [`LANES`] of a small program, fewer of a large one whose rows would leave the caches, one of a single state. Its cost
+//! per operation is shared by the lanes and by the run, and the loops are SIMD. The chunks do not depend on the number of
 //! threads: the same batch gives the same bytes.
 
 mod recorder;
 mod replay;
+mod run;
+mod second;
 mod tracer;
 
 pub(super) use recorder::{Graph, Node, Recorder};
 pub use replay::Replay;
+pub(crate) use second::Directions;
 pub use tracer::Tracer;
+
+use recorder::PARAMETER;
+use run::{Compiler, Run};
 
 use super::TapeError;
 use crate::scalar::Scalar;
 
-/// Lanes of a chunk.
+/// Lanes of a chunk, of programs whose rows then stay in the nearest caches.
 pub const LANES: usize = 64;
+/// Lanes of the chunks of larger programs, and of few states.
+pub(super) const FEW_LANES: usize = 8;
 
-/// One number for each lane of a chunk.
-pub(super) type Row<S> = [S; LANES];
-
-/// An operation and the first row it fills.
-#[derive(Clone, Debug)]
-pub(super) struct Instruction<S> {
-    pub(super) node: Node<S>,
-    pub(super) out: u32,
-}
+/// One number for each of `W` lanes.
+pub(super) type Row<S, const W: usize> = [S; W];
 
 /// A recorded function of lane inputs and parameters; see [`Program::record`].
 ///
@@ -35,13 +37,16 @@ pub(super) struct Instruction<S> {
 #[derive(Clone, Debug)]
 pub struct Program<S> {
     /// Rows below are uniform over the lanes.
-    pub(super) uniform_rows: usize,
-    pub(super) lane_rows: usize,
-    pub(super) uniform: Vec<Instruction<S>>,
-    pub(super) lanes: Vec<Instruction<S>>,
-    pub(super) outputs: Vec<u32>,
-    pub(super) inputs: usize,
-    pub(super) parameters: usize,
+    uniform_rows: usize,
+    lane_rows: usize,
+    uniform: Vec<Run>,
+    lanes: Vec<Run>,
+    /// Rows that the operations read, or what they name: an input, a parameter, a constant.
+    operands: Vec<u32>,
+    constants: Vec<S>,
+    outputs: Vec<u32>,
+    inputs: usize,
+    parameters: usize,
 }
 
 impl<S: Scalar> Program<S> {
@@ -57,67 +62,64 @@ impl<S: Scalar> Program<S> {
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Vec<Tracer<'t, S>>,
     {
-        let recorder = Recorder::new(false);
-        let outputs: Vec<u32> = {
-            let (x, p) = (recorder.inputs(0, inputs), recorder.parameters(parameters));
-            f(&x, &p).into_iter().map(|y| recorder.row_of(y)).collect()
-        };
-        let graph = recorder.finish()?;
-        Ok(Self::compile(&graph, &outputs, inputs, parameters))
+        Self::record_within(PARAMETER, (inputs, parameters), |x, p| Some(f(x, p)))
     }
 
-    /// Keeps what the outputs need and sorts it: constants, other uniform rows, lane rows.
-    fn compile(graph: &recorder::Graph<S>, outputs: &[u32], inputs: usize, parameters: usize) -> Self {
+    /// [`Program::record`], of at most `limit` rows; `None` of a function that gave up.
+    ///
+    /// # Errors
+    /// As of [`Program::record`]; [`TapeError::Full`].
+    pub(crate) fn record_within<F>(limit: u32, (inputs, parameters): (usize, usize), f: F) -> Result<Self, TapeError>
+    where
+        F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Option<Vec<Tracer<'t, S>>>,
+    {
+        let recorder = Recorder::within(limit, false);
+        let outputs: Vec<u32> = {
+            let (x, p) = (recorder.inputs(0, inputs), recorder.parameters(parameters));
+            let outputs = f(&x, &p).ok_or(TapeError::Full { limit })?;
+            outputs.into_iter().map(|y| recorder.row_of(y)).collect()
+        };
+        let graph = recorder.finish()?;
+        Ok(Self::compile(&graph, &outputs, (inputs, parameters)))
+    }
+
+    /// Keeps what the outputs need and sorts it: uniform rows, lane rows.
+    fn compile(graph: &Graph<S>, outputs: &[u32], (inputs, parameters): (usize, usize)) -> Self {
         let count = graph.nodes.len();
         let node_of = |row: u32| graph.node_of_row[row as usize] as usize;
         let mut needed = vec![false; count];
         for &row in outputs {
             needed[node_of(row)] = true;
         }
-        let mut uniform = vec![false; count];
         for index in (0..count).rev() {
             if needed[index] {
                 graph.nodes[index].operands(|row| needed[node_of(row)] = true);
             }
         }
+        let mut uniform = vec![false; count];
         for (index, node) in graph.nodes.iter().enumerate() {
             let mut all = !matches!(node, Node::Input(_));
             node.operands(|row| all &= uniform[node_of(row)]);
             uniform[index] = all;
         }
-        let mut place = vec![0u32; count];
-        let mut rows = 0u32;
-        let mut boundaries = [0usize; 3];
-        for (section, boundary) in boundaries.iter_mut().enumerate() {
-            for (index, node) in graph.nodes.iter().enumerate() {
-                let home = match node {
-                    Node::Constant(_) => 0,
-                    _ if uniform[index] => 1,
-                    _ => 2,
-                };
-                if needed[index] && home == section {
-                    place[index] = rows;
-                    rows += node.rows() as u32;
-                }
-            }
-            *boundary = rows as usize;
-        }
-        let [_, uniform_rows, all_rows] = boundaries;
-        let moved = |row: u32| place[node_of(row)] + (row - graph.first[node_of(row)]);
-        let mut program = Self {
+        let section =
+            |of: bool| (0..count).filter(|&index| needed[index] && uniform[index] == of).collect::<Vec<usize>>();
+        let mut compiler =
+            Compiler { graph, place: vec![0; count], rows: 0, operands: Vec::new(), constants: Vec::new() };
+        let uniform_runs = compiler.section(&section(true));
+        let uniform_rows = compiler.rows as usize;
+        let lanes = compiler.section(&section(false));
+        Self {
             uniform_rows,
-            lane_rows: all_rows - uniform_rows,
-            uniform: Vec::new(),
-            lanes: Vec::new(),
-            outputs: outputs.iter().map(|&row| moved(row)).collect(),
+            lane_rows: compiler.rows as usize - uniform_rows,
+            uniform: uniform_runs,
+            lanes,
+            outputs: outputs.iter().map(|&row| compiler.row(row)).collect(),
+            operands: compiler.operands,
+            constants: compiler.constants,
             inputs,
             parameters,
-        };
-        for (index, node) in graph.nodes.iter().enumerate().filter(|&(index, _)| needed[index]) {
-            let instruction = Instruction { node: node.renumbered(moved), out: place[index] };
-            if uniform[index] { &mut program.uniform } else { &mut program.lanes }.push(instruction);
         }
-        program
     }
 
     /// Number of lane inputs.
@@ -134,11 +136,11 @@ impl<S: Scalar> Program<S> {
     }
     /// Operations done for each lane, inputs included.
     pub fn lane_operations(&self) -> usize {
-        self.lanes.len()
+        self.lanes.iter().map(Run::count).sum()
     }
     /// Operations done once for the batch, constants and parameters included.
     pub fn uniform_operations(&self) -> usize {
-        self.uniform.len()
+        self.uniform.iter().map(Run::count).sum()
     }
 }
 

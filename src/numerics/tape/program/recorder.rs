@@ -60,22 +60,6 @@ impl<S> Node<S> {
             Self::Dense(dense) => dense.inputs.iter().copied().for_each(visit),
         }
     }
-    /// The same operation on renumbered rows.
-    pub(super) fn renumbered(&self, to: impl Fn(u32) -> u32) -> Self
-    where
-        S: Clone,
-    {
-        match self {
-            Self::Input(_) | Self::Parameter(_) | Self::Constant(_) => self.clone(),
-            Self::Unary(f, a) => Self::Unary(*f, to(*a)),
-            Self::SinCos(a) => Self::SinCos(to(*a)),
-            Self::Binary(f, a, b) => Self::Binary(*f, to(*a), to(*b)),
-            Self::Select(c, a, b) => Self::Select(to(*c), to(*a), to(*b)),
-            Self::Dense(dense) => {
-                Self::Dense(Dense { inputs: dense.inputs.iter().map(|&row| to(row)).collect(), ..dense.clone() })
-            }
-        }
-    }
 }
 
 /// Identity of an expression.
@@ -103,7 +87,7 @@ pub(in crate::numerics::tape) struct Graph<S> {
 }
 
 /// Bit of a row that names a parameter which is not recorded yet: most weights of a network are read by blocks alone.
-const PARAMETER: u32 = 1 << 31;
+pub(super) const PARAMETER: u32 = 1 << 31;
 
 /// Records a [`Program`](super::Program).
 #[derive(Debug)]
@@ -112,12 +96,18 @@ pub struct Recorder<S> {
     error: Cell<Option<TapeError>>,
     /// `true` if dense layers are recorded as blocks.
     blocks: bool,
+    /// Rows at most.
+    limit: u32,
 }
 
 impl<S: Scalar> Recorder<S> {
     pub(in crate::numerics::tape) fn new(blocks: bool) -> Self {
+        Self::within(PARAMETER, blocks)
+    }
+    /// Of so many rows at most.
+    pub(in crate::numerics::tape) fn within(limit: u32, blocks: bool) -> Self {
         let graph = Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: HashMap::new() };
-        Self { graph: RefCell::new(graph), error: Cell::new(None), blocks }
+        Self { graph: RefCell::new(graph), error: Cell::new(None), blocks, limit }
     }
     /// The numbers of lane inputs `first..first + count`.
     pub(in crate::numerics::tape) fn inputs(&self, first: usize, count: usize) -> Vec<Tracer<'_, S>> {
@@ -159,9 +149,9 @@ impl<S: Scalar> Recorder<S> {
             return row;
         }
         let (row, index) = (graph.node_of_row.len(), graph.nodes.len() as u32);
-        if row + node.rows() > PARAMETER as usize {
+        if row + node.rows() > self.limit as usize {
             drop(graph);
-            self.latch(TapeError::Full { limit: PARAMETER });
+            self.latch(TapeError::Full { limit: self.limit });
             return 0;
         }
         graph.node_of_row.resize(row + node.rows(), index);

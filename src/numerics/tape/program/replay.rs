@@ -1,22 +1,30 @@
 //! Replay of a program: over a batch, each operation on all lanes of a chunk, or for numbers of any kind, one at a time.
 
-use super::{Instruction, LANES, Node, Program, Row};
+use super::run::{Kind, Run};
+use super::{FEW_LANES, LANES, Program, Row};
 use crate::linalg::Buffer;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{
-    Column, Real, Scalar, copy_column, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes,
+    Column, Real, Scalar, copy_column, cos_lanes, exp_lanes, in_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes,
     tanh_lanes, vectorized,
 };
 use crate::tape::{TapeError, check_length};
 use std::sync::Arc;
+
+/// Bytes of the rows of a chunk at most, for [`LANES`] lanes: those of larger programs leave the second cache.
+const CHUNK: usize = 1 << 19;
+
+/// From so many functions of a single state on vectors are worth a call.
+const TOGETHER: usize = 4;
 
 /// Buffers for replaying a [`Program`]: the rows of one chunk of lanes, so that repeated replays allocate nothing. A clone starts
 /// afresh.
 #[derive(Debug)]
 pub struct Replay<S> {
     program: Arc<Program<S>>,
-    uniform: Buffer<S>,
-    values: Buffer<S>,
+    rows: Buffer<S>,
+    /// Lanes and parameters for which the uniform rows were computed last.
+    uniform: (usize, Vec<S>),
 }
 
 impl<S: Scalar> Clone for Replay<S> {
@@ -28,7 +36,7 @@ impl<S: Scalar> Clone for Replay<S> {
 impl<S: Scalar> Replay<S> {
     /// Buffers for a program.
     pub fn new(program: Arc<Program<S>>) -> Self {
-        Self { uniform: Buffer::default(), values: Buffer::default(), program }
+        Self { rows: Buffer::default(), uniform: (0, Vec::new()), program }
     }
 
     /// Computes the outputs of all lanes from their inputs and the parameters.
@@ -45,7 +53,7 @@ impl<S: Scalar> Replay<S> {
         parameters: &[S],
         outputs: &mut [&mut [S]],
     ) -> Result<(), TapeError> {
-        let Self { program, uniform, values } = self;
+        let program = &*self.program;
         let columns = |length: usize| length / lanes.max(1);
         let width = inputs.iter().map(|field| columns(field.len())).sum();
         check_length("inputs of a state", program.inputs, width)?;
@@ -54,150 +62,268 @@ impl<S: Scalar> Replay<S> {
         check_length("outputs of a state", program.outputs.len(), width)?;
         check_length("outputs", lanes * width, outputs.iter().map(|field| field.len()).sum())?;
         check_length("parameters", program.parameters, parameters.len())?;
-        let values: &mut [Row<S>] = values.lanes(program.lane_rows);
-        let uniform: &mut [Row<S>] = uniform.lanes(program.uniform_rows);
-        let environment = Environment { uniform: &[], inputs: &[], lanes, start: 0, parameters };
-        forward(&program.uniform, &environment, uniform);
-        for start in (0..lanes).step_by(LANES) {
-            let environment = Environment { uniform, inputs, lanes, start, parameters };
-            forward(&program.lanes, &environment, values);
-            let mut next = program.outputs.iter().map(|&row| {
-                let row = row as usize;
-                if row < program.uniform_rows { &uniform[row] } else { &values[row - program.uniform_rows] }
-            });
+        let batch = Batch { inputs, lanes, parameters };
+        let rows = program.uniform_rows + program.lane_rows;
+        let many = if rows * LANES * size_of::<S>() <= CHUNK { lanes - lanes % LANES } else { 0 };
+        // The last states of a batch of whole chunks fill one more where few lanes would need as much time.
+        let many = if many > 0 && lanes - many > LANES / 2 { lanes } else { many };
+        self.chunks::<LANES>(0..many, &batch, outputs);
+        let few = if lanes - many == 1 { many } else { lanes };
+        self.chunks::<FEW_LANES>(many..few, &batch, outputs);
+        self.chunks::<1>(few..lanes, &batch, outputs);
+        Ok(())
+    }
+
+    /// Computes some states of a batch in chunks of `W`.
+    fn chunks<const W: usize>(
+        &mut self,
+        states: std::ops::Range<usize>,
+        batch: &Batch<'_, S>,
+        outputs: &mut [&mut [S]],
+    ) {
+        if states.is_empty() {
+            return;
+        }
+        let program = &*self.program;
+        let rows: &mut [Row<S, W>] = self.rows.lanes(program.uniform_rows + program.lane_rows);
+        if self.uniform.0 != W || self.uniform.1 != batch.parameters {
+            compute(program, &program.uniform, &Chunk { batch, start: states.start, end: states.end }, rows);
+            self.uniform.0 = W;
+            self.uniform.1.clear();
+            self.uniform.1.extend_from_slice(batch.parameters);
+        }
+        for start in states.clone().step_by(W) {
+            compute(program, &program.lanes, &Chunk { batch, start, end: states.end }, rows);
+            let mut next = 0;
             for field in outputs.iter_mut() {
-                let width = field.len() / lanes;
-                for (column, source) in next.by_ref().take(width).enumerate() {
-                    let to = Column::new(&mut field[start * width..], column, width);
-                    copy_column(LANES.min(lanes - start), to, Column::all(source));
+                let width = field.len() / batch.lanes;
+                let wanted = &program.outputs[next..next + width];
+                next += width;
+                let field = &mut field[start * width..];
+                if const { W == 1 } {
+                    for k in 0..width {
+                        field[k] = rows[wanted[k] as usize][0];
+                    }
+                    continue;
+                }
+                for (column, &row) in wanted.iter().enumerate() {
+                    let to = Column::new(&mut field[..], column, width);
+                    copy_column(W.min(states.end - start), to, Column::all(&rows[row as usize]));
                 }
             }
         }
-        Ok(())
     }
 }
 
-/// Data that an instruction may read besides the rows of its own section.
-struct Environment<'a, S> {
-    /// Uniform rows (empty while they themselves are computed).
-    pub(super) uniform: &'a [Row<S>],
-    /// Lane inputs: fields `(lanes, width)` side by side; lanes past the end repeat the last state.
-    pub(super) inputs: &'a [&'a [S]],
-    /// Number of lanes of the batch.
-    pub(super) lanes: usize,
-    /// First lane of the chunk.
-    pub(super) start: usize,
+/// What the states of a batch are made of.
+struct Batch<'a, S> {
+    /// Lane inputs: fields `(lanes, width)` side by side.
+    inputs: &'a [&'a [S]],
+    /// Number of lanes.
+    lanes: usize,
     /// Parameters.
-    pub(super) parameters: &'a [S],
+    parameters: &'a [S],
 }
 
-/// Computes the rows of `program` in order.
-fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Environment<'_, S>, rows: &mut [Row<S>]) {
-    let uniform = environment.uniform;
-    let base = uniform.len();
-    vectorized(
-        #[inline(always)]
-        || {
-            for instruction in program {
-                let (before, after) = rows.split_at_mut(instruction.out as usize - base);
-                let get = |row: u32| {
-                    let row = row as usize;
-                    if row < base { &uniform[row] } else { &before[row - base] }
-                };
-                let Some((out, rest)) = after.split_first_mut() else { continue };
-                match &instruction.node {
-                    Node::Input(index) => load(environment, *index as usize, out),
-                    Node::Parameter(index) => fill(environment.parameters[*index as usize], out),
-                    Node::Constant(value) => fill(*value, out),
-                    Node::Unary(f, a) => unary(*f, get(*a), out),
-                    Node::SinCos(a) => {
-                        if let Some(cos) = rest.first_mut() {
-                            sin_cos(get(*a), out, cos);
-                        }
-                    }
-                    Node::Binary(f, a, b) => binary(*f, get(*a), get(*b), out),
-                    Node::Select(c, a, b) => {
-                        let (c, a, b) = (get(*c), get(*a), get(*b));
-                        for l in 0..LANES {
-                            out[l] = c[l].select(a[l], b[l]);
-                        }
-                    }
-                    Node::Dense(_) => unreachable!("programs of rows are recorded without blocks"),
+/// Some of them: lanes past the end repeat the last state.
+struct Chunk<'a, S> {
+    batch: &'a Batch<'a, S>,
+    start: usize,
+    end: usize,
+}
+
+/// Computes the rows of some runs in order.
+fn compute<S: Scalar, const W: usize>(
+    program: &Program<S>,
+    runs: &[Run],
+    chunk: &Chunk<'_, S>,
+    rows: &mut [Row<S, W>],
+) {
+    // A single lane gains nothing from the widest vectors: one copy of the interpreter fewer.
+    if const { W == 1 } {
+        in_lanes::<1, _>(
+            #[inline(always)]
+            || perform_all(program, runs, chunk, rows),
+        );
+    } else {
+        vectorized(
+            #[inline(always)]
+            || perform_all(program, runs, chunk, rows),
+        );
+    }
+}
+
+#[inline(always)]
+fn perform_all<S: Scalar, const W: usize>(
+    program: &Program<S>,
+    runs: &[Run],
+    chunk: &Chunk<'_, S>,
+    rows: &mut [Row<S, W>],
+) {
+    for run in runs {
+        perform(program, run, chunk, rows);
+    }
+}
+
+#[inline(always)]
+fn perform<S: Scalar, const W: usize>(program: &Program<S>, run: &Run, chunk: &Chunk<'_, S>, rows: &mut [Row<S, W>]) {
+    let (out, operands) = (run.out as usize, &program.operands[run.operands.clone()]);
+    match run.kind {
+        Kind::Input => {
+            for k in 0..operands.len() {
+                load(chunk, operands[k] as usize, &mut rows[out + k]);
+            }
+        }
+        Kind::Parameter => {
+            for k in 0..operands.len() {
+                rows[out + k] = [chunk.batch.parameters[operands[k] as usize]; W];
+            }
+        }
+        Kind::Constant => {
+            for k in 0..operands.len() {
+                rows[out + k] = [program.constants[operands[k] as usize]; W];
+            }
+        }
+        Kind::Unary(Unary::Neg) => map(run, operands, rows, |x| -x),
+        Kind::Unary(Unary::Recip) => map(run, operands, rows, S::recip),
+        Kind::Unary(Unary::Sqrt) => map(run, operands, rows, S::sqrt),
+        Kind::Unary(Unary::Abs) => map(run, operands, rows, S::abs),
+        Kind::Unary(Unary::Powi(2)) => map(run, operands, rows, |x| x * x),
+        Kind::Unary(f) => functions(f, operands, out, rows),
+        Kind::SinCos => sines(operands, out, rows),
+        Kind::Binary(Binary::Add) => zip(run, operands, rows, |a, b| a + b),
+        Kind::Binary(Binary::Sub) => zip(run, operands, rows, |a, b| a - b),
+        Kind::Binary(Binary::Mul) => zip(run, operands, rows, |a, b| a * b),
+        Kind::Binary(Binary::Div) => zip(run, operands, rows, |a, b| a / b),
+        Kind::Binary(Binary::Max) => zip(run, operands, rows, |a, b| Binary::Max.value(a, b)),
+        Kind::Binary(Binary::Min) => zip(run, operands, rows, |a, b| Binary::Min.value(a, b)),
+        Kind::Binary(f) => functions_of_two(f, operands, out, rows),
+        Kind::Select => {
+            for k in 0..operands.len() / 3 {
+                let (before, y) = rows.split_at_mut(out + k);
+                let [c, a, b] = [0, 1, 2].map(|i| &before[operands[3 * k + i] as usize]);
+                for l in 0..W {
+                    y[0][l] = c[l].select(a[l], b[l]);
                 }
             }
-        },
-    );
+        }
+    }
 }
 
 /// One input of all lanes.
 #[inline(always)]
-fn load<S: Scalar>(environment: &Environment<'_, S>, mut index: usize, out: &mut Row<S>) {
-    let states = LANES.min(environment.lanes - environment.start);
-    for field in environment.inputs {
-        let width = field.len() / environment.lanes;
+fn load<S: Scalar, const W: usize>(chunk: &Chunk<'_, S>, mut index: usize, out: &mut Row<S, W>) {
+    let states = W.min(chunk.end - chunk.start);
+    for field in chunk.batch.inputs {
+        let width = field.len() / chunk.batch.lanes;
         if index >= width {
             index -= width;
             continue;
         }
-        let field = Column::new(&field[environment.start * width..], index, width);
+        let field = Column::new(&field[chunk.start * width..], index, width);
         copy_column(states, Column::all(&mut out[..]), field);
         break;
     }
     let last = out[states - 1];
-    for l in states..LANES {
+    for l in states..W {
         out[l] = last;
     }
 }
 
 #[inline(always)]
-fn fill<S: Scalar>(value: S, out: &mut Row<S>) {
-    for l in 0..LANES {
-        out[l] = value;
+fn map<S: Scalar, const W: usize>(run: &Run, operands: &[u32], rows: &mut [Row<S, W>], f: impl Fn(S) -> S) {
+    if run.chained {
+        for k in 0..operands.len() {
+            let (before, y) = rows.split_at_mut(run.out as usize + k);
+            let (x, y) = (&before[operands[k] as usize], &mut y[0]);
+            for l in 0..W {
+                y[l] = f(x[l]);
+            }
+        }
+        return;
     }
-}
-
-#[inline(always)]
-fn map<S: Scalar>(x: &Row<S>, out: &mut Row<S>, f: impl Fn(S) -> S) {
-    for l in 0..LANES {
-        out[l] = f(x[l]);
-    }
-}
-
-/// The cheap functions are compiled in place; the others are calls for a whole row.
-#[inline(always)]
-fn unary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
-    match f {
-        Unary::Neg => map(x, out, |x| -x),
-        Unary::Recip => map(x, out, S::recip),
-        Unary::Sqrt => map(x, out, S::sqrt),
-        Unary::Abs => map(x, out, S::abs),
-        Unary::Powi(2) => map(x, out, |x| x * x),
-        _ => value(f, x, out),
-    }
-}
-
-#[inline(always)]
-fn binary<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
-    #[inline(always)]
-    fn zip<S: Scalar>(a: &Row<S>, b: &Row<S>, out: &mut Row<S>, f: impl Fn(S, S) -> S) {
-        for l in 0..LANES {
-            out[l] = f(a[l], b[l]);
+    let (before, after) = rows.split_at_mut(run.out as usize);
+    let after = &mut after[..operands.len()];
+    for k in 0..operands.len() {
+        let (x, y) = (&before[operands[k] as usize], &mut after[k]);
+        for l in 0..W {
+            y[l] = f(x[l]);
         }
     }
-    match f {
-        Binary::Add => zip(a, b, out, |a, b| a + b),
-        Binary::Sub => zip(a, b, out, |a, b| a - b),
-        Binary::Mul => zip(a, b, out, |a, b| a * b),
-        Binary::Div => zip(a, b, out, |a, b| a / b),
-        Binary::Max => zip(a, b, out, |a, b| Binary::Max.value(a, b)),
-        Binary::Min => zip(a, b, out, |a, b| Binary::Min.value(a, b)),
-        Binary::Powf | Binary::Atan2 => value_of_two(f, a, b, out),
+}
+
+#[inline(always)]
+fn zip<S: Scalar, const W: usize>(run: &Run, operands: &[u32], rows: &mut [Row<S, W>], f: impl Fn(S, S) -> S) {
+    let pairs = operands.as_chunks::<2>().0;
+    if run.chained {
+        for k in 0..pairs.len() {
+            let (before, y) = rows.split_at_mut(run.out as usize + k);
+            let (a, b, y) = (&before[pairs[k][0] as usize], &before[pairs[k][1] as usize], &mut y[0]);
+            for l in 0..W {
+                y[l] = f(a[l], b[l]);
+            }
+        }
+        return;
     }
+    let (before, after) = rows.split_at_mut(run.out as usize);
+    let after = &mut after[..pairs.len()];
+    for k in 0..pairs.len() {
+        let (a, b, y) = (&before[pairs[k][0] as usize], &before[pairs[k][1] as usize], &mut after[k]);
+        for l in 0..W {
+            y[l] = f(a[l], b[l]);
+        }
+    }
+}
+
+/// A function that is a call for a whole row; of single states for a whole run.
+#[inline(never)]
+fn functions<S: Scalar, const W: usize>(f: Unary, operands: &[u32], out: usize, rows: &mut [Row<S, W>]) {
+    if const { W == 1 } && operands.len() >= TOGETHER {
+        let mut y = [<S as Real>::zero(); LANES];
+        for (chunk, operands) in operands.chunks(LANES).enumerate() {
+            let x = gathered(operands, rows);
+            value(f, &x[..operands.len()], &mut y[..operands.len()]);
+            let rows = &mut rows[out + chunk * LANES..][..operands.len()];
+            rows.iter_mut().zip(&y).for_each(|(row, &y)| *row = [y; W]);
+        }
+        return;
+    }
+    for (k, &x) in operands.iter().enumerate() {
+        let (before, y) = rows.split_at_mut(out + k);
+        value(f, &before[x as usize], &mut y[0]);
+    }
+}
+
+/// Sines and cosines.
+#[inline(never)]
+fn sines<S: Scalar, const W: usize>(operands: &[u32], out: usize, rows: &mut [Row<S, W>]) {
+    if const { W == 1 } && operands.len() >= TOGETHER {
+        let (mut sin, mut cos) = ([<S as Real>::zero(); LANES], [<S as Real>::zero(); LANES]);
+        for (chunk, operands) in operands.chunks(LANES).enumerate() {
+            let x = gathered(operands, rows);
+            sin_cos_lanes(&x[..operands.len()], &mut sin, &mut cos);
+            for (k, pair) in rows[out + 2 * chunk * LANES..][..2 * operands.len()].chunks_exact_mut(2).enumerate() {
+                (pair[0], pair[1]) = ([sin[k]; W], [cos[k]; W]);
+            }
+        }
+        return;
+    }
+    for (k, &x) in operands.iter().enumerate() {
+        let (before, after) = rows.split_at_mut(out + 2 * k);
+        let (sin, cos) = after.split_at_mut(1);
+        sin_cos_lanes(&before[x as usize], &mut sin[0], &mut cos[0]);
+    }
+}
+
+/// The first lanes of the operands of a part of a run.
+fn gathered<S: Scalar, const W: usize>(operands: &[u32], rows: &[Row<S, W>]) -> [S; LANES] {
+    let mut x = [<S as Real>::zero(); LANES];
+    x.iter_mut().zip(operands).for_each(|(x, &row)| *x = rows[row as usize][0]);
+    x
 }
 
 /// `out = f(x)`.
-#[inline(never)]
-pub(super) fn value<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
+fn value<S: Scalar>(f: Unary, x: &[S], out: &mut [S]) {
     match f {
         Unary::Exp => exp_lanes(x, out),
         Unary::Ln => ln_lanes(x, out),
@@ -205,20 +331,27 @@ pub(super) fn value<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
         Unary::Sin => sin_lanes(x, out),
         Unary::Cos => cos_lanes(x, out),
         Unary::Tanh => tanh_lanes(x, out),
-        _ => (0..LANES).for_each(|l| out[l] = f.value(x[l])),
+        _ => out.iter_mut().zip(x).for_each(|(out, &x)| *out = f.value(x)),
     }
 }
 
-/// Sine and cosine.
+/// A function of two numbers that is a call.
 #[inline(never)]
-pub(super) fn sin_cos<S: Scalar>(x: &Row<S>, sin: &mut Row<S>, cos: &mut Row<S>) {
-    sin_cos_lanes(x, sin, cos);
+fn functions_of_two<S: Scalar, const W: usize>(f: Binary, operands: &[u32], out: usize, rows: &mut [Row<S, W>]) {
+    for (k, pair) in operands.chunks_exact(2).enumerate() {
+        let (before, y) = rows.split_at_mut(out + k);
+        let (a, b) = (&before[pair[0] as usize], &before[pair[1] as usize]);
+        (0..W).for_each(|l| y[0][l] = f.value(a[l], b[l]));
+    }
 }
 
-/// `out = f(a, b)`.
-#[inline(never)]
-fn value_of_two<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
-    (0..LANES).for_each(|l| out[l] = f.value(a[l], b[l]));
+/// An operation of a program on numbers of any kind.
+pub(super) struct Step<'a> {
+    pub kind: Kind,
+    /// First row that it fills.
+    pub out: usize,
+    /// Rows that it reads, or what it names.
+    pub operands: &'a [u32],
 }
 
 impl<S: Scalar> Program<S> {
@@ -231,24 +364,39 @@ impl<S: Scalar> Program<S> {
         check_length("inputs", self.inputs, inputs.len())?;
         check_length("parameters", self.parameters, parameters.len())?;
         let mut rows = vec![R::zero(); self.uniform_rows + self.lane_rows];
-        for Instruction { node, out } in self.uniform.iter().chain(&self.lanes) {
-            let out = *out as usize;
-            let row = |a: u32| rows[a as usize];
-            rows[out] = match *node {
-                Node::Input(index) => inputs[index as usize],
-                Node::Parameter(index) => parameters[index as usize],
-                Node::Constant(value) => R::constant(value.cast()),
-                Node::Unary(f, a) => f.evaluate(row(a)),
-                Node::Binary(f, a, b) => f.evaluate(row(a), row(b)),
-                Node::Select(c, a, b) => row(c).select(row(a), row(b)),
-                Node::SinCos(a) => {
-                    let (sin, cos) = row(a).sin_cos();
-                    rows[out + 1] = cos;
-                    sin
-                }
-                Node::Dense(_) => unreachable!("programs of rows are recorded without blocks"),
-            };
+        for step in self.steps() {
+            self.interpret_step(&step, inputs, parameters, &mut rows);
         }
         Ok(self.outputs.iter().map(|&row| rows[row as usize]).collect())
+    }
+
+    /// The operations one by one.
+    pub(super) fn steps(&self) -> impl DoubleEndedIterator<Item = Step<'_>> {
+        self.uniform.iter().chain(&self.lanes).flat_map(|run| {
+            let operands = self.operands[run.operands.clone()].chunks_exact(run.kind.arity());
+            operands.enumerate().map(|(k, operands)| {
+                let out = run.out as usize + k * run.kind.rows();
+                Step { kind: run.kind, out, operands }
+            })
+        })
+    }
+
+    /// Fills the rows of one operation.
+    pub(super) fn interpret_step<R: Real>(&self, step: &Step<'_>, inputs: &[R], parameters: &[R], rows: &mut [R]) {
+        let first = step.operands[0] as usize;
+        let row = |k: usize| rows[step.operands[k] as usize];
+        rows[step.out] = match step.kind {
+            Kind::Input => inputs[first],
+            Kind::Parameter => parameters[first],
+            Kind::Constant => R::constant(self.constants[first].cast()),
+            Kind::Unary(f) => f.evaluate(row(0)),
+            Kind::Binary(f) => f.evaluate(row(0), row(1)),
+            Kind::Select => row(0).select(row(1), row(2)),
+            Kind::SinCos => {
+                let (sin, cos) = row(0).sin_cos();
+                rows[step.out + 1] = cos;
+                sin
+            }
+        };
     }
 }

@@ -137,6 +137,26 @@ impl<S: Scalar> Div for Tracer<'_, S> {
 }
 assign_operators!([S: Scalar] Tracer<'_, S>);
 
+/// Operators between numbers and floats, on either side.
+macro_rules! float_operators {
+    ($float:ty: $($operator:ident $method:ident)*) => {$(
+        impl $operator<$float> for Tracer<'_, $float> {
+            type Output = Self;
+            fn $method(self, other: $float) -> Self {
+                $operator::$method(self, Self::constant(other))
+            }
+        }
+        impl<'t> $operator<Tracer<'t, $float>> for $float {
+            type Output = Tracer<'t, $float>;
+            fn $method(self, other: Tracer<'t, $float>) -> Tracer<'t, $float> {
+                $operator::$method(Tracer::constant(self), other)
+            }
+        }
+    )*};
+}
+float_operators!(f32: Add add Sub sub Mul mul Div div);
+float_operators!(f64: Add add Sub sub Mul mul Div div);
+
 /// Callback of `unary_methods`: one method of [`Real`] per row of the table; sine and cosine are overridden below.
 macro_rules! tracer_unary {
     ($($name:ident $method:ident)*) => {$(

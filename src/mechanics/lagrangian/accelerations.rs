@@ -1,0 +1,258 @@
+//! Accelerations of one state after the other: the system `M a = g - c` of a sparse mass matrix is solved within the program that computes it.
+
+use super::programs::derivatives;
+use super::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg::SMALL_PIVOT;
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Program, ROWS, Replay};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Products of an elimination that are always worth recording: it takes less time than the call of a solver.
+const SMALL: usize = 60;
+
+/// A program of accelerations, in which the elimination with the pattern of the mass matrix is recorded too.
+///
+/// Of a positive definite matrix no pivot has to be searched for. Whether it is one is seen at each state: by the pivots, which follow the
+/// accelerations among the outputs.
+#[doc(hidden)]
+#[derive(Clone, Debug)]
+pub struct Solved<S> {
+    program: Arc<Program<S>>,
+    parameters: Vec<S>,
+    /// Number of pairs of a pivot and the element of the diagonal that it was.
+    pivots: usize,
+}
+
+impl<S: Scalar> Solved<S> {
+    /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.
+    pub(super) fn record(value: &Program<S>, parameters: &[S]) -> Option<Self> {
+        let n = value.inputs() / 2;
+        let mut pivots = 0;
+        let program = Program::record_within(ROWS, (2 * n, value.parameters()), |x, p| {
+            let found = derivatives(value, x, p, Request::ACCELERATION)?;
+            let force = found.dl_dq.iter().zip(&found.coriolis).map(|(&g, &c)| g - c).collect();
+            let (mut outputs, guards) = eliminate(found.mass_matrix, force, SMALL.max(value.lane_operations()))?;
+            pivots = guards.len();
+            outputs.extend(guards.into_iter().flatten());
+            Some(outputs)
+        });
+        let program = Arc::new(program.ok()?);
+        Some(Self { program, parameters: parameters.to_vec(), pivots })
+    }
+}
+
+/// Solves with the lower triangle of a symmetric matrix in at most so many products: the solution, and every pivot behind the element of the
+/// diagonal that it was.
+fn eliminate<R: Real>(lower: Vec<Vec<(usize, R)>>, mut right: Vec<R>, most: usize) -> Option<(Vec<R>, Vec<[R; 2]>)> {
+    let n = lower.len();
+    let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
+    let diagonal: Vec<R> = lower.iter().enumerate().map(own).collect::<Option<_>>()?;
+    let mut pivots = diagonal.clone();
+    let mut rest: Vec<BTreeMap<usize, R>> = vec![BTreeMap::new(); n];
+    for (i, row) in lower.into_iter().enumerate() {
+        for (j, m) in row.into_iter().filter(|(j, _)| *j != i) {
+            rest[i].insert(j, m);
+            rest[j].insert(i, m);
+        }
+    }
+    let is_diagonal = rest.iter().all(BTreeMap::is_empty);
+    let (mut steps, mut products) = (Vec::with_capacity(n), 0);
+    let mut left: Vec<usize> = (0..n).collect();
+    while !left.is_empty() {
+        // The row that fills in the least.
+        let at = (0..left.len()).min_by_key(|&at| rest[left[at]].len())?;
+        let k = left.remove(at);
+        let row = std::mem::take(&mut rest[k]);
+        products += row.len() * (row.len() + 3) / 2;
+        if products > most {
+            return None;
+        }
+        let factors: Vec<(usize, R)> = row.iter().map(|(&i, &m)| (i, m / pivots[k])).collect();
+        let known = right[k];
+        for &(i, factor) in &factors {
+            rest[i].remove(&k);
+            right[i] -= factor * known;
+            pivots[i] -= factor * row[&i];
+            for (&j, &m) in row.range(..i) {
+                let term = factor * m;
+                let element = rest[i].get(&j).map_or(-term, |&element| element - term);
+                rest[i].insert(j, element);
+                rest[j].insert(i, element);
+            }
+        }
+        steps.push((k, factors));
+    }
+    let mut solution = right;
+    for (k, factors) in steps.into_iter().rev() {
+        solution[k] = factors.iter().fold(solution[k] / pivots[k], |x, &(i, factor)| x - factor * solution[i]);
+    }
+    // A diagonal matrix is solved whatever its signs.
+    let guards = diagonal.into_iter().zip(pivots).map(|(element, pivot)| [element, pivot]);
+    Some((solution, if is_diagonal { Vec::new() } else { guards.collect() }))
+}
+
+/// The accelerations of a model, state after state or in batches, with buffers of its own: what a solver calls.
+///
+/// Nothing but the accelerations is stored, and nothing is allocated after the first call. A mass matrix of which most elements are zero is
+/// eliminated along its pattern, one that is diagonal is divided by, and what is constant of it is known before.
+///
+/// ```
+/// use lnn::lagrangian::{Accelerations, Lagrangian, Mechanics, MechanicsError};
+/// use lnn::scalar::Real;
+///
+/// // A thousand unit masses in a line, with springs to their neighbours.
+/// struct Line;
+/// impl Lagrangian for Line {
+///     fn coordinates(&self) -> usize {
+///         1000
+///     }
+///     fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+///         let kinetic = v.iter().fold(R::zero(), |l, v| l + v.sqr() * R::half());
+///         q.windows(2).fold(kinetic, |l, q| l - (q[1] - q[0]).sqr() * R::half())
+///     }
+/// }
+/// let line = Mechanics::<_, f64>::new(Line, []);
+/// let mut accelerations = Accelerations::new(&line);
+/// let (mut q, mut a) = ([0.0; 1000], [0.0; 1000]);
+/// q[500] = 1.0;
+/// accelerations.at(&q, &[0.0; 1000], &mut a)?;
+/// assert_eq!(a[499..502], [1.0, -2.0, 1.0]);
+/// # Ok::<(), MechanicsError>(())
+/// ```
+pub struct Accelerations<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    solved: Option<(Solved<S>, Replay<S>)>,
+    pivots: Vec<S>,
+    terms: Terms<S>,
+}
+
+impl<'a, S: Scalar> Accelerations<'a, S> {
+    /// Buffers for a model.
+    pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
+        let solved = model.solved().map(|solved| {
+            let replay = Replay::new(Arc::clone(&solved.program));
+            (solved, replay)
+        });
+        Self { model, solved, pivots: Vec::new(), terms: Terms::default() }
+    }
+
+    /// The accelerations `a` of states `q`, `v`, all `(batch, n)` in physical units.
+    ///
+    /// # Errors
+    /// As of [`EulerLagrange::terms`]; another length of `a`.
+    pub fn at(&mut self, q: &[S], v: &[S], a: &mut [S]) -> Result<(), MechanicsError> {
+        if a.len() != q.len() {
+            return Err(MechanicsError::Shape { what: "accelerations", expected: q.len(), found: a.len() });
+        }
+        if self.is_solved(q, v, a) {
+            return Ok(());
+        }
+        // With a search for pivots, and a reason for every row that fails.
+        let outcome = self.model.terms(q, v, Request::ACCELERATION, &mut self.terms);
+        if self.terms.acceleration.len() == a.len() {
+            a.copy_from_slice(&self.terms.acceleration);
+        }
+        outcome
+    }
+
+    /// Fills the accelerations by the program; `false` if there is none, or a state needs a second look.
+    fn is_solved(&mut self, q: &[S], v: &[S], a: &mut [S]) -> bool {
+        let Some((solved, replay)) = &mut self.solved else { return false };
+        let batch = q.len() / self.model.coordinates().max(1);
+        self.pivots.resize(batch * 2 * solved.pivots, S::nan());
+        if replay.evaluate(batch, &[q, v], &solved.parameters, &mut [a, &mut self.pivots]).is_err() {
+            return false;
+        }
+        let (floor, zero) = (S::of_f64(SMALL_PIVOT), <S as Real>::zero());
+        let mut safe = true;
+        for pair in self.pivots.as_chunks::<2>().0 {
+            safe &= pair[1] > floor * pair[0] && pair[1] > zero;
+        }
+        let mut probe = zero;
+        for &a in a.iter() {
+            probe += a * zero;
+        }
+        safe && probe == zero
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{Lagrangian, Mechanics};
+
+    /// Masses in a line that also pull their neighbours' velocities: a tridiagonal mass matrix that depends on the place.
+    struct Line {
+        n: usize,
+        sign: f64,
+    }
+
+    impl Lagrangian for Line {
+        fn coordinates(&self) -> usize {
+            self.n
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let own = v.iter().zip(q).fold(R::zero(), |l, (v, q)| l + v.sqr() * (R::one() + q.sqr()));
+            let pairs = q.windows(2).zip(v.windows(2));
+            let joined =
+                pairs.fold(R::zero(), |l, (q, v)| l + v[0] * v[1] * q[0].cos() * R::half() - (q[0] * q[1]).cos());
+            R::of(self.sign) * own + joined
+        }
+    }
+
+    fn states(count: usize) -> (Vec<f64>, Vec<f64>) {
+        let number = |k: usize, by: f64| (by * k as f64 + 0.3).sin();
+        ((0..count).map(|k| number(k, 0.37)).collect(), (0..count).map(|k| number(k, 0.71)).collect())
+    }
+
+    #[test]
+    fn accelerations_are_those_of_the_terms() {
+        for (n, batch) in [(1, 3), (2, 5), (7, 1), (40, 70), (300, 2)] {
+            let model = Mechanics::<_, f64>::new(Line { n, sign: 1.0 }, []);
+            let (q, v) = states(n * batch);
+            let mut a = vec![0.0; n * batch];
+            let mut accelerations = Accelerations::new(&model);
+            assert!(accelerations.is_solved(&q, &v, &mut a), "{n}");
+            for (a, b) in a.iter().zip(model.acceleration(&q, &v).unwrap()) {
+                assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{n}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_positive_definite_gets_a_second_look() {
+        let model = Mechanics::<_, f64>::new(Line { n: 8, sign: -1.0 }, []);
+        let (q, v) = states(8);
+        let mut a = vec![0.0; 8];
+        let mut accelerations = Accelerations::new(&model);
+        assert!(!accelerations.is_solved(&q, &v, &mut a));
+        accelerations.at(&q, &v, &mut a).unwrap();
+        assert_eq!(a, model.acceleration(&q, &v).unwrap());
+        let singular = Mechanics::<_, f64>::new(Line { n: 8, sign: 0.0 }, []);
+        let error = Accelerations::new(&singular).at(&[0.0; 8], &[0.0; 8], &mut a);
+        assert_eq!(error.is_err(), singular.acceleration(&[0.0; 8], &[0.0; 8]).is_err());
+        assert!(matches!(accelerations.at(&q, &v, &mut a[1..]), Err(MechanicsError::Shape { .. })));
+        assert!(accelerations.at(&[f64::NAN; 8], &v, &mut a).is_err());
+    }
+
+    #[test]
+    fn a_dense_matrix_of_many_coordinates_is_left_to_a_solver() {
+        struct Full;
+        impl Lagrangian for Full {
+            fn coordinates(&self) -> usize {
+                30
+            }
+            fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+                let sum = v.iter().zip(q).fold(R::zero(), |sum, (&v, q)| sum + v * q.cos());
+                v.iter().fold(sum.sqr(), |l, v| l + v.sqr())
+            }
+        }
+        let model = Mechanics::<_, f64>::new(Full, []);
+        assert!(model.solved().is_none());
+        let (q, v) = states(30);
+        let mut a = vec![0.0; 30];
+        Accelerations::new(&model).at(&q, &v, &mut a).unwrap();
+        assert_eq!(a, model.acceleration(&q, &v).unwrap());
+    }
+}
