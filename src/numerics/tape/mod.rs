@@ -32,7 +32,7 @@
 //!
 //! // A bead on a rotating hoop, L = v^2/2 + w^2 sin^2 q / 2 + cos q, recorded once with w as parameter.
 //! let hoop = Recorded::new(vec![1.0], 1, |w, q, v| {
-//!     v[0].sqr() * Real::half() + (w[0] * q[0].sin()).sqr() * Real::half() + q[0].cos()
+//!     0.5 * v[0].sqr() + 0.5 * (w[0] * q[0].sin()).sqr() + q[0].cos()
 //! })?;
 //! let mut evaluation = Evaluation::new(Arc::new(hoop));
 //! evaluation.evaluate(&[2.0], &[0.5], &[1.0], Depth::Motion);

@@ -14,6 +14,9 @@ use std::sync::Arc;
 /// Bytes of the rows of a chunk at most, for [`LANES`] lanes: those of larger programs leave the second cache.
 const CHUNK: usize = 1 << 19;
 
+/// Fields up to this width are written column by column.
+const NARROW: usize = 16;
+
 /// From so many functions of a single state on vectors are worth a call.
 const TOGETHER: usize = 4;
 
@@ -106,10 +109,31 @@ impl<S: Scalar> Replay<S> {
                     }
                     continue;
                 }
+                let count = W.min(states.end - start);
+                if width > NARROW {
+                    write_rows(rows, wanted, &mut field[..count * width]);
+                    continue;
+                }
                 for (column, &row) in wanted.iter().enumerate() {
                     let to = Column::new(&mut field[..], column, width);
-                    copy_column(W.min(states.end - start), to, Column::all(&rows[row as usize]));
+                    copy_column(count, to, Column::all(&rows[row as usize]));
                 }
+            }
+        }
+    }
+}
+
+/// Writes rows of the program as columns of a wide field, few lanes at a time: each is read once, and what is written to a state stands side by
+/// side.
+#[inline(never)]
+fn write_rows<S: Scalar, const W: usize>(rows: &[Row<S, W>], wanted: &[u32], field: &mut [S]) {
+    let width = wanted.len();
+    for (group, states) in field.chunks_mut(FEW_LANES * width).enumerate() {
+        let count = states.len() / width;
+        for (column, &row) in wanted.iter().enumerate() {
+            let lanes = &rows[row as usize][group * FEW_LANES..][..count];
+            for l in 0..count {
+                states[l * width + column] = lanes[l];
             }
         }
     }
