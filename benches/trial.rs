@@ -4,6 +4,7 @@
 
 mod constraints;
 mod formula;
+mod hessians;
 mod identify;
 mod linalg;
 mod measured;
@@ -29,6 +30,7 @@ fn main() {
     linalg::linalg_benches();
     systems::systems_benches();
     tape::benches();
+    hessians::hessian_benches();
     network::benches();
     cost::run(true);
     peers::smoke().expect("every request is answered");

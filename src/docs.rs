@@ -23,6 +23,7 @@
 //! | [`results`] | accuracy on five systems, limits, time to accuracy, what made training exact, the tables of others |
 //! | [`paper`] | the paper's tables and ours, what they confirm, where a training needs the penalty, all experiments |
 //! | [`accuracy`] | errors of the numerics, run time against error |
+//! | [`hessians`] | second derivatives and accelerations of one state and of batches, few and many coordinates, beside CasADi |
 //! | [`performance`] | times of training steps, evaluations and small matrices, beside PyTorch and JAX |
 //! | [`architecture`] | flow of data, modules, how to add a system, an operation, an integrator |
 //! | [`building`] | test programs, fuzzing, benchmarks |
@@ -75,6 +76,7 @@ macro_rules! page {
             "[experiments]: crate::docs::paper#experiments\n",
             "[time-to-accuracy]: crate::docs::results#time-to-accuracy\n",
             "[accuracy]: crate::docs::accuracy\n",
+            "[hessians]: crate::docs::hessians\n",
             "[performance]: crate::docs::performance\n",
             "[small-matrices]: crate::docs::performance#small-symmetric-matrices\n",
             "[architecture]: crate::docs::architecture\n",
@@ -114,6 +116,7 @@ pages! {
     results "results.md";
     paper "paper.md";
     accuracy "accuracy.md";
+    hessians "hessians.md";
     performance "performance.md";
     architecture "architecture.md";
     building "building.md";

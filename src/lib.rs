@@ -28,7 +28,8 @@
 //! | look up a key of a configuration | the page [`docs::configuration`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
 //! | store and load models | [`network::ModelFile`] |
-//! | differentiate your own function | [`tape::gradient`], [`tape::hessian`] |
+//! | differentiate your own function | [`tape::Function`], recorded once; [`tape::gradient`], [`tape::hessian`] of one point |
+//! | call accelerations from your own solver, of few or many coordinates | [`lagrangian::Accelerations`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
