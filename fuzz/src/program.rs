@@ -9,7 +9,7 @@ use super::accuracy::cast;
 use super::bytes::{Bytes, Random};
 use lnn::forward::HyperDual;
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::tape::{Program, Replay, ScalarFunction, gradient};
+use lnn::tape::{Function, Program, Replay, ScalarFunction, gradient};
 use std::sync::Arc;
 
 /// Variables of the expression: the first two are lane inputs, the others parameters.
@@ -162,6 +162,18 @@ fn replayed<S: Scalar>(f: &Expression, x: &[S], u: &[S], lanes: usize) -> Answer
     answer
 }
 
+/// By a recorded function, all variables alike.
+fn recorded<S: Scalar>(f: &Expression, x: &[S], u: &[S]) -> Answer<S> {
+    let function = Function::record(VARIABLES, |z| f.eval(z, |x| x));
+    let mut function = function.expect("an expression without branches can be recorded");
+    let mut answer = [<S as Real>::zero(); 1 + 2 * VARIABLES];
+    let (first, products) = answer.split_at_mut(1 + VARIABLES);
+    let (value, gradient) = first.split_at_mut(1);
+    function.gradients(x, value, gradient).expect("shapes fit");
+    function.hessian_vectors(x, u, products).expect("shapes fit");
+    answer
+}
+
 /// The judge's answer with its condition, or `None` where numbers come near the ends of the range or where roundings
 /// move an answer by more than can be told.
 fn judged(f: &Expression, x: &[f64], u: &[f64]) -> Option<(Answer<Dd>, [f64; 1 + 2 * VARIABLES])> {
@@ -236,6 +248,7 @@ pub fn run(bytes: &[u8]) {
     let Some(judged) = judged(&f, &x, &u) else { return };
     agrees("nested", &f, &nested(&f, &x, &u, |y| y), &judged);
     agrees("replayed", &f, &alone, &judged);
+    agrees("recorded", &f, &recorded(&f, &x, &u), &judged);
     let (value, slopes) = gradient(&f, &x).expect("one tape");
     agrees("tape", &f, &[&[value], &slopes[..]].concat(), &judged);
     agrees("replayed", &f, &replayed(&f, &cast::<_, Dd>(&x), &cast(&u), 1), &judged);

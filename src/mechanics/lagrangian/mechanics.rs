@@ -16,6 +16,7 @@ const STACK_COORDINATES: usize = 2;
 const REPLAY_FROM: usize = 8;
 /// More coordinates take curvature in their own numbers, not wider ones.
 const WIDE_COORDINATES: usize = 4;
+
 /// A Lagrangian and the values of its parameters.
 ///
 /// Few states of up to two coordinates are evaluated by forward numbers on the stack. Everything else replays a program of
@@ -219,9 +220,8 @@ impl<S: Scalar> Evaluator<S> {
             replays.len() - 1
         });
         // The order of the recording; what is not needed is empty.
-        let Terms { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = terms;
-        let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, coriolis];
-        replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, outputs).is_ok()
+        let mut outputs = terms.derivatives_mut().map(Vec::as_mut_slice);
+        replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, &mut outputs).is_ok()
     }
 
     fn compute(
@@ -247,20 +247,36 @@ impl<S: Scalar> Evaluator<S> {
             field.clear();
         }
         terms.clear_constraints();
-        // Whatever is needed is overwritten below.
-        let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
-        terms.lagrangian.resize(size(request.includes(Request::LAGRANGIAN), 1), S::nan());
-        terms.momentum.resize(size(request.includes(Request::MOMENTUM), n), S::nan());
-        terms.dl_dq.resize(size(request.includes(Request::DL_DQ), n), S::nan());
-        terms.mass_matrix.resize(size(request.includes(Request::MASS_MATRIX), n * n), S::nan());
-        terms.coriolis.resize(size(request.includes(Request::CORIOLIS), n), S::nan());
+        terms.make_room(n, batch, request);
         let done = (n > STACK_COORDINATES || batch >= REPLAY_FROM)
             && (self.replay(form, (q, v), request, terms, scratch)
                 || self.sweep(form, (q, v), request, terms, scratch));
         if !done {
             form.states(&self.parameters, q, v, request, terms);
         }
+        let outcome = terms.complete(n, v, request, &mut scratch.workspace);
+        if !done || !matches!(outcome, Err(MechanicsError::NotFinite { .. })) {
+            return outcome;
+        }
+        self.refine(form, (q, v), request, terms);
         terms.complete(n, v, request, &mut scratch.workspace)
+    }
+
+    /// Evaluates the rows that are not finite once more, by forward numbers: those know that an infinite derivative along a direction in
+    /// which nothing changes is none.
+    #[cold]
+    fn refine(&self, form: &dyn Form<S>, (q, v): (&[S], &[S]), request: Request, terms: &mut Terms<S>) {
+        let n = form.coordinates();
+        let failed = terms.failures.iter().filter(|failure| matches!(failure, MechanicsError::NotFinite { .. }));
+        let rows: Vec<usize> = failed.filter_map(MechanicsError::row).collect();
+        let mut one = Terms::default();
+        one.make_room(n, 1, request);
+        for row in rows {
+            form.states(&self.parameters, &q[row * n..][..n], &v[row * n..][..n], request, &mut one);
+            for (all, one) in terms.derivatives_mut().into_iter().zip(one.derivatives_mut()) {
+                all.iter_mut().skip(row * one.len()).zip(one).for_each(|(to, from)| *to = *from);
+            }
+        }
     }
 
     fn terms(
@@ -276,6 +292,28 @@ impl<S: Scalar> Evaluator<S> {
         let outcome = self.compute(form, q, v, request, terms, &mut scratch);
         pooled().push(scratch);
         outcome
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// The fields that derivatives of `L` fill, in the order of the programs.
+    fn derivatives_mut(&mut self) -> [&mut Vec<S>; 5] {
+        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = self;
+        [lagrangian, momentum, dl_dq, mass_matrix, coriolis]
+    }
+
+    /// Gives those that are asked for their sizes, to be overwritten.
+    fn make_room(&mut self, n: usize, batch: usize, request: Request) {
+        let needs = [
+            (Request::LAGRANGIAN, 1),
+            (Request::MOMENTUM, n),
+            (Request::DL_DQ, n),
+            (Request::MASS_MATRIX, n * n),
+            (Request::CORIOLIS, n),
+        ];
+        for (field, (need, width)) in self.derivatives_mut().into_iter().zip(needs) {
+            field.resize(if request.includes(need) { batch * width } else { 0 }, S::nan());
+        }
     }
 }
 
@@ -413,6 +451,54 @@ mod tests {
         let all = operations(Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ);
         assert!(operations(Request::MASS_MATRIX) < all && operations(Request::DL_DQ) < all);
         assert!(operations(Request::LAGRANGIAN) < operations(Request::DL_DQ));
+    }
+
+    /// A second derivative by the velocities that is infinite where nothing depends on them.
+    struct Sliding;
+
+    impl Lagrangian for Sliding {
+        fn coordinates(&self) -> usize {
+            3
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let kinetic = v.iter().fold(R::zero(), |l, v| l + v.sqr());
+            kinetic - (q[0] + v[0]).max(R::zero()).powf(R::of(1.5)) - q[1]
+        }
+    }
+
+    #[test]
+    fn infinite_derivatives_that_nothing_needs_are_none() {
+        let model = Mechanics::<_, f64>::new(Sliding, []);
+        let a = model.acceleration(&[-1.0, 0.0, 0.0], &[0.5, 0.0, 0.0]);
+        assert_eq!(a, Ok(vec![0.0, -0.5, 0.0]));
+    }
+
+    /// Pendula in absolute angles by running sums, the chain of `benches/hessians.rs`.
+    struct Plain(usize);
+
+    impl Lagrangian for Plain {
+        fn coordinates(&self) -> usize {
+            self.0
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let (mut x, mut y, mut height, mut l) = (R::zero(), R::zero(), R::zero(), R::zero());
+            for (&q, &v) in q.iter().zip(v) {
+                let (sin, cos) = q.sin_cos();
+                (x, y, height) = (x + v * cos, y + v * sin, height + cos);
+                l += (x.sqr() + y.sqr()) * R::half() + height * R::of(9.8);
+            }
+            l
+        }
+    }
+
+    #[test]
+    fn operations_of_a_chain_grow_with_the_square_of_its_length() {
+        let terms = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ;
+        for (n, operations) in [(8, 428), (16, 1184), (32, 3656), (64, 12440)] {
+            let model = Mechanics::<_, f64>::new(Plain(n), []);
+            let program = model.evaluator.program(&model.system, terms).unwrap();
+            assert!(program.lane_operations() <= operations, "{n}: {}", program.lane_operations());
+        }
     }
 
     /// Masses of different sizes and springs to the neighbours.

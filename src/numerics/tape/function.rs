@@ -41,8 +41,9 @@ pub struct Function<S: Scalar> {
     values: Option<Replay<S>>,
     gradients: Option<Replay<S>>,
     by_parameters: Option<Replay<S>>,
-    hessians: Option<Replay<S>>,
     entries: Option<Entries<S>>,
+    /// Entries of the Hessians that are made dense.
+    buffer: Vec<S>,
     products: Option<Replay<S>>,
 }
 
@@ -81,7 +82,7 @@ impl<S: Scalar> Function<S> {
             values: None,
             gradients: None,
             by_parameters: None,
-            hessians: None,
+            buffer: Vec::new(),
             entries: None,
             products: None,
         })
@@ -165,23 +166,21 @@ impl<S: Scalar> Function<S> {
         gradients: &mut [S],
         hessians: &mut [S],
     ) -> Result<(), TapeError> {
-        let n = self.value.inputs();
-        let second = || {
-            recorded(n, &self.value, |x, p| {
-                let found = self.value.derivatives(x, p, Some(&every_direction(n)))?;
-                let mut outputs = [vec![found.value], found.first].concat();
-                outputs.resize(1 + n + n * n, Tracer::zero());
-                for (i, row) in found.second.iter().enumerate() {
-                    for &(j, entry) in row {
-                        outputs[1 + n + i * n + j as usize] = entry;
-                        outputs[1 + n + j as usize * n + i] = entry;
-                    }
-                }
-                Some(outputs)
-            })
-        };
-        let replay = filled(&mut self.hessians, second)?;
-        replay.evaluate(values.len(), &[x], &self.parameters, &mut [values, gradients, hessians])
+        let (n, batch) = (self.value.inputs(), values.len());
+        check_length("Hessians", batch * n * n, hessians.len())?;
+        let width = self.pattern()?.len();
+        let mut entries = std::mem::take(&mut self.buffer);
+        entries.resize(batch * width, S::nan());
+        let outcome = self.sparse_hessians(x, values, gradients, &mut entries);
+        hessians.fill(<S as Real>::zero());
+        let places = self.pattern()?;
+        for (k, hessian) in hessians.chunks_exact_mut((n * n).max(1)).enumerate() {
+            for (&(i, j), &entry) in places.iter().zip(&entries[k * width..]) {
+                (hessian[i * n + j], hessian[j * n + i]) = (entry, entry);
+            }
+        }
+        self.buffer = entries;
+        outcome
     }
 
     /// Row and column of every entry of the lower triangle of the Hessian that is not zero whatever `x` is, row by row.

@@ -87,7 +87,7 @@ pub struct Bodies {
     pub exist: bool,
 }
 
-/// What is left of the motion of one coordinate, or of the force on it: of forces what is left of the averages of neighbouring equations.
+/// The residual of one coordinate, of its motion or of the force on it. Neighbouring equations of force are averaged first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residual {
     /// The coordinate.
