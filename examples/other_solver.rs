@@ -3,32 +3,15 @@
 //! Whatever a network has learned, its motion keeps the energy of what it has learned.
 
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
-use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Request, RightHandSide, Terms};
 use lnn::network::{ModelFile, NetworkLagrangian};
-use std::cell::RefCell;
 use std::path::Path;
 
-/// `d(q, v)/dt = (v, a)`. The solver's right-hand side cannot fail: the first error is kept, and NaN ends the motion.
-struct Motion<'a> {
-    model: &'a dyn EulerLagrange<f64>,
-    terms: RefCell<Terms<f64>>,
-    failure: RefCell<Option<MechanicsError>>,
-}
+struct Motion<'a>(RightHandSide<'a, f64>);
 
 impl ODE<f64, [f64; 4]> for Motion<'_> {
     fn diff(&self, _t: f64, x: &[f64; 4], dx: &mut [f64; 4]) {
-        let (q, v) = x.split_at(2);
-        let mut terms = self.terms.borrow_mut();
-        match self.model.terms(q, v, Request::ACCELERATION, &mut terms) {
-            Ok(()) => {
-                dx[..2].copy_from_slice(v);
-                dx[2..].copy_from_slice(&terms.acceleration);
-            }
-            Err(error) => {
-                dx.fill(f64::NAN);
-                self.failure.borrow_mut().get_or_insert(error);
-            }
-        }
+        self.0.evaluate(x, dx);
     }
 }
 
@@ -37,12 +20,10 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Weights of a file in single precision, widened: the arithmetic is in double precision.
     let ModelFile { header, weights } = ModelFile::<f64>::load(&path)?;
     let model = NetworkLagrangian::new(header.architecture, weights)?;
-    let motion = Motion { model: &model, terms: RefCell::default(), failure: RefCell::default() };
+    let motion = Motion(model.rhs());
     let solver = ExplicitRungeKutta::dop853().rtol(1e-11).atol(1e-11);
     let solution = IVP::ode(&motion, 0.0, 5.0, [0.6, 1.1, 0.0, 0.0]).method(solver).solve();
-    if let Some(error) = motion.failure.take() {
-        return Err(error.into());
-    }
+    motion.0.outcome()?;
     let solution = solution.map_err(|error| format!("{error:?}"))?;
 
     // The energies after all steps at once; between steps the solver interpolates, to fewer digits.

@@ -2,11 +2,10 @@
 //!
 //! Energy and horizontal momentum are conserved; both are compared with their values at the start.
 
-use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, RightHandSide, Terms};
 use lnn::scalar::Real;
 use nalgebra::SVector;
 use ode_solvers::{Dopri5, System};
-use std::cell::RefCell;
 
 /// Coordinates: place of the cart in m, angle of the pendulum in rad. Parameters: cart, bob (kg), rod (m), g (m/s^2).
 struct CartAndPendulum;
@@ -23,38 +22,22 @@ impl Lagrangian for CartAndPendulum {
     }
 }
 
-/// `d(q, v)/dt = (v, a)`. The solver's right-hand side cannot fail: the first error is kept, and NaN ends the motion.
-struct Motion<'a> {
-    model: &'a dyn EulerLagrange<f64>,
-    terms: RefCell<Terms<f64>>,
-    failure: &'a RefCell<Option<MechanicsError>>,
-}
+struct Motion<'a>(&'a RightHandSide<'a, f64>);
 
 impl System<f64, SVector<f64, 4>> for Motion<'_> {
     fn system(&self, _t: f64, x: &SVector<f64, 4>, dx: &mut SVector<f64, 4>) {
-        let (q, v) = x.as_slice().split_at(2);
-        let mut terms = self.terms.borrow_mut();
-        match self.model.terms(q, v, Request::ACCELERATION, &mut terms) {
-            Ok(()) => dx.copy_from_slice(&[v, &terms.acceleration].concat()),
-            Err(error) => {
-                dx.fill(f64::NAN);
-                self.failure.borrow_mut().get_or_insert(error);
-            }
-        }
+        self.0.evaluate(x.as_slice(), dx.as_mut_slice());
     }
 }
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = Mechanics::new(CartAndPendulum, vec![1.5, 0.6, 0.9, 9.81]);
-    let failure = RefCell::new(None);
-    let motion = Motion { model: &model, terms: RefCell::default(), failure: &failure };
+    let motion = model.rhs();
     let start = SVector::from([0.0, 2.5, 0.3, 0.0]);
-    let mut solver = Dopri5::new(motion, 0.0, 20.0, 0.05, start, 1e-11, 1e-11);
+    let mut solver = Dopri5::new(Motion(&motion), 0.0, 20.0, 0.05, start, 1e-11, 1e-11);
     solver.set_output(ode_solvers::OutputType::Sparse);
     let work = solver.integrate();
-    if let Some(error) = failure.take() {
-        return Err(error.into());
-    }
+    motion.outcome()?;
     println!("{}", work?);
 
     // Conserved quantities of all states at once.

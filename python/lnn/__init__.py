@@ -22,8 +22,8 @@ _WHERE = {
     **dict.fromkeys(["fit", "learn", "train"], "_learning"),
     **dict.fromkeys(["find_constraints", "formula", "identify"], "_readings"),
     **dict.fromkeys(["Bodies", "Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
-    **dict.fromkeys(["Identified", "IdentifiedConstant", "Learned", "Outlier", "OwnConstraints", "Residual"], "_results"),
-    **dict.fromkeys(["SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
+    **dict.fromkeys(["Identified", "IdentifiedConstant", "Learned", "Linearization", "Outlier", "OwnConstraints"], "_results"),
+    **dict.fromkeys(["Residual", "SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
 }
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from ._readings import find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
     from ._results import Bodies, Certificate, Combination, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
-    from ._results import Learned, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory, Undetermined
+    from ._results import Learned, Linearization, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory
+    from ._results import Undetermined
     from .reader import Terms
 
 

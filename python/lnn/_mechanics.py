@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import as_json, bounds_of, doubles, doubles_list, real, states, thread_count, whole
-from ._results import Certificate, Formula, Geometry, OwnConstraints, Symmetries, Trajectory
+from ._results import Certificate, Formula, Geometry, Linearization, OwnConstraints, Symmetries, Trajectory
 from .reader import files
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
@@ -111,6 +111,35 @@ class Mechanics:
     def acceleration(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """a, ``(..., n)``, friction included; NaN where it is not determined."""
         return self._term("acceleration", (self._n,), q, v, threads)
+
+    def linearize(self, q: Numbers, v: Numbers, *, force: Numbers | None = None) -> Linearization:
+        """Accelerations and their derivatives, exact, friction and constraints included.
+
+        Parameters
+        ----------
+        q, v : array_like (..., n)
+            Coordinates and velocities in SI units and rad.
+        force : array_like (..., n), optional
+            Generalized forces from outside, such as torques of motors; none by default.
+
+        Returns
+        -------
+        Linearization
+            a ``(..., n)``, and ``da/dq``, ``da/dv``, ``da/dF`` ``(..., n, n)``, a row for each acceleration.
+
+        Raises
+        ------
+        ValueError
+            If an acceleration is not determined.
+        """
+        n = self._n
+        q, v, shape = states(q, v, n)
+        forces = force
+        if force is not None:
+            forces = np.ascontiguousarray(np.broadcast_to(doubles("force", force), (*shape, n)).reshape(-1, n))
+        acceleration, *matrices = self._subject.linearize(q, v, forces)
+        by_q, by_v, by_force = (matrix.reshape(*shape, n, n) for matrix in matrices)
+        return Linearization(acceleration.reshape(*shape, n), by_q, by_v, by_force)
 
     def energy(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """E = v.p - L, ``(...)``."""

@@ -26,6 +26,26 @@ def _axes(ax: Axes | None) -> Axes:
 
 
 @dataclass(frozen=True)
+class Linearization:
+    """Accelerations and their derivatives, a row for each acceleration.
+
+    Attributes
+    ----------
+    acceleration : (..., n)
+        a.
+    by_q, by_v : (..., n, n)
+        da/dq and da/dv.
+    by_force : (..., n, n)
+        da/dF by a generalized force; the inverse of the mass matrix where there are no constraints.
+    """
+
+    acceleration: np.ndarray
+    by_q: np.ndarray
+    by_v: np.ndarray
+    by_force: np.ndarray
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Motion at ``t``, of one start or of a batch of them.
 

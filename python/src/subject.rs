@@ -9,8 +9,8 @@ use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::{Geometry, GeometryError, geometries};
 use lnn::lagrangian::system::{Bounds, Size};
 use lnn::lagrangian::{
-    Description, EulerLagrange, Interruptible, Request, SystemInstance, Terms, configure, configure_system,
-    configure_values, constrained_systems, find,
+    Description, EulerLagrange, Interruptible, Linearization, Linearizer, Request, SystemInstance, Terms, configure,
+    configure_system, configure_values, constrained_systems, find,
 };
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
@@ -429,6 +429,22 @@ impl Subject {
         };
         let mut parts = self.attended(py, (q, v), request, threads)?;
         Ok(field(py, &mut parts, width, take))
+    }
+
+    /// Accelerations and their derivatives by coordinates, velocities and forces at states `(b, n)`, flat.
+    fn linearize<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+        force: Option<PyReadonlyArray2<'py, f64>>,
+    ) -> PyResult<Vec<Numbers<'py>>> {
+        let (q, v) = self.states(&q, &v)?;
+        let force = force.as_ref().map(slice).transpose()?;
+        let model = self.moving();
+        let found = py.detach(|| Linearizer::new(model).under(q, v, force).cloned()).map_err(value)?;
+        let Linearization { acceleration, by_q, by_v, by_force } = found;
+        Ok([acceleration, by_q, by_v, by_force].map(|numbers| numbers.into_pyarray(py)).into())
     }
 
     /// Motions from starts `(b, n)`.

@@ -154,10 +154,31 @@ def test_what_is_huge_is_refused_or_said(arm):
             wrong()
 
 
+def test_a_linearization_has_the_slopes_of_the_accelerations(shipped, arm):
+    q, v = np.array([[0.3, 0.2], [1.0, -0.4]]), np.array([[1.0, -1.0], [0.2, 0.5]])
+    for mechanics in [arm, lnn.Model.load(shipped)]:
+        found = mechanics.linearize(q, v)
+        assert np.allclose(found.acceleration, mechanics.acceleration(q, v), rtol=1e-12)
+        for k, moved in enumerate(1e-5 * np.eye(2)):
+            by_q = (mechanics.acceleration(q + moved, v) - mechanics.acceleration(q - moved, v)) / 2e-5
+            by_v = (mechanics.acceleration(q, v + moved) - mechanics.acceleration(q, v - moved)) / 2e-5
+            assert np.allclose(found.by_q[..., k], by_q, rtol=1e-4, atol=1e-4)
+            assert np.allclose(found.by_v[..., k], by_v, rtol=1e-4, atol=1e-4)
+        assert np.allclose(found.by_force @ mechanics.mass_matrix(q, v), np.eye(2), atol=1e-6)
+        pushed = mechanics.linearize(q, v, force=[0.1, 0.0])
+        assert np.allclose(pushed.acceleration - found.acceleration, 0.1 * found.by_force[..., 0])
+    assert arm.linearize([0.3, 0.2], [1.0, -1.0]).by_q.shape == (2, 2)
+    with pytest.raises(ValueError):
+        arm.linearize(q, v, force=np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="singular"):
+        lnn.System("sphere-geodesic").linearize([0.0, 1.0], [0.1, 0.2])
+
+
 def test_every_result_is_pickled(shipped, arm):
     model, sphere = lnn.Model.load(shipped), lnn.System("sphere-geodesic")
     results = [
         arm.terms([0.1, 0.2], [0.0, 1.0]),
+        arm.linearize([0.1, 0.2], [0.0, 1.0]),
         arm.rollout([0.1, 0.2], [0.0, 1.0], 1.0, 0.5),
         sphere.geometry([0.5, 0.1]),
         sphere.symmetries(seed=1),

@@ -6,7 +6,9 @@ use crate::cli::inverse::inverse;
 use crate::cli::number::{Precision, list};
 use crate::cli::source::{Source, SystemOrModel};
 use crate::cli::{CliError, States, input, output, parse_states, states};
-use crate::lagrangian::{EulerLagrange, LeastNorm, ManifoldRows, ReducedMass, Request, Terms};
+use crate::lagrangian::{
+    EulerLagrange, LeastNorm, Linearizer, ManifoldRows, MechanicsError, ReducedMass, Request, Terms,
+};
 use crate::linalg::{Workspace, eigenvalues};
 use crate::scalar::{Dd, Scalar};
 use crate::symmetry::{Canonical, CanonicalForm, SymmetryError};
@@ -44,6 +46,10 @@ pub struct Args {
     /// Take the acceleration of least norm where the mass matrix is singular; null_directions are the free directions.
     #[arg(long, conflicts_with = "inverse")]
     least_norm: bool,
+    /// Add the derivatives of the accelerations: acceleration_by_q, acceleration_by_v and acceleration_by_force have a row for each
+    /// acceleration; acceleration_by_parameters, of a system, has a row for each parameter.
+    #[arg(long, conflicts_with = "inverse")]
+    linearize: bool,
     /// Precision of everything, the reading of the states included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
@@ -100,21 +106,20 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let model: Model<S> = if args.least_norm { Box::new(LeastNorm(model)) } else { model };
     let mut failures: Vec<(usize, String)> = Vec::new();
     let mut terms = Terms::default();
+    let mut linearizer = args.linearize.then(|| Linearizer::new(model.as_ref()));
     for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
         let mut text = String::new();
         let outcome = model.terms(q, v, Request::ALL, &mut terms);
         let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let held = ConstrainedState::of(model.as_ref(), q, v, &terms);
+        let slopes = linearizer.as_mut().map(|linearizer| Slopes::of(linearizer, n, (q, v)));
         let mut failed = failed.into_iter().peekable();
         for (k, &row) in rows.iter().enumerate() {
             let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
-            text += &show(
-                args.format,
-                row,
-                &fields(n, k, &terms, &spectrum, &held[k], factor.as_ref()),
-                problem.as_deref(),
-            );
+            let mut fields = fields(n, k, &terms, &spectrum, &held[k], factor.as_ref());
+            fields.extend(slopes.iter().flat_map(|slopes| slopes[k].fields()));
+            text += &show(args.format, row, &fields, problem.as_deref());
             failures.extend(problem.map(|text| (row, text)));
         }
         output::print(&text)?;
@@ -195,6 +200,55 @@ impl<S: Scalar> ConstrainedState<S> {
                 }
             })
             .collect()
+    }
+}
+
+/// Most parameters whose derivatives are shown: those of systems, not the weights of networks.
+const PARAMETERS: usize = 256;
+
+/// The derivatives of the accelerations of a state; empty where it has none.
+#[derive(Default)]
+struct Slopes<S> {
+    by_q: Vec<S>,
+    by_v: Vec<S>,
+    by_force: Vec<S>,
+    /// `(parameters, n)`.
+    by_parameters: Vec<S>,
+}
+
+impl<S: Scalar> Slopes<S> {
+    /// Of every state of a batch.
+    fn of(linearizer: &mut Linearizer<'_, S>, n: usize, (q, v): (&[S], &[S])) -> Vec<Self> {
+        let states = q.chunks_exact(n).zip(v.chunks_exact(n));
+        states.map(|(q, v)| Self::at(linearizer, q, v).unwrap_or_default()).collect()
+    }
+
+    fn at(linearizer: &mut Linearizer<'_, S>, q: &[S], v: &[S]) -> Result<Self, MechanicsError> {
+        let n = q.len();
+        let found = linearizer.at(q, v)?;
+        let (by_q, by_v, by_force) = (found.by_q.clone(), found.by_v.clone(), found.by_force.clone());
+        let mut by_parameters = Vec::new();
+        for i in 0..n {
+            let unit: Vec<S> = (0..n).map(|j| S::of_f64(f64::from(u8::from(i == j)))).collect();
+            let of_row = &linearizer.gradient(q, v, &unit)?.by_parameters;
+            if of_row.len() > PARAMETERS {
+                break;
+            }
+            by_parameters.resize(of_row.len() * n, S::nan());
+            of_row.iter().enumerate().for_each(|(k, &x)| by_parameters[k * n + i] = x);
+        }
+        Ok(Self { by_q, by_v, by_force, by_parameters })
+    }
+
+    fn fields(&self) -> impl Iterator<Item = Field<'_, S>> {
+        let named = [
+            ("acceleration_by_q", &self.by_q),
+            ("acceleration_by_v", &self.by_v),
+            ("acceleration_by_force", &self.by_force),
+            ("acceleration_by_parameters", &self.by_parameters),
+        ];
+        let known = |(name, values): &(&str, &Vec<S>)| *name != "acceleration_by_parameters" || !values.is_empty();
+        named.into_iter().filter(known).map(|(name, values)| Field { name, values, shape: Shape::Matrix })
     }
 }
 

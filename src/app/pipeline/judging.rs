@@ -1,6 +1,6 @@
 //! Progress and cancellation of the work on a finished model: it reports how far it is, and the flag of its [`Watch`] ends it.
 
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Terms};
 use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
 use crate::pipeline::{Event, PipelineError, Watch};
@@ -89,6 +89,10 @@ impl EulerLagrange<f64> for Watched<'_> {
             return Err(MechanicsError::Interrupted);
         }
         self.model.terms(q, v, request, terms)
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<f64> + '_>> {
+        self.model.slopes()
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<f64>> {

@@ -136,7 +136,8 @@ impl<S: Scalar> SystemInstance<S> {
         let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
         self.constrain(match self.friction() {
             None => free,
-            Some(friction) => Box::new(WithForces::new(free, Rayleigh(friction))),
+            Some((friction, false)) => Box::new(WithForces::new(free, friction)),
+            Some((friction, true)) => Box::new(WithForces::vanishing(free, friction)),
         })
     }
     /// A model of the same coordinates, learned for instance, under the constraints of the system; without any, as it is.
@@ -153,6 +154,7 @@ impl<S: Scalar> SystemInstance<S> {
             problem: error.to_string(),
         };
         let model = Constrained::new(model, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
+        let model = model.with_parameters_of_model();
         let (q, v) = self.anywhere();
         Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
     }
@@ -164,8 +166,8 @@ impl<S: Scalar> SystemInstance<S> {
     pub(crate) fn dissipation(&self) -> Option<&ExpressionLagrangian> {
         self.system.described.as_ref()?.dissipation.as_ref()
     }
-    /// The same with the values of the parameters; none if these take all friction away.
-    fn friction(&self) -> Option<Friction<S>> {
+    /// The same with the values of the parameters, and whether these take all friction away.
+    fn friction(&self) -> Option<(Friction<S>, bool)> {
         let (function, n, mut vanishes) = (self.dissipation()?, self.coordinates, false);
         // Products with a constant 0 are 0 for a tracer.
         let _ = tape::Program::<S>::record(2 * n, 0, |x, _| {
@@ -175,7 +177,7 @@ impl<S: Scalar> SystemInstance<S> {
             vec![lost]
         });
         let parameters = self.parameters.clone();
-        (!vanishes).then(|| Friction { function: function.clone(), parameters })
+        Some((Friction { function: function.clone(), parameters }, vanishes))
     }
     /// States within the bounds of the validation, at which constraints are examined.
     fn anywhere(&self) -> (Vec<S>, Vec<S>) {
@@ -211,7 +213,13 @@ impl<S: Scalar> SystemInstance<S> {
             return Err(SystemError::Constraints { system, problem: problem.to_string() });
         }
         Ok(match &self.system.described {
-            Some(described) => differentiated(&described.lagrangian, self.friction(), &self.parameters, q, v),
+            Some(described) => differentiated(
+                &described.lagrangian,
+                self.friction().map(|(friction, _)| friction),
+                &self.parameters,
+                q,
+                v,
+            ),
             None => closed_acceleration(self, q, v),
         })
     }

@@ -4,8 +4,9 @@
 //! changes the acceleration by `-M^-1 dr`: one reverse sweep per coordinate gives all slopes, however many parameters there are.
 
 use super::derivatives::{StateTerms, evaluate};
+use super::linearization::{ProgramSlopes, SlopePrograms};
 use super::mechanics::RecordedValue;
-use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Request, SystemInstance};
+use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Rayleigh, Request, Slopes, SystemInstance};
 use crate::forward::HyperDual;
 use crate::scalar::Real;
 use crate::tape::{Program, TapeError, Tracer, VectorFunction, jacobian};
@@ -196,6 +197,19 @@ impl<S: crate::scalar::Scalar> super::Dissipation for Friction<S> {
     fn dissipation<R: Real>(&self, q: &[R], v: &[R]) -> R {
         let parameters: Vec<R> = self.parameters.iter().map(|p| R::constant(p.cast())).collect();
         self.function.lagrangian(&parameters, q, v)
+    }
+}
+
+/// The parameters are those of the Lagrangian, in the same order.
+impl<S: crate::scalar::Scalar> super::GeneralizedForce<S> for Friction<S> {
+    fn force(&self, q: &[S], v: &[S], force: &mut [S]) {
+        Rayleigh(self).force(q, v, force);
+    }
+
+    fn slopes(&self, n: usize) -> Option<Box<dyn Slopes<S> + '_>> {
+        let k = self.parameters.len();
+        let value = Program::record(2 * n, k, |x, p| vec![self.function.lagrangian(p, &x[..n], &x[n..])]).ok()?;
+        Some(Box::new(ProgramSlopes::new(SlopePrograms::of_dissipation(&value)?, &self.parameters)))
     }
 }
 

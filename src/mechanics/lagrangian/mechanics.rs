@@ -1,9 +1,10 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
 use super::derivatives::{StateTerms, evaluate};
+use super::linearization::{ProgramSlopes, SlopePrograms};
 use super::programs::program_of_terms;
 use super::taylor::Taylor;
-use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Solved, Terms, metric_jets};
+use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Slopes, Solved, Terms, metric_jets};
 use crate::linalg::Workspace;
 use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError};
@@ -97,6 +98,8 @@ struct Evaluator<S> {
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
     /// The program of the accelerations alone.
     solved: OnceLock<Option<Solved<S>>>,
+    /// The programs of the derivatives of the equations of motion.
+    slopes: OnceLock<Option<SlopePrograms<S>>>,
     /// Buffers not in use; as many as there were callers at a time.
     #[allow(clippy::vec_box)] // They go in and out at every call.
     pool: Mutex<Vec<Box<Scratch<S>>>>,
@@ -120,6 +123,7 @@ impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
             engine: OnceLock::new(),
             programs: [const { OnceLock::new() }; 32],
             solved: OnceLock::new(),
+            slopes: OnceLock::new(),
             pool: Mutex::new(Vec::new()),
         };
         Self { system, evaluator }
@@ -168,6 +172,14 @@ impl<S: Scalar> Evaluator<S> {
         self.require_parameters(form).ok()?;
         let record = || Solved::record(&self.value(form)?.value, &self.parameters);
         self.solved.get_or_init(record).clone()
+    }
+
+    /// The derivatives of the equations of motion by programs that are recorded on first use.
+    fn slopes(&self, form: &dyn Form<S>) -> Option<Box<dyn Slopes<S>>> {
+        self.require_parameters(form).ok()?;
+        let record = || SlopePrograms::of_lagrangian(&self.value(form)?.value);
+        let programs = self.slopes.get_or_init(record).clone()?;
+        Some(Box::new(ProgramSlopes::new(programs, &self.parameters)))
     }
 
     /// Fills the needed fields of a batch by the engine's sweeps; whether that was possible.
@@ -323,18 +335,21 @@ impl<S: Scalar> Terms<S> {
 struct Routines<S> {
     terms: TermsOf<S>,
     solved: SolvedOf<S>,
+    slopes: SlopesOf<S>,
     metric_jets: JetsOf<S, S>,
     wide_metric_jets: JetsOf<S, Dd>,
 }
 
 type TermsOf<S> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
 type SolvedOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Solved<S>>;
+type SlopesOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Box<dyn Slopes<S>>>;
 type JetsOf<S, T> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<T>>, MechanicsError>;
 
 impl<S: Scalar> Routines<S> {
     const ALL: Self = Self {
         terms: Evaluator::terms,
         solved: Evaluator::solved,
+        slopes: Evaluator::slopes,
         metric_jets: Evaluator::metric_jets,
         wide_metric_jets: Evaluator::metric_jets,
     };
@@ -374,6 +389,10 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
 
     fn solved(&self) -> Option<Solved<S>> {
         (self.evaluator.routines.solved)(&self.evaluator, &self.system)
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        (self.evaluator.routines.slopes)(&self.evaluator, &self.system)
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {

@@ -15,8 +15,10 @@ mod euler_lagrange;
 mod expression;
 #[cfg(feature = "rollout")]
 mod groups;
+mod linearization;
 mod mechanics;
 mod programs;
+mod right_hand_side;
 #[doc(hidden)]
 pub mod system;
 #[doc(hidden)]
@@ -64,7 +66,11 @@ pub use expression::{Expression, ExpressionError};
 pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
+pub use linearization::{Gradient, Linearization, Linearizer};
+#[doc(hidden)]
+pub use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;
+pub use right_hand_side::RightHandSide;
 pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};

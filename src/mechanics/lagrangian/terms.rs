@@ -1,9 +1,9 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
-use super::Solved;
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
 use super::error::MechanicsError;
+use super::{RightHandSide, Slopes, Solved};
 use crate::scalar::{Dd, Scalar};
 use crate::tape::Depth;
 use std::ops::BitOr;
@@ -220,6 +220,14 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         field(&mut |terms| self.terms(q, v, Request::ENERGY, terms), |terms| terms.energy)
     }
 
+    /// The motion as `dy/dt = f(y)`, `y = (q, v)`, for a solver of another crate.
+    fn rhs(&self) -> RightHandSide<'_, S>
+    where
+        Self: Sized,
+    {
+        RightHandSide::new(self)
+    }
+
     /// The metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.
     ///
     /// `q` and `v` are `(batch, n)` in physical units. Numbers that are not finite are passed on.
@@ -259,6 +267,12 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         None
     }
 
+    /// The derivatives of the equations of motion, for a [`Linearizer`](super::Linearizer); `None` of a model that has none.
+    #[doc(hidden)]
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        None
+    }
+
     /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {
         self.inner().is_some_and(|inner| inner.prefers_batches())
@@ -278,6 +292,10 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
         (**self).solved()
     }
 
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        (**self).slopes()
+    }
+
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         Some(&**self)
     }
@@ -294,6 +312,10 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 
     fn solved(&self) -> Option<Solved<S>> {
         (**self).solved()
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        (**self).slopes()
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

@@ -1,9 +1,11 @@
 //! Models around a model: with forces beside its Lagrangian, generalized forces `Q(q, v)` or Rayleigh's dissipation, and
 //! with a flag that ends it.
 
-use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Terms};
+use super::linearization::{ProgramSlopes, SlopePrograms, add_jacobian, with_force};
+use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
 use crate::forward::Dual;
 use crate::scalar::{Dd, Real, Scalar};
+use crate::tape::Program;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Generalized forces that do not follow from a Lagrangian; closures `Fn(&[S], &[S], &mut [S])` of coordinates, velocities and
@@ -11,6 +13,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub trait GeneralizedForce<S>: Send + Sync {
     /// Writes `Q(q, v)` of one state; all three are of length `n`, in physical units (N, N m).
     fn force(&self, q: &[S], v: &[S], force: &mut [S]);
+
+    /// Writes `dQ/dq` and `dQ/dv` of one state, `(n, n)` each, a row for each component of the force; by default central differences of
+    /// the fourth order, with errors of about `eps^(4/5)`.
+    fn jacobian(&self, q: &[S], v: &[S], by_q: &mut [S], by_v: &mut [S])
+    where
+        S: Scalar,
+    {
+        by_q.fill(<S as Real>::zero());
+        by_v.fill(<S as Real>::zero());
+        add_jacobian(self, (q, v), by_q, by_v);
+    }
+
+    /// The derivatives for a [`Linearizer`](super::Linearizer), of a force that has more than [`jacobian`](Self::jacobian).
+    #[doc(hidden)]
+    fn slopes(&self, _coordinates: usize) -> Option<Box<dyn Slopes<S> + '_>>
+    where
+        S: Scalar,
+    {
+        None
+    }
 }
 
 impl<S, F: Fn(&[S], &[S], &mut [S]) + Send + Sync> GeneralizedForce<S> for F {
@@ -23,6 +45,12 @@ impl<S, F: Fn(&[S], &[S], &mut [S]) + Send + Sync> GeneralizedForce<S> for F {
 pub trait Dissipation: Send + Sync {
     /// `D(q, v)` of one state, `q` and `v` of length `n`.
     fn dissipation<R: Real>(&self, q: &[R], v: &[R]) -> R;
+}
+
+impl<D: Dissipation> Dissipation for &D {
+    fn dissipation<R: Real>(&self, q: &[R], v: &[R]) -> R {
+        (**self).dissipation(q, v)
+    }
 }
 
 /// Force `-dD/dv` of a [`Dissipation`] `D`, by exact derivatives.
@@ -41,6 +69,11 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
             *force = -self.0.dissipation(&q, &v).tangent;
             v[i].tangent = <S as Real>::zero();
         }
+    }
+
+    fn slopes(&self, n: usize) -> Option<Box<dyn Slopes<S> + '_>> {
+        let value = Program::record(2 * n, 0, |x, _| vec![self.0.dissipation(&x[..n], &x[n..])]).ok()?;
+        Some(Box::new(ProgramSlopes::new(SlopePrograms::of_dissipation(&value)?, &[])))
     }
 }
 
@@ -69,12 +102,19 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
 pub struct WithForces<M, F> {
     model: M,
     force: F,
+    /// `false` if the force vanishes with the values that its parameters have.
+    acts: bool,
 }
 
 impl<M, F> WithForces<M, F> {
     /// The model under the force, a [`GeneralizedForce`].
     pub fn new(model: M, force: F) -> Self {
-        Self { model, force }
+        Self { model, force, acts: true }
+    }
+
+    /// The model beside a force that vanishes with the values of its parameters, but not its derivatives by them.
+    pub(crate) fn vanishing(model: M, force: F) -> Self {
+        Self { model, force, acts: false }
     }
 
     /// The model without the force.
@@ -90,6 +130,9 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        if !self.acts {
+            return self.model.terms(q, v, request, terms);
+        }
         let n = self.coordinates();
         // The acceleration is solved for once, with all forces.
         let outcome = self.model.terms(q, v, request.without_solution(), terms);
@@ -116,8 +159,16 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
         Some(&self.model)
     }
 
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        Some(with_force(self.coordinates(), self.model.slopes()?, &self.force))
+    }
+
     fn conserves_energy(&self) -> bool {
-        false
+        !self.acts && self.model.conserves_energy()
+    }
+
+    fn solved(&self) -> Option<Solved<S>> {
+        if self.acts { None } else { self.model.solved() }
     }
 }
 
@@ -146,6 +197,10 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
             return Err(MechanicsError::Interrupted);
         }
         self.model.terms(q, v, request, terms)
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        self.model.slopes()
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {

@@ -26,6 +26,7 @@ mod joint_friction;
 mod layout;
 mod model;
 mod recorded;
+mod slopes;
 mod structure;
 
 pub use crate::ops::Activation;

@@ -1,6 +1,9 @@
 //! A trained network as a mechanical system in physical units.
 
-use crate::lagrangian::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Taylor, Terms, metric_jets};
+use super::slopes::NetworkSlopes;
+use crate::lagrangian::{
+    EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Slopes, Taylor, Terms, metric_jets,
+};
 use crate::linalg;
 use crate::network::{Architecture, Dynamics, Form, Layout, Model};
 use crate::scalar::{Real, Scalar};
@@ -29,9 +32,11 @@ pub struct NetworkLagrangian<S> {
 struct Code<S> {
     terms: TermsOf<S>,
     metric_jets: JetsOf<S>,
+    slopes: SlopesOf<S>,
 }
 
 type TermsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
+type SlopesOf<S> = for<'a> fn(&'a NetworkLagrangian<S>) -> Box<dyn Slopes<S> + 'a>;
 type JetsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>;
 
 #[derive(Debug)]
@@ -154,7 +159,8 @@ impl<S: Scalar> NetworkLagrangian<S> {
 
     fn of_valid(architecture: Architecture, weights: Vec<S>) -> Self {
         let (model, idle) = (architecture.model(), Mutex::new(Vec::new()));
-        let code = Code { terms: Self::evaluate_terms, metric_jets: Self::evaluate_metric_jets };
+        let code =
+            Code { terms: Self::evaluate_terms, metric_jets: Self::evaluate_metric_jets, slopes: Self::new_slopes };
         Self { architecture, weights, model, idle, code }
     }
 
@@ -172,6 +178,15 @@ impl<S: Scalar> NetworkLagrangian<S> {
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
         NetworkLagrangian::of_valid(self.architecture.clone(), weights)
+    }
+
+    /// The recorded functions.
+    pub(super) fn model(&self) -> &Model<S> {
+        &self.model
+    }
+
+    fn new_slopes(&self) -> Box<dyn Slopes<S> + '_> {
+        Box::new(NetworkSlopes::new(self))
     }
 
     fn evaluate_terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
@@ -266,6 +281,10 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         (self.code.metric_jets)(self, q, v)
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        Some((self.code.slopes)(self))
     }
 
     fn conserves_energy(&self) -> bool {

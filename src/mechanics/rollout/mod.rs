@@ -22,6 +22,7 @@ mod dense;
 mod ensemble;
 mod error;
 mod fixed;
+mod flow;
 mod force;
 mod gauss;
 mod ode;
@@ -42,6 +43,7 @@ pub use ensemble::{rollout_each, rollout_together};
 pub use error::RolloutError;
 #[doc(hidden)]
 pub use error::UnderflowCause;
+pub use flow::{Flow, FlowGradient, FlowJacobian};
 pub use force::{Driven, Force, SampledForce};
 #[doc(hidden)]
 pub use ode::Integrable;

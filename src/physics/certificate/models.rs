@@ -5,7 +5,7 @@ use super::search::Found;
 use super::spectrum::Source;
 use super::{Certificate, CertificateError, Options, Signature, Verdict, certificate, checked};
 use crate::lagrangian::system::Bounds;
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Terms};
 use crate::network::{Architecture, NetworkLagrangian};
 use crate::scalar::Scalar;
 use std::f64::consts::TAU;
@@ -151,6 +151,10 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
         }
         terms.prepend_failures(found);
         terms.outcome()
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        self.model.slopes()
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

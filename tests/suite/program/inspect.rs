@@ -98,6 +98,35 @@ fn inspect_prints_every_term() {
 }
 
 #[test]
+fn linearizations_are_slopes_of_the_accelerations() {
+    let folder = Folder::new();
+    // theta1 is moved, then the velocity of theta2.
+    let states = folder.file("s.csv", format!("{HEADER}0.3,0.2,1,-1\n0.3001,0.2,1,-1\n0.3,0.2,1,-0.9999\n"));
+    let objects = inspect("double-pendulum", &states, &["--linearize"]).objects();
+    let row = |k: usize, name: &str, i: usize| numbers(&objects[k][name][i]);
+    for (moved, name, column) in [(1, "acceleration_by_q", 0), (2, "acceleration_by_v", 1)] {
+        for i in 0..2 {
+            let [before, after] = [0, moved].map(|k| numbers(&objects[k]["acceleration"])[i]);
+            let middle = (row(0, name, i)[column] + row(moved, name, i)[column]) / 2.0;
+            assert!(((after - before) / 1e-4 - middle).abs() < 1e-5, "{name} {i}");
+        }
+    }
+    // Twice the mass and gravity give the slopes by parameters of m1, m2, l1, l2, g: a is homogeneous in the masses.
+    let by: Vec<Vec<f64>> = (0..5).map(|k| row(0, "acceleration_by_parameters", k)).collect();
+    assert!((0..2).all(|i| (by[0][i] + by[1][i]).abs() < 1e-12) && by[4].iter().any(|x| x.abs() > 1e-3));
+    // By a force: the inverse of the mass matrix.
+    let (m, w) = (objects[0]["mass_matrix"].clone(), objects[0]["acceleration_by_force"].clone());
+    let [m, w] = [m, w].map(|matrix| [numbers(&matrix[0]), numbers(&matrix[1])]);
+    assert!((m[0][0] * w[0][0] + m[0][1] * w[1][0] - 1.0).abs() < 1e-13);
+    // A state without an acceleration has none of its slopes.
+    let pole = folder.file("p.csv", "theta,phi,theta_dot,phi_dot\n0,2,3,4\n1,2,3,4\n");
+    let found = inspect("sphere-geodesic", &pole, &["--linearize"]);
+    assert_eq!(found.code, Some(1));
+    let lines: Vec<Value> = found.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(lines[0]["acceleration_by_q"].is_null() && lines[1]["acceleration_by_q"].is_array());
+}
+
+#[test]
 fn canonical_forms_agree_at_the_base_state() {
     let folder = Folder::new();
     let states = folder.file("s.csv", format!("{HEADER}0.3,0.2,1,-1\n0.7,-1.2,0.5,2\n"));

@@ -8,6 +8,8 @@ mod formula;
 #[allow(dead_code, reason = "its functions are called")]
 #[path = "../../../examples/gps.rs"]
 mod gps;
+#[path = "../../../examples/kalman.rs"]
+mod kalman;
 #[allow(dead_code, reason = "its functions are called")]
 #[path = "../../../examples/load_model.rs"]
 mod load_model;
@@ -27,6 +29,8 @@ mod own_lagrangian;
 mod own_optimizer;
 #[path = "../../../examples/own_solver.rs"]
 mod own_solver;
+#[path = "../../../examples/swing_up.rs"]
+mod swing_up;
 #[path = "../../../examples/system_identification.rs"]
 mod system_identification;
 
@@ -45,6 +49,16 @@ fn an_integrator_of_ode_solvers_moves_a_cart_and_a_pendulum() {
 #[test]
 fn an_integrator_of_another_crate_moves_a_learned_pendulum() {
     other_solver::main().unwrap();
+}
+
+#[test]
+fn a_filter_follows_an_angle_that_is_not_measured() {
+    kalman::main().unwrap();
+}
+
+#[test]
+fn a_controller_swings_a_learned_pendulum_up() {
+    swing_up::main().unwrap();
 }
 
 #[test]

@@ -4,7 +4,8 @@ use super::projection::project;
 use super::rows::independent;
 use super::{Constraints, Manifold, ManifoldRows, RowAdjoint};
 use crate::forward::{Dual, HyperDual};
-use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
+use crate::lagrangian::linearization::{ProgramSlopes, SlopePrograms, Sum};
+use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Slopes, Terms};
 use crate::scalar::{Dd, Real, Scalar};
 
 /// A row at unit length whose part beside the rows before it is below this at every state follows from them.
@@ -77,6 +78,8 @@ pub struct Constrained<M, C, S> {
     model: M,
     constraints: C,
     parameters: Vec<S>,
+    /// `true` if they are those of the model.
+    shared: bool,
     /// Rows of `constraints`, and which of them act.
     rows: usize,
     kept: Vec<usize>,
@@ -102,7 +105,21 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
             }
         }
         let rows = names.len();
-        Ok(Self { model, constraints, parameters, rows, kept: (0..rows).collect(), names, redundant: Vec::new() })
+        Ok(Self {
+            model,
+            constraints,
+            parameters,
+            shared: false,
+            rows,
+            kept: (0..rows).collect(),
+            names,
+            redundant: Vec::new(),
+        })
+    }
+
+    /// The same with parameters that are those of the model in the same order.
+    pub(crate) fn with_parameters_of_model(self) -> Self {
+        Self { shared: true, ..self }
     }
 
     /// The same without the constraints that follow from those before them at all of some states, `(batch, n)` each, which are
@@ -305,6 +322,13 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
 
     fn manifold(&self) -> Option<&dyn Manifold<S>> {
         Some(self)
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        let rows = (self.rows, &self.kept[..]);
+        let programs = SlopePrograms::of_constraints(&self.constraints, rows, &self.parameters, self.shared)?;
+        let parameters = if self.shared { &self.parameters[..] } else { &[] };
+        Some(Box::new(Sum(self.model.slopes()?, Box::new(ProgramSlopes::new(programs, parameters)))))
     }
 
     /// None: across the constraints a mass matrix means nothing.

@@ -72,6 +72,11 @@ impl<S: Scalar> Bordered<S> {
         }
     }
 
+    /// The matrices, `(batch, n + m, n + m)`.
+    pub fn matrices(&self) -> &[S] {
+        &self.matrices
+    }
+
     /// Solves for `[x; y]` with `[upper; lower]` on the right, `(batch, n)` and `(batch, m)`, 0 if `lower` is empty; `true` if no row
     /// failed. Those that did are `NaN`, and named by the workspace.
     pub fn solve(&mut self, upper: &[S], lower: &[S], x: &mut [S], y: &mut [S], workspace: &mut Workspace<S>) -> bool {

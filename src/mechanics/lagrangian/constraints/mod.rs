@@ -26,7 +26,6 @@ mod tests;
 pub use constrained::{Constrained, ConstraintError};
 pub use described::ExpressionConstraints;
 pub use formulas::{FormulaConstraints, FormulaError};
-#[cfg(feature = "training")]
 pub(crate) use kkt::Bordered;
 pub(super) use kkt::{Motion, accelerate};
 pub use least_norm::{LeastNorm, LeastNormMotion};

@@ -1,0 +1,265 @@
+//! How the accelerations of a model change with its state, with forces on it, and with its parameters.
+
+mod differences;
+mod forces;
+mod programs;
+
+pub(super) use differences::add_jacobian;
+pub(super) use forces::{Sum, with_force};
+pub(super) use programs::{ProgramSlopes, SlopePrograms};
+
+use super::constraints::Bordered;
+use super::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg::{self, Workspace};
+use crate::scalar::{Real, Scalar, update};
+use differences::Differences;
+
+/// A batch of states with their accelerations and multipliers, which are held.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Held<'a, S> {
+    /// Coordinates and velocities, `(batch, n)`.
+    pub state: (&'a [S], &'a [S]),
+    /// Accelerations, `(batch, n)`.
+    pub a: &'a [S],
+    /// Number of constraints `m`.
+    pub constraints: usize,
+    /// Their multipliers, `(batch, m)`.
+    pub multipliers: &'a [S],
+}
+
+/// Sums of a [`Slopes::add_products`].
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Products<'a, S> {
+    /// By the coordinates, `(batch, n)`.
+    pub by_q: &'a mut [S],
+    /// By the velocities, `(batch, n)`.
+    pub by_v: &'a mut [S],
+    /// By the parameters, summed over the batch; left alone by a part without.
+    pub by_parameters: &'a mut Vec<S>,
+}
+
+impl<S: Scalar> Products<'_, S> {
+    /// Adds the derivatives by the parameters of a state.
+    pub(crate) fn add_parameters(&mut self, by_parameters: &[S]) {
+        if self.by_parameters.is_empty() {
+            self.by_parameters.resize(by_parameters.len(), <S as Real>::zero());
+        }
+        update(self.by_parameters, by_parameters, |sum, x| *sum += x);
+    }
+}
+
+/// Derivatives of the equations of motion `f = [g - c + Q - M a + A^T lambda; -(A a + gamma)]`, `n + m` of them, by the state and the
+/// parameters, with `a` and `lambda` held. Buffers are reused.
+#[doc(hidden)]
+pub trait Slopes<S: Scalar> {
+    /// Adds `df/d(q, v)` to matrices `(batch, n + m, 2 n)`.
+    ///
+    /// # Errors
+    /// As of [`EulerLagrange::terms`].
+    fn add_matrices(&mut self, held: &Held<'_, S>, matrices: &mut [S]) -> Result<(), MechanicsError>;
+
+    /// Adds the derivatives of `weights.f`, weights `(batch, n + m)`.
+    ///
+    /// # Errors
+    /// As of [`EulerLagrange::terms`].
+    fn add_products(
+        &mut self,
+        held: &Held<'_, S>,
+        weights: &[S],
+        products: &mut Products<'_, S>,
+    ) -> Result<(), MechanicsError>;
+}
+
+/// The accelerations of a batch of states and their derivatives; matrices are row-major, a row for each acceleration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Linearization<S> {
+    /// `a`, `(batch, n)`.
+    pub acceleration: Vec<S>,
+    /// `da/dq`, `(batch, n, n)`.
+    pub by_q: Vec<S>,
+    /// `da/dv`, `(batch, n, n)`.
+    pub by_v: Vec<S>,
+    /// `da/dF` by a generalized force, `M^-1` without constraints, `(batch, n, n)`.
+    pub by_force: Vec<S>,
+}
+
+/// Derivatives of `w.a` of a batch of states, weights `w` `(batch, n)`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Gradient<S> {
+    /// By the coordinates, `(batch, n)`.
+    pub by_q: Vec<S>,
+    /// By the velocities, `(batch, n)`.
+    pub by_v: Vec<S>,
+    /// By a generalized force, `(batch, n)`.
+    pub by_force: Vec<S>,
+    /// By the parameters of the Lagrangian, summed over the batch; empty of a model that has none, or is a type of yours. A system
+    /// from a file has one list of parameters for its Lagrangian, its friction and its constraints; those of other forces and
+    /// constraints are held.
+    pub by_parameters: Vec<S>,
+}
+
+/// Linearizes a model about states, with buffers of its own: what an implicit integrator, a filter, or a controller calls.
+///
+/// With `f = g - c + Q` the motion is `M a = f`, so that `da/dx = M^-1 (df/dx - dM/dx a)`: the inverse times the derivatives of
+/// the equations at fixed accelerations. Those are exact: of a Lagrangian written down by a program of its third derivatives that is
+/// recorded on first use, without what is zero; of a network by the sweeps of its training. Forces given as a closure, and types of yours
+/// that implement [`EulerLagrange`] themselves, are differentiated numerically, with errors of about `eps^(4/5)`.
+///
+/// ```
+/// use lnn::lagrangian::{Linearizer, build};
+///
+/// // A pendulum of 1 m and 1 kg near its lowest point: a = -g q.
+/// let pendulum = build::<f64>("n-pendulum", &[("n".into(), "1".into())])?;
+/// let mut linearizer = Linearizer::new(&*pendulum);
+/// let motion = linearizer.at(&[0.0], &[0.0])?;
+/// assert!((motion.by_q[0] + 9.8).abs() < 1e-14 && motion.by_v == [0.0] && motion.by_force == [1.0]);
+/// // The derivative of its acceleration at 0.5 rad by mass, length and gravity: a = -g sin(q)/l.
+/// let gradient = linearizer.gradient(&[0.5], &[0.0], &[1.0])?;
+/// let exact = [0.0, 9.8 * 0.5f64.sin(), -0.5f64.sin()];
+/// assert!(gradient.by_parameters.iter().zip(exact).all(|(x, exact)| (x - exact).abs() < 1e-14));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Linearizer<'a, S: Scalar> {
+    model: &'a dyn EulerLagrange<S>,
+    slopes: Box<dyn Slopes<S> + 'a>,
+    terms: Terms<S>,
+    bordered: Bordered<S>,
+    /// Derivatives of the equations, or weights.
+    right: Vec<S>,
+    /// What was solved for: inverses, or weights.
+    solution: Vec<S>,
+    workspace: Workspace<S>,
+    linearization: Linearization<S>,
+    gradient: Gradient<S>,
+}
+
+impl<'a, S: Scalar> Linearizer<'a, S> {
+    /// Buffers for a model.
+    pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
+        Self {
+            model,
+            slopes: model.slopes().unwrap_or_else(|| Box::new(Differences::new(model))),
+            terms: Terms::default(),
+            bordered: Bordered::default(),
+            right: Vec::new(),
+            solution: Vec::new(),
+            workspace: Workspace::new(),
+            linearization: Linearization::default(),
+            gradient: Gradient::default(),
+        }
+    }
+
+    /// Accelerations and their derivatives at states `q`, `v`, `(batch, n)` in physical units.
+    ///
+    /// # Errors
+    /// As of [`EulerLagrange::terms`]: of the first state that fails.
+    pub fn at(&mut self, q: &[S], v: &[S]) -> Result<&Linearization<S>, MechanicsError> {
+        self.under(q, v, None)
+    }
+
+    /// The same under generalized forces from outside, `(batch, n)`, if there are any.
+    ///
+    /// # Errors
+    /// As of [`EulerLagrange::terms`]; another length of the forces.
+    pub fn under(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<&Linearization<S>, MechanicsError> {
+        let n = self.model.coordinates();
+        let (m, batch) = (self.solve_motion(q, v, force)?, q.len() / n.max(1));
+        let (rows, zero) = (n + m, <S as Real>::zero());
+        self.right.clear();
+        self.right.resize(batch * rows * 2 * n, zero);
+        self.slopes.add_matrices(&held((q, v), &self.terms), &mut self.right)?;
+        self.solution.resize(batch * rows * rows, zero);
+        let matrices = if m == 0 { &self.terms.mass_matrix } else { self.bordered.matrices() };
+        let inverted = linalg::inverse(rows, matrices, &mut self.solution, &mut self.workspace);
+        self.check(inverted.is_ok())?;
+        let Linearization { acceleration, by_q, by_v, by_force } = &mut self.linearization;
+        acceleration.clear();
+        acceleration.extend_from_slice(&self.terms.acceleration);
+        for field in [&mut *by_q, &mut *by_v, by_force] {
+            field.clear();
+        }
+        let mut row = vec![zero; 2 * n];
+        let states =
+            self.solution.chunks_exact((rows * rows).max(1)).zip(self.right.chunks_exact((rows * 2 * n).max(1)));
+        for (inverse, slopes) in states {
+            for inverse in inverse.chunks_exact(rows).take(n) {
+                row.fill(zero);
+                for (&factor, slopes) in inverse.iter().zip(slopes.chunks_exact(2 * n)) {
+                    update(&mut row, slopes, |sum, x| *sum += factor * x);
+                }
+                by_q.extend_from_slice(&row[..n]);
+                by_v.extend_from_slice(&row[n..]);
+                by_force.extend_from_slice(&inverse[..n]);
+            }
+        }
+        Ok(&self.linearization)
+    }
+
+    /// Derivatives of `w.a` by everything that the accelerations depend on: the product of the linearization with `w`, `(batch, n)`, from the
+    /// left, by one sweep instead of `n`.
+    ///
+    /// # Errors
+    /// As of [`EulerLagrange::terms`]; another length of `w`.
+    pub fn gradient(&mut self, q: &[S], v: &[S], w: &[S]) -> Result<&Gradient<S>, MechanicsError> {
+        if w.len() != q.len() {
+            return Err(MechanicsError::Shape { what: "weights", expected: q.len(), found: w.len() });
+        }
+        let n = self.model.coordinates();
+        let (m, zero) = (self.solve_motion(q, v, None)?, <S as Real>::zero());
+        self.right.clear();
+        for w in w.chunks_exact(n.max(1)) {
+            self.right.extend_from_slice(w);
+            self.right.resize(self.right.len() + m, zero);
+        }
+        // The bordered matrix `[M A^T; A 0]` is its own transpose, and `-lambda` its second unknown.
+        self.solution.resize(self.right.len(), zero);
+        let (right, solution, workspace) = (&self.right, &mut self.solution, &mut self.workspace);
+        let solved = match m {
+            0 => linalg::solve_symmetric(n, &self.terms.mass_matrix, right, solution, workspace),
+            _ => linalg::solve(n + m, self.bordered.matrices(), right, solution, workspace),
+        };
+        self.check(solved.is_ok())?;
+        let Gradient { by_q, by_v, by_force, by_parameters } = &mut self.gradient;
+        by_force.clear();
+        self.solution.chunks_exact((n + m).max(1)).for_each(|weights| by_force.extend_from_slice(&weights[..n]));
+        by_parameters.clear();
+        for field in [&mut *by_q, &mut *by_v] {
+            field.clear();
+            field.resize(q.len(), zero);
+        }
+        let mut products = Products { by_q, by_v, by_parameters };
+        self.slopes.add_products(&held((q, v), &self.terms), &self.solution, &mut products)?;
+        Ok(&self.gradient)
+    }
+
+    /// The terms of the states, and the matrices of their motion; the number of constraints.
+    fn solve_motion(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<usize, MechanicsError> {
+        self.model.terms(q, v, Request::ACCELERATION, &mut self.terms)?;
+        let (n, m) = (self.model.coordinates(), self.terms.constraints);
+        if let Some(force) = force {
+            self.terms.add_force(n, v, force, &mut self.workspace)?;
+        }
+        if m > 0 {
+            self.bordered.set((n, m), &self.terms.mass_matrix, &self.terms.constraint_matrix);
+        }
+        Ok(m)
+    }
+
+    /// The first failure of the workspace.
+    fn check(&self, solved: bool) -> Result<(), MechanicsError> {
+        match self.workspace.failures().first() {
+            Some(&(row, failure)) if !solved => Err(MechanicsError::unsolved(row, failure)),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// States with their accelerations.
+fn held<'a, S>((q, v): (&'a [S], &'a [S]), terms: &'a Terms<S>) -> Held<'a, S> {
+    Held { state: (q, v), a: &terms.acceleration, constraints: terms.constraints, multipliers: &terms.multipliers }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+//! The motion of a model as a system of first order, for solvers of other crates.
+
+use super::{Accelerations, EulerLagrange, Linearizer, MechanicsError};
+use crate::scalar::{Real, Scalar};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The right-hand side of `dy/dt = f(y)`, `y = (q, v)`, `f = (v, a)`, `2 n` numbers: what solvers of differential equations call.
+///
+/// Solvers give a right-hand side no way to fail. Its first error is kept instead, and `dy` is `NaN` from then on, which makes them stop.
+/// Buffers are its own: nothing is allocated after the first call.
+///
+/// ```
+/// use lnn::lagrangian::{EulerLagrange, build};
+///
+/// let pendulum = build::<f64>("double-pendulum", &[])?;
+/// let f = pendulum.rhs();
+/// let (mut y, mut dy) = ([1.0, 1.0, 0.0, 0.0], [0.0; 4]);
+/// for _ in 0..100 {
+///     f.evaluate(&y, &mut dy); // Euler's method, for want of a better one
+///     y.iter_mut().zip(dy).for_each(|(y, dy)| *y += 0.001 * dy);
+/// }
+/// f.outcome()?;
+/// assert!(y[0] < 1.0 && y[2] < 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct RightHandSide<'a, S: Scalar> {
+    model: &'a dyn EulerLagrange<S>,
+    buffers: Mutex<Buffers<'a, S>>,
+}
+
+struct Buffers<'a, S: Scalar> {
+    accelerations: Accelerations<'a, S>,
+    /// Made on first use.
+    linearizer: Option<Linearizer<'a, S>>,
+    error: Option<MechanicsError>,
+}
+
+impl<'a, S: Scalar> RightHandSide<'a, S> {
+    /// Of a model; [`EulerLagrange::rhs`] is the same.
+    pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
+        let buffers = Buffers { accelerations: Accelerations::new(model), linearizer: None, error: None };
+        Self { model, buffers: Mutex::new(buffers) }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Buffers<'a, S>> {
+        self.buffers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Writes `f(y)`.
+    pub fn evaluate(&self, y: &[S], dy: &mut [S]) {
+        let (mut buffers, n) = (self.lock(), self.model.coordinates());
+        if buffers.error.is_none() && y.len() == 2 * n && dy.len() == 2 * n {
+            let (q, v) = y.split_at(n);
+            let (speed, a) = dy.split_at_mut(n);
+            speed.copy_from_slice(v);
+            match buffers.accelerations.at(q, v, a) {
+                Ok(()) => return,
+                Err(error) => buffers.error = Some(error),
+            }
+        } else if buffers.error.is_none() {
+            let found = if y.len() == 2 * n { dy.len() } else { y.len() };
+            buffers.error = Some(MechanicsError::Shape { what: "state", expected: 2 * n, found });
+        }
+        dy.fill(S::nan());
+    }
+
+    /// Writes `df/dy`, `(2 n, 2 n)` row by row.
+    pub fn jacobian(&self, y: &[S], jacobian: &mut [S]) {
+        let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+        jacobian.fill(S::nan());
+        self.linearized(y, |n, by_q, by_v| {
+            if jacobian.len() != 4 * n * n {
+                return Err(MechanicsError::Shape { what: "Jacobian", expected: 4 * n * n, found: jacobian.len() });
+            }
+            jacobian.fill(zero);
+            for i in 0..n {
+                jacobian[i * 2 * n + n + i] = one;
+                let row = &mut jacobian[(n + i) * 2 * n..][..2 * n];
+                row[..n].copy_from_slice(&by_q[i * n..][..n]);
+                row[n..].copy_from_slice(&by_v[i * n..][..n]);
+            }
+            Ok(())
+        });
+    }
+
+    /// Writes the product `df/dy x` with a vector of `2 n` numbers.
+    pub fn jacobian_product(&self, y: &[S], x: &[S], product: &mut [S]) {
+        product.fill(S::nan());
+        self.linearized(y, |n, by_q, by_v| {
+            if let Some(found) = [x.len(), product.len()].into_iter().find(|&found| found != 2 * n) {
+                return Err(MechanicsError::Shape { what: "vector", expected: 2 * n, found });
+            }
+            product[..n].copy_from_slice(&x[n..]);
+            for i in 0..n {
+                let row = by_q[i * n..][..n].iter().chain(&by_v[i * n..][..n]);
+                product[n + i] = row.zip(x).fold(<S as Real>::zero(), |sum, (&a, &x)| sum + a * x);
+            }
+            Ok(())
+        });
+    }
+
+    /// Hands over `n`, `da/dq` and `da/dv`; keeps an error.
+    fn linearized(&self, y: &[S], take: impl FnOnce(usize, &[S], &[S]) -> Result<(), MechanicsError>) {
+        let (mut buffers, n) = (self.lock(), self.model.coordinates());
+        if buffers.error.is_some() {
+            return;
+        }
+        let found = if y.len() == 2 * n {
+            let linearizer = buffers.linearizer.get_or_insert_with(|| Linearizer::new(self.model));
+            linearizer.at(&y[..n], &y[n..]).and_then(|found| take(n, &found.by_q, &found.by_v))
+        } else {
+            Err(MechanicsError::Shape { what: "state", expected: 2 * n, found: y.len() })
+        };
+        buffers.error = found.err();
+    }
+
+    /// Whether all calls succeeded since the last look; forgets the error.
+    ///
+    /// # Errors
+    /// The first error.
+    pub fn outcome(&self) -> Result<(), MechanicsError> {
+        self.lock().error.take().map_or(Ok(()), Err)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::build;
+
+    #[test]
+    fn a_right_hand_side_keeps_its_first_error() {
+        let model = build::<f64>("kepler", &[]).unwrap();
+        let f = model.rhs();
+        let (mut dy, mut jacobian, mut product) = ([0.0; 4], [0.0; 16], [0.0; 4]);
+        let y = [1.0, 0.5, 0.2, 0.9];
+        f.evaluate(&y, &mut dy);
+        let a = model.acceleration(&y[..2], &y[2..]).unwrap();
+        assert_eq!(dy, [0.2, 0.9, a[0], a[1]]);
+        f.jacobian(&y, &mut jacobian);
+        let x = [0.3, -0.1, 0.7, 1.1];
+        f.jacobian_product(&y, &x, &mut product);
+        for i in 0..4 {
+            let sum: f64 = (0..4).map(|j| jacobian[i * 4 + j] * x[j]).sum();
+            assert!((product[i] - sum).abs() < 1e-15);
+        }
+        assert_eq!(f.outcome(), Ok(()));
+        f.evaluate(&[0.0; 4], &mut dy);
+        f.jacobian(&y, &mut jacobian[..3]);
+        assert!(dy[3].is_nan() && f.outcome().unwrap_err().row() == Some(0));
+        f.evaluate(&y[..3], &mut dy);
+        assert!(matches!(f.outcome(), Err(MechanicsError::Shape { expected: 4, found: 3, .. })));
+        f.jacobian(&y, &mut jacobian[..3]);
+        assert!(matches!(f.outcome(), Err(MechanicsError::Shape { expected: 16, found: 3, .. })));
+        f.evaluate(&y, &mut dy);
+        assert!(f.outcome().is_ok() && dy[3] == a[1]);
+    }
+}
