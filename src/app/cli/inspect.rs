@@ -21,8 +21,12 @@ pub struct Args {
     subject: SystemOrModel,
     /// CSV of states, or - for standard input. Its header has the columns of the system, in any order; other columns, such as t
     /// and energy of a roll-out, are ignored.
-    #[arg(long, value_name = "FILE.csv")]
-    states: PathBuf,
+    #[arg(long, value_name = "FILE.csv", required_unless_present = "structure")]
+    states: Option<PathBuf>,
+    /// Print which second derivatives of L are zero, constant or vary with the state, and which coordinates do not couple. No states are
+    /// needed.
+    #[arg(long, conflicts_with_all = ["states", "inverse", "canonical", "constraints", "least_norm", "linearize"])]
+    structure: bool,
     /// Print the forces that cause given accelerations; the CSV also has the accelerations (COORDINATE_ddot).
     /// generalized_force is M a + c - g, the total force besides that of L, including friction. friction is that of the model,
     /// -dD/dv. external_force is the difference of the two, the force that must be applied from outside. Other columns are
@@ -76,15 +80,16 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 
 fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
+    let Some(file) = &args.states else { return structure(args, &source) };
     if args.inverse {
-        return inverse(&args.states, args.format, &source);
+        return inverse(file, args.format, &source);
     }
     if args.format == Format::Csv {
         return Err(CliError::usage("--format csv: expected --inverse beside it; use json or table"));
     }
-    let place = input::name(&args.states);
+    let place = input::name(file);
     let bytes =
-        input::read(&args.states, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
+        input::read(file, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
     let states: States<S> =
         parse_states(&bytes, &source.columns).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
     drop(bytes);
@@ -125,6 +130,16 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         output::print(&text)?;
     }
     report_failures(&place, &failures)
+}
+
+/// Prints the pattern of the second derivatives.
+fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError> {
+    let pattern = source.model.pattern();
+    let pattern = pattern.ok_or_else(|| CliError::data("--structure: the Lagrangian is too large to be recorded"))?;
+    if args.format == Format::Table {
+        return output::print(&pattern.to_string());
+    }
+    output::print(&format!("{}\n", pattern.to_json()))
 }
 
 /// A model with its Lagrangian.

@@ -7,6 +7,7 @@ use crate::scalar::{Real, Scalar};
 use crate::tape::{Program, ROWS, Replay};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Products of an elimination that are always worth recording: it takes less time than the call of a solver.
 const SMALL: usize = 60;
@@ -17,14 +18,23 @@ const SMALL: usize = 60;
 /// accelerations among the outputs.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
-pub struct Solved<S> {
+pub struct Solved<'a, S> {
     program: Arc<Program<S>>,
     parameters: Vec<S>,
     /// Number of pairs of a pivot and the element of the diagonal that it was.
     pivots: usize,
+    /// Once it is raised, every call fails.
+    flag: Option<&'a AtomicBool>,
 }
 
-impl<S: Scalar> Solved<S> {
+impl<'a, S: Scalar> Solved<'a, S> {
+    /// The same until a flag is raised.
+    pub(super) fn until(self, flag: &'a AtomicBool) -> Self {
+        Self { flag: Some(flag), ..self }
+    }
+}
+
+impl<S: Scalar> Solved<'static, S> {
     /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.
     pub(super) fn record(value: &Program<S>, parameters: &[S]) -> Option<Self> {
         let n = value.inputs() / 2;
@@ -38,7 +48,7 @@ impl<S: Scalar> Solved<S> {
             Some(outputs)
         });
         let program = Arc::new(program.ok()?);
-        Some(Self { program, parameters: parameters.to_vec(), pivots })
+        Some(Self { program, parameters: parameters.to_vec(), pivots, flag: None })
     }
 }
 
@@ -122,7 +132,7 @@ fn eliminate<R: Real>(lower: Vec<Vec<(usize, R)>>, mut right: Vec<R>, most: usiz
 /// ```
 pub struct Accelerations<'a, S> {
     model: &'a dyn EulerLagrange<S>,
-    solved: Option<(Solved<S>, Replay<S>)>,
+    solved: Option<(Solved<'a, S>, Replay<S>)>,
     pivots: Vec<S>,
     terms: Terms<S>,
 }
@@ -145,13 +155,21 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         if a.len() != q.len() {
             return Err(MechanicsError::Shape { what: "accelerations", expected: q.len(), found: a.len() });
         }
+        if let Some((Solved { flag: Some(flag), .. }, _)) = &self.solved
+            && flag.load(Ordering::Relaxed)
+        {
+            return Err(MechanicsError::Interrupted);
+        }
         if self.is_solved(q, v, a) {
             return Ok(());
         }
         // With a search for pivots, and a reason for every row that fails.
         let outcome = self.model.terms(q, v, Request::ACCELERATION, &mut self.terms);
-        if self.terms.acceleration.len() == a.len() {
+        let found = self.terms.acceleration.len();
+        if found == a.len() {
             a.copy_from_slice(&self.terms.acceleration);
+        } else if outcome.is_ok() {
+            return Err(MechanicsError::Shape { what: "acceleration", expected: a.len(), found });
         }
         outcome
     }

@@ -4,7 +4,7 @@ use super::derivatives::{StateTerms, evaluate};
 use super::linearization::{ProgramSlopes, SlopePrograms};
 use super::programs::program_of_terms;
 use super::taylor::Taylor;
-use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Slopes, Solved, Terms, metric_jets};
+use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Pattern, Request, Slopes, Solved, Terms, metric_jets};
 use crate::linalg::Workspace;
 use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError};
@@ -97,7 +97,7 @@ struct Evaluator<S> {
     /// One program per combination of needed terms.
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
     /// The program of the accelerations alone.
-    solved: OnceLock<Option<Solved<S>>>,
+    solved: OnceLock<Option<Solved<'static, S>>>,
     /// The programs of the derivatives of the equations of motion.
     slopes: OnceLock<Option<SlopePrograms<S>>>,
     /// Buffers not in use; as many as there were callers at a time.
@@ -168,10 +168,16 @@ impl<S: Scalar> Evaluator<S> {
     }
 
     /// The program of the accelerations alone, recorded on first use.
-    fn solved(&self, form: &dyn Form<S>) -> Option<Solved<S>> {
+    fn solved(&self, form: &dyn Form<S>) -> Option<Solved<'static, S>> {
         self.require_parameters(form).ok()?;
         let record = || Solved::record(&self.value(form)?.value, &self.parameters);
         self.solved.get_or_init(record).clone()
+    }
+
+    /// The pattern of the second derivatives.
+    fn pattern(&self, form: &dyn Form<S>) -> Option<Pattern> {
+        self.require_parameters(form).ok()?;
+        Pattern::of(&self.value(form)?.value)
     }
 
     /// The derivatives of the equations of motion by programs that are recorded on first use.
@@ -336,12 +342,14 @@ struct Routines<S> {
     terms: TermsOf<S>,
     solved: SolvedOf<S>,
     slopes: SlopesOf<S>,
+    pattern: PatternOf<S>,
     metric_jets: JetsOf<S, S>,
     wide_metric_jets: JetsOf<S, Dd>,
 }
 
 type TermsOf<S> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
-type SolvedOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Solved<S>>;
+type SolvedOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Solved<'static, S>>;
+type PatternOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Pattern>;
 type SlopesOf<S> = fn(&Evaluator<S>, &dyn Form<S>) -> Option<Box<dyn Slopes<S>>>;
 type JetsOf<S, T> = fn(&Evaluator<S>, &dyn Form<S>, &[S], &[S]) -> Result<Vec<MetricJet<T>>, MechanicsError>;
 
@@ -350,6 +358,7 @@ impl<S: Scalar> Routines<S> {
         terms: Evaluator::terms,
         solved: Evaluator::solved,
         slopes: Evaluator::slopes,
+        pattern: Evaluator::pattern,
         metric_jets: Evaluator::metric_jets,
         wide_metric_jets: Evaluator::metric_jets,
     };
@@ -387,8 +396,12 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
         (self.evaluator.routines.terms)(&self.evaluator, &self.system, q, v, request, terms)
     }
 
-    fn solved(&self) -> Option<Solved<S>> {
+    fn solved(&self) -> Option<Solved<'_, S>> {
         (self.evaluator.routines.solved)(&self.evaluator, &self.system)
+    }
+
+    fn pattern(&self) -> Option<Pattern> {
+        (self.evaluator.routines.pattern)(&self.evaluator, &self.system)
     }
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {

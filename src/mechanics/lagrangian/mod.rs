@@ -17,6 +17,7 @@ mod expression;
 mod groups;
 mod linearization;
 mod mechanics;
+mod pattern;
 mod programs;
 mod right_hand_side;
 #[doc(hidden)]
@@ -70,6 +71,7 @@ pub use linearization::{Gradient, Linearization, Linearizer};
 #[doc(hidden)]
 pub use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;
+pub use pattern::{Element, Pattern};
 pub use right_hand_side::RightHandSide;
 pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;

@@ -3,7 +3,7 @@
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
 use super::error::MechanicsError;
-use super::{RightHandSide, Slopes, Solved};
+use super::{Pattern, RightHandSide, Slopes, Solved};
 use crate::scalar::{Dd, Scalar};
 use crate::tape::Depth;
 use std::ops::BitOr;
@@ -251,6 +251,12 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.inner().map_or(Ok(None), |inner| inner.wide_metric_jets(q, v))
     }
 
+    /// Which second derivatives of the Lagrangian are zero and which are constant, whatever the state; `None` of a model that is not
+    /// recorded.
+    fn pattern(&self) -> Option<Pattern> {
+        self.inner().and_then(|inner| inner.pattern())
+    }
+
     /// The states that the constraints of the model allow; none for a model without constraints.
     fn manifold(&self) -> Option<&dyn Manifold<S>> {
         self.inner().and_then(|inner| inner.manifold())
@@ -263,7 +269,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
 
     /// The program of the accelerations alone, for [`Accelerations`](super::Accelerations); `None` of a model that has none.
     #[doc(hidden)]
-    fn solved(&self) -> Option<Solved<S>> {
+    fn solved(&self) -> Option<Solved<'_, S>> {
         None
     }
 
@@ -288,7 +294,7 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
         (**self).terms(q, v, request, terms)
     }
 
-    fn solved(&self) -> Option<Solved<S>> {
+    fn solved(&self) -> Option<Solved<'_, S>> {
         (**self).solved()
     }
 
@@ -310,7 +316,7 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
         (**self).terms(q, v, request, terms)
     }
 
-    fn solved(&self) -> Option<Solved<S>> {
+    fn solved(&self) -> Option<Solved<'_, S>> {
         (**self).solved()
     }
 

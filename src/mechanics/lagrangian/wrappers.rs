@@ -167,7 +167,7 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
         !self.acts && self.model.conserves_energy()
     }
 
-    fn solved(&self) -> Option<Solved<S>> {
+    fn solved(&self) -> Option<Solved<'_, S>> {
         if self.acts { None } else { self.model.solved() }
     }
 }
@@ -197,6 +197,10 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
             return Err(MechanicsError::Interrupted);
         }
         self.model.terms(q, v, request, terms)
+    }
+
+    fn solved(&self) -> Option<Solved<'_, S>> {
+        Some(self.model.solved()?.until(self.flag))
     }
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {

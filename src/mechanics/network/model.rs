@@ -2,12 +2,12 @@
 
 use super::slopes::NetworkSlopes;
 use crate::lagrangian::{
-    EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Slopes, Taylor, Terms, metric_jets,
+    EulerLagrange, Lagrangian, MechanicsError, MetricJet, Pattern, Request, Slopes, Taylor, Terms, metric_jets,
 };
 use crate::linalg;
 use crate::network::{Architecture, Dynamics, Form, Layout, Model};
 use crate::scalar::{Real, Scalar};
-use crate::tape::{Depth, STATES};
+use crate::tape::{Depth, Program, STATES};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
@@ -33,9 +33,11 @@ struct Code<S> {
     terms: TermsOf<S>,
     metric_jets: JetsOf<S>,
     slopes: SlopesOf<S>,
+    pattern: PatternOf<S>,
 }
 
 type TermsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
+type PatternOf<S> = fn(&NetworkLagrangian<S>) -> Option<Pattern>;
 type SlopesOf<S> = for<'a> fn(&'a NetworkLagrangian<S>) -> Box<dyn Slopes<S> + 'a>;
 type JetsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError>;
 
@@ -160,7 +162,8 @@ impl<S: Scalar> NetworkLagrangian<S> {
     fn of_valid(architecture: Architecture, weights: Vec<S>) -> Self {
         let (model, idle) = (architecture.model(), Mutex::new(Vec::new()));
         let code =
-            Code { terms: Self::evaluate_terms, metric_jets: Self::evaluate_metric_jets, slopes: Self::new_slopes };
+            Code { terms: Self::evaluate_terms, metric_jets: Self::evaluate_metric_jets, slopes: Self::new_slopes,
+            pattern: Self::find_pattern };
         Self { architecture, weights, model, idle, code }
     }
 
@@ -183,6 +186,16 @@ impl<S: Scalar> NetworkLagrangian<S> {
     /// The recorded functions.
     pub(super) fn model(&self) -> &Model<S> {
         &self.model
+    }
+
+    /// That of the smallest network of the same form: widths change no zero.
+    fn find_pattern(&self) -> Option<Pattern> {
+        let Architecture { hidden, activation, coordinates: n, .. } = &self.architecture;
+        let width = 2 * activation.branches().len();
+        let small = Architecture { hidden: vec![width; hidden.len().min(2)], ..self.architecture.clone() };
+        let parameters = Layout::new(&small).parameters;
+        let value = Program::<S>::record(2 * n, parameters, |x, p| vec![small.lagrangian(p, &x[..*n], &x[*n..])]);
+        Pattern::of(&value.ok()?)
     }
 
     fn new_slopes(&self) -> Box<dyn Slopes<S> + '_> {
@@ -281,6 +294,10 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         (self.code.metric_jets)(self, q, v)
+    }
+
+    fn pattern(&self) -> Option<Pattern> {
+        (self.code.pattern)(self)
     }
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {

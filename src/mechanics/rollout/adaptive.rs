@@ -6,7 +6,7 @@ use super::regular::Regularity;
 use super::run::{Keep, Nodes, into_error};
 use super::trajectory::{Part, Samples, Times};
 use super::{Domain, Force, Integrable, Options, RolloutError, StepCounts, StepFailure, UnderflowCause};
-use crate::lagrangian::{EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
+use crate::lagrangian::{Accelerations, EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 
@@ -19,6 +19,9 @@ struct MotionEquations<'a, S> {
     force: Option<&'a dyn Force<S>>,
     options: &'a Options<S>,
     n: usize,
+    /// What moves without a force from outside.
+    accelerations: Accelerations<'a, S>,
+    /// What a force from outside is added to.
     terms: Terms<S>,
     external: Vec<S>,
     workspace: Workspace<S>,
@@ -39,21 +42,22 @@ impl<S: Scalar> MotionEquations<'_, S> {
         let n = self.n;
         StepFailure::check(self.options.domain.as_ref(), y)?;
         let (q, v) = y.split_at(n);
-        self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
-        if self.terms.acceleration.len() != n {
-            let (expected, found) = (n, self.terms.acceleration.len());
-            return Err(StepFailure::Model(MechanicsError::Shape { what: "acceleration", expected, found }));
+        let (speed, a) = dy.split_at_mut(n);
+        speed.copy_from_slice(v);
+        match self.force {
+            None => self.accelerations.at(q, v, a).map_err(StepFailure::Model)?,
+            Some(force) => {
+                self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
+                force.force(piece.time(self.time(elapsed)), q, v, &mut self.external);
+                self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(StepFailure::Model)?;
+                a.copy_from_slice(&self.terms.acceleration);
+            }
         }
-        if let Some(force) = self.force {
-            force.force(piece.time(self.time(elapsed)), q, v, &mut self.external);
-            self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(StepFailure::Model)?;
-        }
-        if self.terms.acceleration.iter().any(|a| !a.is_finite()) {
+        if a.iter().any(|a| !a.is_finite()) {
             return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
         }
-        let backwards = self.backwards();
-        for (slope, &x) in dy.iter_mut().zip(v.iter().chain(&self.terms.acceleration)) {
-            *slope = if backwards { -x } else { x };
+        if self.backwards() {
+            dy.iter_mut().for_each(|slope| *slope = -*slope);
         }
         Ok(())
     }
@@ -71,7 +75,8 @@ pub(super) fn run<S: Integrable>(
     let mut total = StepCounts::default();
     let (n, zero) = (model.coordinates(), <S as Real>::zero());
     let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
-    let mut motion = MotionEquations { model, force, options, n, terms, external, workspace };
+    let accelerations = Accelerations::new(model);
+    let mut motion = MotionEquations { model, force, options, n, accelerations, terms, external, workspace };
     let all = Samples::new(options);
     let (domain, manifold) = (options.domain.as_ref(), model.manifold());
     let mut state: Vec<S> = q.iter().chain(v).copied().collect();

@@ -134,6 +134,10 @@ impl<S: Scalar> Program<S> {
     pub fn outputs(&self) -> usize {
         self.outputs.len()
     }
+    /// `true` if an output depends on no input.
+    pub(crate) fn is_uniform(&self, output: usize) -> bool {
+        (self.outputs[output] as usize) < self.uniform_rows
+    }
     /// Operations done for each lane, inputs included.
     pub fn lane_operations(&self) -> usize {
         self.lanes.iter().map(Run::count).sum()
