@@ -21,7 +21,7 @@ const ADAPTERS: [(&str, &[&str]); 14] = [
     ("pulp", &["numerics/scalar/"]),
     ("xprec", &["numerics/scalar/"]),
     ("libm", &["numerics/scalar/"]),
-    ("faer", &["numerics/linalg/"]),
+    ("faer", &["numerics/linalg/by_faer.rs"]),
     ("nalgebra", &["mechanics/rollout/"]),
     ("ode_solvers", &["mechanics/rollout/"]),
     ("argmin", &["learning/training/", "learning/shooting/"]),
