@@ -17,9 +17,8 @@ const FLOORS: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates with the only places that name them.
-const ADAPTERS: [(&str, &[&str]); 14] = [
+const ADAPTERS: [(&str, &[&str]); 13] = [
     ("pulp", &["numerics/scalar/"]),
-    ("xprec", &["numerics/scalar/"]),
     ("libm", &["numerics/scalar/"]),
     ("faer", &["numerics/linalg/by_faer.rs"]),
     ("nalgebra", &["mechanics/rollout/"]),
