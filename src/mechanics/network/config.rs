@@ -129,9 +129,17 @@ impl std::fmt::Display for ActivationChoice {
 }
 
 /// A text that names no activation.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown activation `{0}`; known are {known}", known = ActivationChoice::NAMES)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownActivation(pub String);
+
+impl std::fmt::Display for UnknownActivation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(name) = self;
+        write!(f, "unknown activation `{name}`; known are {known}", known = ActivationChoice::NAMES)
+    }
+}
+
+impl std::error::Error for UnknownActivation {}
 
 impl std::str::FromStr for ActivationChoice {
     type Err = UnknownActivation;

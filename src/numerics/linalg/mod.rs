@@ -81,11 +81,10 @@ pub enum Failure {
 }
 
 /// Error of a batched operation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LinalgError {
     /// A slice has the wrong length.
-    #[error("{what}: expected {expected} numbers, found {found}")]
     Shape {
         /// Which argument.
         what: &'static str,
@@ -95,7 +94,6 @@ pub enum LinalgError {
         found: usize,
     },
     /// A matrix is singular to working precision.
-    #[error("matrix {row} is singular (condition number {condition:.3e})")]
     Singular {
         /// Row of the batch.
         row: usize,
@@ -103,12 +101,25 @@ pub enum LinalgError {
         condition: f64,
     },
     /// A matrix, a right-hand side or an answer is not finite.
-    #[error("matrix {row} or its answer is not finite")]
     NotFinite {
         /// Row of the batch.
         row: usize,
     },
 }
+
+impl std::fmt::Display for LinalgError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
+            Self::Singular { row, condition } => {
+                write!(f, "matrix {row} is singular (condition number {condition:.3e})")
+            }
+            Self::NotFinite { row } => write!(f, "matrix {row} or its answer is not finite"),
+        }
+    }
+}
+
+impl std::error::Error for LinalgError {}
 
 impl LinalgError {
     /// The error of one row.

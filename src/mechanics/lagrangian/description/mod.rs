@@ -206,14 +206,22 @@ impl Description {
 }
 
 /// Mistake in a description.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{problem}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescriptionError {
     /// Path of the key, such as `metric.t,t`.
     pub key: String,
     /// The mistake, with the column for a formula.
     pub problem: String,
 }
+
+impl std::fmt::Display for DescriptionError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { key, problem } = self;
+        if key.is_empty() { f.write_str(problem) } else { write!(f, "{key}: {problem}") }
+    }
+}
+
+impl std::error::Error for DescriptionError {}
 
 impl DescriptionError {
     fn new(key: impl Into<String>, problem: impl std::fmt::Display) -> Self {

@@ -188,9 +188,16 @@ impl Num for Dd {
 }
 
 /// A text that is no decimal number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("not a decimal number")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnreadableNumber;
+
+impl std::fmt::Display for UnreadableNumber {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("not a decimal number")
+    }
+}
+
+impl std::error::Error for UnreadableNumber {}
 
 impl std::str::FromStr for Dd {
     type Err = UnreadableNumber;
