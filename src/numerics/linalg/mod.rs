@@ -61,6 +61,7 @@ pub(crate) use solve::SMALL_PIVOT;
 pub use solve::inverse;
 pub use solve::{solve, solve_symmetric};
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Sum of products.
@@ -69,7 +70,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Why one matrix of a batch gave no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Failure {
     /// Singular to working precision; the 2-norm condition number is infinite if exactly singular.
     Singular {

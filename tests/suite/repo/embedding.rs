@@ -120,6 +120,6 @@ fn the_library_leaves_the_program_out() {
         assert!(all.iter().any(|d| d == name), "the program uses {name}");
         assert!(!library.iter().any(|d| d == name), "the library does not need {name}");
     }
-    assert!(library.len() + 30 < all.len(), "{} of {}", library.len(), all.len());
+    assert!(library.len() <= 20, "{} packages: {library:?}", library.len());
     assert!(dependencies(&["--no-default-features", "--features", "faer"]).iter().any(|d| d == "faer"));
 }
