@@ -34,9 +34,16 @@ impl fmt::Display for SearchProgress {
 }
 
 /// The flag was raised: there is no result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cancelled;
+
+impl fmt::Display for Cancelled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("interrupted")
+    }
+}
+
+impl std::error::Error for Cancelled {}
 
 struct Reports {
     to: Box<dyn Fn(SearchProgress) + Send + Sync>,

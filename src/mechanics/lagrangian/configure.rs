@@ -19,11 +19,10 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Why a system could not be built.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SystemError {
     /// No system of this name.
-    #[error("{}", unknown("system", name, known.iter().map(String::as_str)))]
     UnknownSystem {
         /// The name asked for.
         name: String,
@@ -31,7 +30,6 @@ pub enum SystemError {
         known: Vec<String>,
     },
     /// No parameter of this symbol.
-    #[error("{system}: {}", unknown("parameter", symbol, known.iter().map(String::as_str)))]
     UnknownParameter {
         /// The system.
         system: String,
@@ -41,13 +39,11 @@ pub enum SystemError {
         known: Vec<String>,
     },
     /// A parameter given twice.
-    #[error("parameter `{symbol}` is given twice")]
     Repeated {
         /// The symbol.
         symbol: String,
     },
     /// A value that is not a number or outside the allowed range.
-    #[error("parameter `{symbol}` of {system} must be {demand}, found `{found}`")]
     Value {
         /// The system.
         system: String,
@@ -59,7 +55,6 @@ pub enum SystemError {
         found: String,
     },
     /// Constraints that contradict each other or leave no motion.
-    #[error("{system}: {problem}")]
     Constraints {
         /// The system.
         system: String,
@@ -67,7 +62,6 @@ pub enum SystemError {
         problem: String,
     },
     /// A state of the wrong length.
-    #[error("{system}: expected {expected} coordinates and velocities, found {found}")]
     State {
         /// The system.
         system: String,
@@ -77,6 +71,29 @@ pub enum SystemError {
         found: usize,
     },
 }
+
+impl std::fmt::Display for SystemError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::UnknownSystem { name, known } => {
+                f.write_str(&unknown("system", name, known.iter().map(String::as_str)))
+            }
+            Self::UnknownParameter { system, symbol, known } => {
+                write!(f, "{system}: {}", unknown("parameter", symbol, known.iter().map(String::as_str)))
+            }
+            Self::Repeated { symbol } => write!(f, "parameter `{symbol}` is given twice"),
+            Self::Value { system, symbol, demand, found } => {
+                write!(f, "parameter `{symbol}` of {system} must be {demand}, found `{found}`")
+            }
+            Self::Constraints { system, problem } => write!(f, "{system}: {problem}"),
+            Self::State { system, expected, found } => {
+                write!(f, "{system}: expected {expected} coordinates and velocities, found {found}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for SystemError {}
 
 /// Parameters as given: symbol and decimal text.
 pub type Given = [(String, String)];

@@ -5,11 +5,10 @@ use crate::linalg::{Failure, Workspace};
 use crate::scalar::{Scalar, vectorized};
 
 /// Why terms could not be computed.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MechanicsError {
     /// A slice has the wrong length.
-    #[error("{what}: expected {expected} numbers, found {found}")]
     Shape {
         /// Which argument.
         what: &'static str,
@@ -19,7 +18,6 @@ pub enum MechanicsError {
         found: usize,
     },
     /// The mass matrix of a state cannot be solved with.
-    #[error("mass matrix of state {row} is singular (condition number {condition:.3e})")]
     Singular {
         /// Row of the batch.
         row: usize,
@@ -27,7 +25,6 @@ pub enum MechanicsError {
         condition: f64,
     },
     /// A constraint that depends on the others at a state, although it does not elsewhere: they leave open what carries the load.
-    #[error("constraint {constraint} depends on the others at state {row}")]
     Dependent {
         /// Row of the batch.
         row: usize,
@@ -35,9 +32,6 @@ pub enum MechanicsError {
         constraint: usize,
     },
     /// An acceleration that the constraints do not allow.
-    #[error(
-        "the acceleration of state {row} is {distance:.3e} away from what the constraints allow, most by constraint {constraint}"
-    )]
     OffConstraints {
         /// Row of the batch.
         row: usize,
@@ -47,7 +41,6 @@ pub enum MechanicsError {
         distance: f64,
     },
     /// A term is not finite.
-    #[error("{what} of state {row} is not finite")]
     NotFinite {
         /// Row of the batch.
         row: usize,
@@ -55,21 +48,42 @@ pub enum MechanicsError {
         what: &'static str,
     },
     /// A state at which the mass matrix is not certified, of a model that is to move where it is.
-    #[error("mass matrix of state {row} is not certified")]
     Uncertified {
         /// Row of the batch.
         row: usize,
     },
     /// A model that a flag has ended.
-    #[error("interrupted")]
     Interrupted,
     /// Derivatives that a model does not have.
-    #[error("{what}: this model has no such derivatives")]
     Derivatives {
         /// Of which term.
         what: &'static str,
     },
 }
+
+impl std::fmt::Display for MechanicsError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
+            Self::Singular { row, condition } => {
+                write!(f, "mass matrix of state {row} is singular (condition number {condition:.3e})")
+            }
+            Self::Dependent { row, constraint } => {
+                write!(f, "constraint {constraint} depends on the others at state {row}")
+            }
+            Self::OffConstraints { row, constraint, distance } => write!(
+                f,
+                "the acceleration of state {row} is {distance:.3e} away from what the constraints allow, most by constraint {constraint}"
+            ),
+            Self::NotFinite { row, what } => write!(f, "{what} of state {row} is not finite"),
+            Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
+            Self::Interrupted => f.write_str("interrupted"),
+            Self::Derivatives { what } => write!(f, "{what}: this model has no such derivatives"),
+        }
+    }
+}
+
+impl std::error::Error for MechanicsError {}
 
 impl MechanicsError {
     /// Row of the state that failed; `None` of an error that is not about one state.

@@ -51,8 +51,10 @@ pub use constraints::{
 #[doc(hidden)]
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
+#[cfg(feature = "serde")]
+pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
-pub(crate) use description::{inertia_symbols, loss_symbols, pair};
+pub(crate) use description::{inertia_symbols, loss_symbols};
 #[cfg(feature = "training")]
 pub(crate) use equations::{EquationPart, Equations};
 pub use error::MechanicsError;

@@ -3,6 +3,7 @@
 use super::Lagrangian;
 use super::description::{Described, Description};
 use crate::scalar::Real;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -321,18 +322,19 @@ pub trait ClosedForm: Lagrangian {
 }
 
 /// Values a parameter may take, besides being finite.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub enum Range {
     /// Any finite number.
     #[default]
-    #[serde(rename = "any")]
+    #[cfg_attr(feature = "serde", serde(rename = "any"))]
     Any,
     /// Zero or more.
-    #[serde(rename = "at least 0")]
+    #[cfg_attr(feature = "serde", serde(rename = "at least 0"))]
     AtLeastZero,
     /// More than zero.
-    #[serde(rename = "positive")]
+    #[cfg_attr(feature = "serde", serde(rename = "positive"))]
     Positive,
 }
 

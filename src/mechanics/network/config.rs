@@ -2,11 +2,12 @@
 
 use super::Form;
 use crate::network::Activation;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Distribution of the initial weights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Initialization {
     /// Uniform in `+-1/sqrt(fan_in)`, weights and biases.
@@ -24,8 +25,8 @@ pub enum Initialization {
 }
 
 /// Layer between the input features and the first dense layer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum InputLayer {
     /// Nothing.
@@ -44,8 +45,8 @@ impl InputLayer {
 }
 
 /// Everything that determines a network Lagrangian but its weights.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Architecture {
     /// Number of coordinates `n`.
     pub coordinates: usize,
@@ -58,7 +59,7 @@ pub struct Architecture {
     pub alpha: f64,
     /// The coordinate whose square counts negative in the added term: `alpha (-t'^2 + x'^2 + ..)`, the signature of a
     /// spacetime. Without it all squares are added.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub time_like: Option<usize>,
     /// Scale `s_i` of each coordinate: the network sees `q_i/s_i`, `v_i/s_i`. Ones: no scaling.
     pub scale: Vec<f64>,
@@ -67,14 +68,14 @@ pub struct Architecture {
     /// Feed `sin q_i`, `cos q_i` of the periodic coordinates instead of `q_i/s_i`.
     pub embed_periodic: bool,
     /// Layer before the first dense one; files without this key have none.
-    #[serde(default, skip_serializing_if = "InputLayer::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "InputLayer::is_none"))]
     pub input_layer: InputLayer,
     /// Units of the Rayleigh dissipation `D(q, v)` beside `L`; without it the motion
     /// keeps its energy.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<usize>,
     /// Knowledge of the Lagrangian beforehand; files without this key have none.
-    #[serde(default, skip_serializing_if = "Form::is_default")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Form::is_default"))]
     pub form: Form,
 }
 
@@ -82,12 +83,13 @@ pub struct Architecture {
 macro_rules! choices {
     ($($(#[$($doc:tt)*])* $name:ident $text:literal;)*) => {
         /// Activation of the hidden layers, as a configuration chooses it.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
         #[non_exhaustive]
         pub enum ActivationChoice {
-            $($(#[$($doc)*])* #[serde(rename = $text)] $name,)*
+            $($(#[$($doc)*])* #[cfg_attr(feature = "serde", serde(rename = $text))] $name,)*
             /// Two networks of half the widths added up, one with `ln(1 + e^x)`, one with `x^2` (Liu et al. 2021).
-            #[serde(rename = "quadratic-softplus")]
+            #[cfg_attr(feature = "serde", serde(rename = "quadratic-softplus"))]
             QuadraticSoftplus,
         }
 
@@ -129,9 +131,17 @@ impl std::fmt::Display for ActivationChoice {
 }
 
 /// A text that names no activation.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown activation `{0}`; known are {known}", known = ActivationChoice::NAMES)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownActivation(pub String);
+
+impl std::fmt::Display for UnknownActivation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(name) = self;
+        write!(f, "unknown activation `{name}`; known are {known}", known = ActivationChoice::NAMES)
+    }
+}
+
+impl std::error::Error for UnknownActivation {}
 
 impl std::str::FromStr for ActivationChoice {
     type Err = UnknownActivation;

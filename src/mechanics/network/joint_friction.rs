@@ -10,11 +10,12 @@
 //! stands above these near the speed `u = exp(fall)` and falls off beyond. All three forces are against the velocity.
 
 use crate::scalar::Real;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Friction that every coordinate has by itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum JointFriction {
     /// None.

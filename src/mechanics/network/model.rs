@@ -9,7 +9,6 @@ use crate::network::{Architecture, Dynamics, Form, Layout, Model};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, Program, STATES};
 use std::sync::{Mutex, PoisonError};
-use thiserror::Error;
 
 /// A network with its weights: `L(q, v)`, perhaps a dissipation `D(q, v)`, and everything that follows from them.
 ///
@@ -49,14 +48,12 @@ struct Workspace<S> {
 }
 
 /// Why weights do not make a network.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NetworkError {
     /// A list of the architecture has the wrong length, or there is no coordinate or hidden layer.
-    #[error("architecture: {0}")]
     Architecture(String),
     /// There are too few or too many weights.
-    #[error("weights: expected {expected} numbers, found {found}")]
     Weights {
         /// Parameters of the architecture.
         expected: usize,
@@ -64,6 +61,17 @@ pub enum NetworkError {
         found: usize,
     },
 }
+
+impl std::fmt::Display for NetworkError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Architecture(problem) => write!(f, "architecture: {problem}"),
+            Self::Weights { expected, found } => write!(f, "weights: expected {expected} numbers, found {found}"),
+        }
+    }
+}
+
+impl std::error::Error for NetworkError {}
 
 impl Architecture {
     /// Checks that the lists fit each other and that nothing is empty or not finite.

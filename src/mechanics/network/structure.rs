@@ -14,20 +14,22 @@
 use super::joint_friction::JointFriction;
 use crate::lagrangian::Description;
 use crate::scalar::Real;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Builds the choice from rows `Name "name in configurations and files";`.
 macro_rules! structures {
     ($first:ident $first_text:literal $first_doc:literal; $($name:ident $text:literal $doc:literal;)*) => {
         /// Structure of a Lagrangian: how it is made of the network's outputs.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
         #[non_exhaustive]
         pub enum Structure {
             #[doc = $first_doc]
             #[default]
-            #[serde(rename = $first_text)]
+            #[cfg_attr(feature = "serde", serde(rename = $first_text))]
             $first,
-            $(#[doc = $doc] #[serde(rename = $text)] $name,)*
+            $(#[doc = $doc] #[cfg_attr(feature = "serde", serde(rename = $text))] $name,)*
         }
 
         impl Structure {
@@ -85,13 +87,13 @@ impl Structure {
 const BESIDE_KNOWN: f64 = 0.01;
 
 /// Knowledge of a Lagrangian beforehand.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields, default))]
 pub struct Form {
     /// Structure of a Lagrangian: how it is made of the network's outputs.
     pub structure: Structure,
     /// Factor of the kinetic energy or the metric; files without this key have a triangle.
-    #[serde(skip_serializing_if = "Factor::is_triangle")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Factor::is_triangle"))]
     pub factor: Factor,
     /// Coordinates that `L` does not depend on: their momenta are conserved exactly.
     pub cyclic: Vec<usize>,
@@ -100,23 +102,23 @@ pub struct Form {
     /// `true` if `alpha` of a black box is learned.
     pub learn_alpha: bool,
     /// Groups of coordinates that enter by direction and distance; files without this key have none.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub radial: Vec<Radial>,
     /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub known: Option<Box<Description>>,
     /// Friction of every coordinate by itself; files without this key have none.
-    #[serde(skip_serializing_if = "JointFriction::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "JointFriction::is_none"))]
     pub joint_friction: JointFriction,
     /// Sizes of the parts; files without this key have all of size 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub sizes: Option<Sizes>,
 }
 
 /// Usual sizes of the parts of a model, in scaled coordinates, so that a network learns numbers near 1: in an arm gravity is far above
 /// inertia, and the inertia of the first joint far above that of the last one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Sizes {
     /// Factor of every scaled velocity in the kinetic energy, `(n)`: its square is the size of `M_ii`.
     pub velocity: Vec<f64>,
@@ -137,8 +139,8 @@ impl Sizes {
 
 /// Cartesian coordinates `x` around a centre, seen near and far alike: each enters as `(x_i/R) ln(R/u)` and as `(x_i/R) (u/R)`, `R` the
 /// distance from the centre. At the centre itself there is no feature.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Radial {
     /// The coordinates.
     pub coordinates: Vec<usize>,
@@ -272,8 +274,8 @@ pub(super) struct LagrangianInputs<'a, R> {
 }
 
 /// Factor of the quadratic form of a structure, which makes it a sum of squares.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Factor {
     /// A lower triangle with the diagonal `softplus(c_ii) + 10^-3`: as many squares as coordinates.

@@ -1,14 +1,21 @@
 //! The routines of `f32` and `f64`, compiled once, here.
 
-use super::{large_systems, matmul};
+#[cfg(feature = "faer")]
+use super::by_faer;
+use super::matmul;
 use crate::scalar::{MatMut, MatRef, Matrices};
 
-macro_rules! by_faer {
+macro_rules! compiled {
     ($($float:ty)*) => {$(
         impl Matrices for $float {
             fn product(c: MatMut<'_, Self>, accumulate: bool, alpha: Self, a: MatRef<'_, Self>, b: MatRef<'_, Self>) {
-                matmul::fast(c, accumulate, alpha, a, b);
+                #[cfg(feature = "faer")]
+                if !matmul::is_small(&c, &a, &b) {
+                    return by_faer::product(c, accumulate, alpha, a, b);
+                }
+                matmul::plain(c, accumulate, alpha, a, b);
             }
+            #[cfg(feature = "faer")]
             fn eliminate(
                 n: usize,
                 m: usize,
@@ -16,13 +23,14 @@ macro_rules! by_faer {
                 right: Option<&[Self]>,
                 solutions: &mut [Self],
             ) -> Option<Vec<usize>> {
-                Some(large_systems::eliminate(n, m, matrices, right, solutions))
+                Some(by_faer::eliminate(n, m, matrices, right, solutions))
             }
+            #[cfg(feature = "faer")]
             fn eigh(n: usize, matrix: &[Self], values: &mut [Self], vectors: &mut [Self]) -> bool {
-                large_systems::decompose(n, matrix, values, vectors);
+                by_faer::eigh(n, matrix, values, vectors);
                 true
             }
         }
     )*};
 }
-by_faer!(f32 f64);
+compiled!(f32 f64);

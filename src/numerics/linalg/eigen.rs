@@ -57,11 +57,11 @@ fn run<S: Scalar>(
     if batch == 0 {
         return Ok(());
     }
-    let by_faer = matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate().all(|(row, (m, w))| {
+    let one_by_one = matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate().all(|(row, (m, w))| {
         let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
         large_systems::eigh(n, m, w, u)
     });
-    let finite = if by_faer {
+    let finite = if one_by_one {
         false
     } else if const { size_of::<S>() < size_of::<f64>() } {
         split::<S, { 2 * LANES }>(n, matrices, values, vectors, &mut workspace.block)
@@ -411,4 +411,40 @@ fn store<S: Scalar, const W: usize>(
         finite &= check[l] == zero && (exponents[l] == 0 || values.iter().all(|w| w.is_finite()));
     }
     finite
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::dot;
+
+    #[test]
+    fn lanes_find_what_faer_finds() {
+        for n in [3, 40, 70] {
+            let batch = LANES + 2;
+            let mut m = vec![0.0; batch * n * n];
+            for (b, m) in m.chunks_exact_mut(n * n).enumerate() {
+                for i in 0..n {
+                    for j in 0..n {
+                        m[i * n + j] = ((i * j * 7 + (i + j) * 13 + b * 5) % 101) as f64 / 101.0 - 0.5;
+                    }
+                }
+            }
+            let (mut w, mut u) = (vec![0.0; batch * n], m.clone());
+            let (mut faer, mut its) = (w.clone(), m.clone());
+            assert!(split::<f64, LANES>(n, &m, &mut w, &mut u, &mut Buffer::default()));
+            eigh(n, &m, &mut faer, &mut its, &mut Workspace::new()).unwrap();
+            let rounding = 16.0 * n as f64 * f64::EPSILON;
+            for (b, m) in m.chunks_exact(n * n).enumerate() {
+                let (w, u, faer) = (&w[b * n..][..n], &u[b * n * n..][..n * n], &faer[b * n..][..n]);
+                let size = faer[0].abs().max(faer[n - 1].abs());
+                for (k, u) in u.chunks_exact(n).enumerate() {
+                    assert!((w[k] - faer[k]).abs() < rounding * size, "{n}, {k}: {} {}", w[k], faer[k]);
+                    let rest =
+                        m.chunks_exact(n).zip(u).fold(0.0, |m: f64, (row, x)| m.max((dot(row, u) - w[k] * x).abs()));
+                    assert!(rest < rounding * size && (dot(u, u) - 1.0).abs() < rounding, "{n}, {k}: {rest}");
+                }
+            }
+        }
+    }
 }

@@ -1,22 +1,17 @@
-//! Systems too large for lanes: faer's elimination with partial pivoting, one matrix after the other.
+//! Systems too large for lanes: from which sizes the routines of the scalar take one matrix after the other.
 
 use super::Failure;
 use super::batch::{Retry, Workspace};
-use super::solve::{Systems, examine, is_harmless, suspicious};
-use crate::scalar::{Real, Scalar, vectorized};
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::lu::partial_pivoting::{factor, solve};
-use faer::perm::PermRef;
-use faer::traits::RealField;
-use faer::{MatMut, MatRef, Par, Side, Spec};
+use super::solve::{Systems, examine};
+use crate::scalar::Scalar;
 
 /// Sizes from which faer's blocked elimination beats ours on lanes, whose blocks of matrices then leave the nearest cache: for
 /// one right-hand side, and for as many as there are rows.
 const SIZES: (usize, usize) = (47, 40);
 
 impl<S: Scalar> Systems<'_, S> {
-    /// Solves all by faer as [`Systems::solve`] does by lanes, if faer has this scalar and the size is large enough; whether it
-    /// did.
+    /// Solves all by the routine of the scalar, faer's, as [`Systems::solve`] does by lanes, if there is one and the size is large enough; whether
+    /// it did.
     pub(super) fn solve_large(&self, solutions: &mut [S], workspace: &mut Workspace<S>) -> bool {
         if self.n < if self.m == 1 { SIZES.0 } else { SIZES.1 } {
             return false;
@@ -37,174 +32,11 @@ impl<S: Scalar> Systems<'_, S> {
     }
 }
 
-/// Factors of one matrix, and what solving with them needs.
-struct Elimination<F> {
-    n: usize,
-    m: usize,
-    /// `L` and `U` in columns.
-    factors: Vec<F>,
-    order: Vec<usize>,
-    inverse_order: Vec<usize>,
-    memory: MemBuffer,
-}
-
-impl<F: Scalar + RealField> Elimination<F> {
-    fn new(n: usize, m: usize) -> Self {
-        Self {
-            n,
-            m,
-            factors: Vec::new(),
-            order: vec![0; n],
-            inverse_order: vec![0; n],
-            memory: MemBuffer::new(StackReq::any_of(&[
-                factor::lu_in_place_scratch::<usize, F>(n, n, Par::Seq, Spec::default()),
-                solve::solve_in_place_scratch::<usize, F>(n, m, Par::Seq),
-            ])),
-        }
-    }
-
-    /// Factors a symmetric matrix: its rows are its columns.
-    fn factor(&mut self, matrix: &[F]) {
-        self.factors.clear();
-        self.factors.extend_from_slice(matrix);
-        let lu = MatMut::from_column_major_slice_mut(&mut self.factors, self.n, self.n);
-        let stack = MemStack::new(&mut self.memory);
-        factor::lu_in_place(lu, &mut self.order, &mut self.inverse_order, Par::Seq, stack, Spec::default());
-    }
-
-    /// Solves in place for `x`, `(n, m)`.
-    fn solve(&mut self, x: &mut [F]) {
-        let lu = MatRef::from_column_major_slice(&self.factors, self.n, self.n);
-        let order = PermRef::new_checked(&self.order, &self.inverse_order, self.n);
-        let x = MatMut::from_row_major_slice_mut(x, self.n, self.m);
-        solve::solve_in_place(lu, lu, order, x, Par::Seq, MemStack::new(&mut self.memory));
-    }
-
-    /// Smallest pivot and largest element of `U`, absolutely.
-    fn pivots(&self) -> (F, F) {
-        let mut pivots = (F::infinity(), <F as Real>::zero());
-        for (j, column) in self.factors.chunks_exact(self.n).enumerate() {
-            let pivot = Real::abs(column[j]);
-            // NaN counts as the smallest.
-            pivots.0 = if pivot >= pivots.0 { pivots.0 } else { pivot };
-            pivots.1 = largest(pivots.1, &column[..=j]);
-        }
-        pivots
-    }
-}
-
-/// The largest of a bound and absolute elements.
-#[inline(always)]
-fn largest<F: Scalar>(bound: F, x: &[F]) -> F {
-    x.iter().fold(bound, |bound, &x| if Real::abs(x) > bound { Real::abs(x) } else { bound })
-}
-
-/// Solves all systems, each refined once where it is due; returns the rows whose matrices must be examined.
-pub(super) fn eliminate<F: Scalar + RealField>(
-    n: usize,
-    m: usize,
-    matrices: &[F],
-    right: Option<&[F]>,
-    solutions: &mut [F],
-) -> Vec<usize> {
-    let zero = <F as Real>::zero();
-    let mut elimination = Elimination::<F>::new(n, m);
-    let (mut identity, mut x, mut step, mut doubtful) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    if right.is_none() {
-        identity.resize(n * m, zero);
-        identity.iter_mut().step_by(n + 1).for_each(|one| *one = <F as Real>::one());
-    }
-    for (row, (matrix, out)) in matrices.chunks_exact(n * n).zip(solutions.chunks_exact_mut(n * m)).enumerate() {
-        let right = right.map_or(&identity[..], |right| &right[row * n * m..][..n * m]);
-        elimination.factor(matrix);
-        x.clear();
-        x.extend_from_slice(right);
-        elimination.solve(&mut x);
-        let (smallest, growth, size) = vectorized(
-            #[inline(always)]
-            || {
-                let (smallest, growth) = elimination.pivots();
-                (smallest, growth, largest(zero, matrix))
-            },
-        );
-        let harmless = is_harmless(smallest, growth, size);
-        if !harmless {
-            step.clear();
-            step.extend_from_slice(right);
-            residual(m, matrix, &x, &mut step);
-            elimination.solve(&mut step);
-            refine(m, &mut x, &step);
-        }
-        if identity.is_empty() {
-            out.copy_from_slice(&x);
-        } else {
-            for (k, out) in out.iter_mut().enumerate() {
-                *out = (x[k] + x[k % n * n + k / n]) * F::half();
-            }
-        }
-        let finite = out.iter().all(|&x| Scalar::is_finite(x));
-        if !(finite && (harmless || smallest > suspicious::<F>(n) * size)) {
-            doubtful.push(row);
-        }
-    }
-    doubtful
-}
-
-/// Subtracts `A X` from the right-hand sides.
-fn residual<F: Scalar>(m: usize, matrix: &[F], x: &[F], right: &mut [F]) {
-    vectorized(
-        #[inline(always)]
-        || {
-            for (row, right) in matrix.chunks_exact(x.len() / m).zip(right.chunks_exact_mut(m)) {
-                for (&a, x) in row.iter().zip(x.chunks_exact(m)) {
-                    for (right, &x) in right.iter_mut().zip(x) {
-                        *right = (-a).lane_fused(x, *right);
-                    }
-                }
-            }
-        },
-    );
-}
-
-/// Adds the corrections of no more than half the size of their solutions.
-fn refine<F: Scalar>(m: usize, x: &mut [F], step: &[F]) {
-    let column =
-        |x: &[F], c: usize| x.iter().skip(c).step_by(m).fold(<F as Real>::zero(), |size, &x| largest(size, &[x]));
-    for c in 0..m {
-        if column(step, c) <= F::half() * column(x, c) {
-            x.iter_mut().zip(step).skip(c).step_by(m).for_each(|(x, &step)| *x += step);
-        }
-    }
-}
-
 /// Size above which faer's tridiagonal method beats Jacobi on lanes.
 const EIGEN: usize = 32;
 
 /// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix, `NaN` if faer gives up; `false` if the lanes
-/// are faster, or faer does not have this scalar.
+/// are faster, or this scalar has no routine.
 pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) -> bool {
     n > EIGEN && S::eigh(n, matrix, values, vectors)
-}
-
-pub(super) fn decompose<F: Scalar + RealField>(n: usize, matrix: &[F], values: &mut [F], vectors: &mut [F]) {
-    // Row-major and lower triangle: column-major and upper triangle of the same symmetric matrix.
-    let matrix = MatRef::from_column_major_slice(matrix, n, n);
-    if vectors.is_empty() {
-        match matrix.self_adjoint_eigenvalues(Side::Lower) {
-            Ok(found) => values.copy_from_slice(&found),
-            Err(_) => values.fill(<F as Scalar>::nan()),
-        }
-        return;
-    }
-    match matrix.self_adjoint_eigen(Side::Lower) {
-        Ok(found) => {
-            for k in 0..n {
-                values[k] = found.S()[k];
-                for i in 0..n {
-                    vectors[k * n + i] = found.U()[(i, k)];
-                }
-            }
-        }
-        Err(_) => values.fill(<F as Scalar>::nan()),
-    }
 }

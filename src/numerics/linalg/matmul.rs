@@ -1,12 +1,10 @@
 //! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, dot products for a few rows. Other numbers have the loop
-//! of [`Matrices`](crate::scalar::Matrices).
+//! of [`Matrices`](crate::scalar::Matrices); without faer `f32` and `f64` have dot products and that loop.
 //!
 //! Products of a few rows with a transposed matrix, `C = alpha A B^T`, by dot products: the rows of both are contiguous, so that
 //! nothing is packed. A blocked product packs `B^T` whatever the number of rows, which takes longer than to multiply few.
 
-use crate::scalar::{MatMut, MatRef, Scalar, Simd, WithSimd, in_vectors};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Par};
+use crate::scalar::{MatMut, MatRef, Scalar, Simd, WithSimd, in_vectors, product_by_loops, vectorized};
 
 /// `C = alpha A B`, or `C += alpha A B` if `accumulate`; one thread.
 ///
@@ -22,31 +20,27 @@ pub fn gemm<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'
     S::product(c, accumulate, alpha, a, b);
 }
 
-/// The product by faer, or by dot products where that is faster.
-pub(super) fn fast<'a, T: faer::traits::ComplexField + Scalar>(
-    c: MatMut<'a, T>,
-    accumulate: bool,
-    alpha: T,
-    a: MatRef<'a, T>,
-    b: MatRef<'a, T>,
-) {
-    if (c.rows <= FEW_ROWS || c.cols == 1) && b.transposed && !a.transposed {
+/// Whether dot products are faster than a blocked product.
+#[cfg(feature = "faer")]
+pub(super) fn is_small<S>(c: &MatMut<'_, S>, a: &MatRef<'_, S>, b: &MatRef<'_, S>) -> bool {
+    (c.rows <= FEW_ROWS || c.cols == 1) && b.transposed && !a.transposed
+}
+
+/// The product without faer: by dot products where the rows of both are contiguous, by loops otherwise.
+pub(super) fn plain<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, S>, b: MatRef<'_, S>) {
+    if b.transposed && !a.transposed {
         let shape = (c.rows, c.cols, a.cols());
-        let rows = |m: MatRef<'a, T>| Rows { numbers: m.data, stride: m.stride };
-        return SmallBatch { a: rows(a), b: rows(b), c: c.data, stride: c.stride, shape, alpha, accumulate }.run();
+        let [a, b] = [a, b].map(|m| Rows { numbers: m.data, stride: m.stride });
+        return SmallBatch { a, b, c: c.data, stride: c.stride, shape, alpha, accumulate }.run();
     }
-    fn view<'a, T>(m: MatRef<'a, T>) -> faer::MatRef<'a, T> {
-        let view = faer::MatRef::from_row_major_slice_with_stride(m.data, m.rows, m.cols, m.stride);
-        if m.transposed { view.transpose() } else { view }
-    }
-    // Not `from_row_major_slice_with_stride_mut`: faer 0.24.4 swaps its strides and writes past the slice.
-    let target =
-        faer::MatMut::from_column_major_slice_with_stride_mut(c.data, c.cols, c.rows, c.stride).transpose_mut();
-    let accum = if accumulate { Accum::Add } else { Accum::Replace };
-    matmul(target, accum, view(a), view(b), alpha, Par::Seq);
+    vectorized(
+        #[inline(always)]
+        || product_by_loops(c, accumulate, alpha, a, b),
+    );
 }
 
 /// Rows up to which dot products are faster than a blocked product.
+#[cfg(feature = "faer")]
 const FEW_ROWS: usize = 8;
 
 /// Rows of a matrix, `stride` numbers apart.
@@ -206,6 +200,30 @@ mod tests {
                 assert_eq!(product(view.row_range(from, to)), product(view)[from..to]);
             }
         }
+    }
+
+    /// Sizes beyond those that dot products have when there is faer.
+    fn check_plain<S: Scalar>() {
+        for n in [3, 40, 70] {
+            let (m, k) = (n + 1, n + 2);
+            let (a, b) = (numbers::<S>(m * k, 1), numbers::<S>(k * n, 2));
+            for (ta, tb) in [(false, false), (true, false), (false, true), (true, true)] {
+                let va = if ta { MatRef::new(&a, k, m).t() } else { MatRef::new(&a, m, k) };
+                let vb = if tb { MatRef::new(&b, n, k).t() } else { MatRef::new(&b, k, n) };
+                for accumulate in [false, true] {
+                    let (mut c, mut faer) = (numbers::<S>(m * n, 3), numbers::<S>(m * n, 3));
+                    plain(MatMut::new(&mut c, m, n), accumulate, S::of_f64(2.0), va, vb);
+                    gemm(MatMut::new(&mut faer, m, n), accumulate, S::of_f64(2.0), va, vb);
+                    assert!(c == faer, "{} {n} {ta} {tb} {accumulate}", S::NAME);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn products_without_faer_are_those_with_it() {
+        check_plain::<f32>();
+        check_plain::<f64>();
     }
 
     #[test]

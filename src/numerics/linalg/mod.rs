@@ -3,7 +3,7 @@
 //! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of
 //! `LANES` matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
 //! bits wherever it stands in a batch. A [`Workspace`] is reused; nothing else allocates for matrices up to the size
-//! from which faer takes over.
+//! from which faer, with the feature of this name, takes over: 47 for systems of one right-hand side, 40 for inverses, 33 for eigenvalues.
 //!
 //! ```
 //! use lnn::linalg::{LinalgError, Workspace, eigenvalues, solve};
@@ -19,6 +19,8 @@
 //! ```
 
 mod batch;
+#[cfg(feature = "faer")]
+mod by_faer;
 mod compiled;
 mod components;
 mod condition;
@@ -59,6 +61,7 @@ pub(crate) use solve::SMALL_PIVOT;
 pub use solve::inverse;
 pub use solve::{solve, solve_symmetric};
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Sum of products.
@@ -67,7 +70,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Why one matrix of a batch gave no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Failure {
     /// Singular to working precision; the 2-norm condition number is infinite if exactly singular.
     Singular {
@@ -79,11 +83,10 @@ pub enum Failure {
 }
 
 /// Error of a batched operation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LinalgError {
     /// A slice has the wrong length.
-    #[error("{what}: expected {expected} numbers, found {found}")]
     Shape {
         /// Which argument.
         what: &'static str,
@@ -93,7 +96,6 @@ pub enum LinalgError {
         found: usize,
     },
     /// A matrix is singular to working precision.
-    #[error("matrix {row} is singular (condition number {condition:.3e})")]
     Singular {
         /// Row of the batch.
         row: usize,
@@ -101,12 +103,25 @@ pub enum LinalgError {
         condition: f64,
     },
     /// A matrix, a right-hand side or an answer is not finite.
-    #[error("matrix {row} or its answer is not finite")]
     NotFinite {
         /// Row of the batch.
         row: usize,
     },
 }
+
+impl std::fmt::Display for LinalgError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
+            Self::Singular { row, condition } => {
+                write!(f, "matrix {row} is singular (condition number {condition:.3e})")
+            }
+            Self::NotFinite { row } => write!(f, "matrix {row} or its answer is not finite"),
+        }
+    }
+}
+
+impl std::error::Error for LinalgError {}
 
 impl LinalgError {
     /// The error of one row.

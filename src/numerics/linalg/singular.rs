@@ -1,13 +1,11 @@
 //! Singular systems: the solution of least norm, and singular values of tall matrices.
 
 use super::batch::Workspace;
+#[cfg(any(test, not(feature = "faer")))]
+use super::dot;
 use super::eigen::eigh;
 use super::{LinalgError, expect_length};
 use crate::scalar::{Real, Scalar};
-use faer::diag::Diag;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
-use faer::{Mat, MatRef, Par, Spec};
 
 /// Solution of a symmetric system that may be singular, and the numerical rank used.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,8 +89,8 @@ pub(crate) struct Singular {
     pub vectors: Vec<Vec<f64>>,
 }
 
-/// Decomposes a matrix that is given by its columns, at least as many rows as columns; `None` if it is not finite or faer gives
-/// up. Small singular values are exact to roundings of the largest.
+/// Decomposes a matrix that is given by its columns, at least as many rows as columns; `None` if it is not finite or no decomposition
+/// is found. Small singular values are exact to roundings of the largest.
 pub(crate) fn singular(columns: &[Vec<f64>]) -> Option<Singular> {
     let (n, m) = (columns.len(), columns.first().map_or(0, Vec::len));
     if n == 0 {
@@ -102,17 +100,61 @@ pub(crate) fn singular(columns: &[Vec<f64>]) -> Option<Singular> {
     if m < n || all.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let matrix = MatRef::from_column_major_slice(&all, m, n);
-    let (mut values, mut right) = (Diag::<f64>::zeros(n), Mat::<f64>::zeros(n, n));
-    let scratch = svd_scratch::<f64>(m, n, ComputeSvdVectors::No, ComputeSvdVectors::Full, Par::Seq, Spec::default());
-    let mut memory = MemBuffer::new(scratch);
-    let stack = MemStack::new(&mut memory);
-    svd(matrix, values.as_mut(), None, Some(right.as_mut()), Par::Seq, stack, Spec::default()).ok()?;
-    let order = (0..n).rev();
-    Some(Singular {
-        values: order.clone().map(|k| values[k]).collect(),
-        vectors: order.map(|k| (0..n).map(|i| right[(i, k)]).collect()).collect(),
-    })
+    #[cfg(feature = "faer")]
+    return super::by_faer::singular(n, m, &all);
+    #[cfg(not(feature = "faer"))]
+    by_rotations(n, m, &all)
+}
+
+/// More sweeps than any matrix was seen to need.
+#[cfg(any(test, not(feature = "faer")))]
+const SWEEPS: usize = 40;
+
+/// [`singular`] without faer, of `all`, the columns of `n` of `m` numbers one after the other, finite, `m >= n`.
+///
+/// Pairs of columns are rotated by the smaller angle until all are orthogonal (Hestenes 1958): their lengths are the singular values, and the
+/// rotations together the vectors. Columns count as orthogonal up to the rounding of their inner product, or of that of the longest.
+#[cfg(any(test, not(feature = "faer")))]
+fn by_rotations(n: usize, m: usize, all: &[f64]) -> Option<Singular> {
+    let (all, exponent) = near_one(all);
+    let mut columns: Vec<Vec<f64>> = all.chunks_exact(m).map(<[f64]>::to_vec).collect();
+    let mut vectors = vec![vec![0.0; n]; n];
+    (0..n).for_each(|k| vectors[k][k] = 1.0);
+    let rounding = f64::EPSILON * (m as f64).sqrt();
+    let longest = columns.iter().fold(0.0, |longest: f64, x| longest.max(dot(x, x)));
+    for _ in 0..SWEEPS {
+        let mut orthogonal = true;
+        for j in 1..n {
+            for i in 0..j {
+                let (x, y) = (&columns[i], &columns[j]);
+                let (xx, yy, xy) = (dot(x, x), dot(y, y), dot(x, y));
+                if xy.abs() > rounding * (xx * yy).sqrt() && xy.abs() > rounding * rounding * longest {
+                    orthogonal = false;
+                    let ratio = (yy - xx) / (2.0 * xy);
+                    let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
+                    turn(&mut columns, (i, j), tangent);
+                    turn(&mut vectors, (i, j), tangent);
+                }
+            }
+        }
+        if orthogonal {
+            let mut found: Vec<_> = columns.iter().map(|x| dot(x, x).sqrt().ldexp(exponent)).zip(vectors).collect();
+            found.sort_by(|(x, _), (y, _)| x.total_cmp(y));
+            let (values, vectors) = found.into_iter().unzip();
+            return Some(Singular { values, vectors });
+        }
+    }
+    None
+}
+
+/// `(c x - s y, s x + c y)` for two of the vectors, by the tangent of the angle.
+#[cfg(any(test, not(feature = "faer")))]
+fn turn(vectors: &mut [Vec<f64>], (i, j): (usize, usize), tangent: f64) {
+    let cosine = tangent.hypot(1.0).recip();
+    let (head, tail) = vectors.split_at_mut(j);
+    for (x, y) in head[i].iter_mut().zip(&mut tail[0]) {
+        (*x, *y) = (cosine * (*x - tangent * *y), cosine * (*y + tangent * *x));
+    }
 }
 
 #[cfg(test)]
@@ -134,5 +176,39 @@ mod tests {
         assert!((null[0] - null[1]).abs() < 1e-14 && (null[0] + null[2]).abs() < 1e-14, "{null:?}");
         assert!(singular(&[vec![1.0], vec![2.0]]).is_none() && singular(&[vec![f64::NAN]]).is_none());
         assert_eq!(singular(&[]).unwrap().values.len(), 0);
+    }
+
+    #[test]
+    fn rotations_find_what_faer_finds() {
+        for n in [3, 40, 70] {
+            let m = 2 * n + 1;
+            // Columns of lengths from 1 down to 1e-8; the last is the sum of the first two, and in the middle one is nothing.
+            let mut columns: Vec<Vec<f64>> = (0..n)
+                .map(|k| {
+                    let size = 10_f64.powf(-8.0 * k as f64 / n as f64);
+                    (0..m).map(|i| size * ((i * i * 7 + k * 13 + i * k * 5) % 101) as f64 / 101.0).collect()
+                })
+                .collect();
+            columns[n - 1] = columns[0].iter().zip(&columns[1]).map(|(x, y)| x + y).collect();
+            if n > 3 {
+                columns[n / 2].fill(0.0);
+            }
+            let (found, faer) = (by_rotations(n, m, &columns.concat()).unwrap(), singular(&columns).unwrap());
+            let rounding = 4.0 * n as f64 * f64::EPSILON;
+            let largest = faer.values[n - 1];
+            for (k, (value, vector)) in found.values.iter().zip(&found.vectors).enumerate() {
+                assert!((value - faer.values[k]).abs() < rounding * largest, "{n}, {k}: {value} {}", faer.values[k]);
+                let image: Vec<f64> = (0..m).map(|i| (0..n).map(|k| columns[k][i] * vector[k]).sum()).collect();
+                assert!((dot(&image, &image).sqrt() - value).abs() < rounding * largest, "{n}, {k}");
+                for (l, other) in found.vectors.iter().enumerate() {
+                    assert!((dot(vector, other) - f64::from(u8::from(k == l))).abs() < rounding, "{n}, {k} and {l}");
+                }
+            }
+            assert!(found.values[0] < rounding * largest && found.values[n - 1] > 1.0);
+            // Where values are apart, vectors are the same but for the sign.
+            assert!(dot(&found.vectors[n - 1], &faer.vectors[n - 1]).abs() > 1.0 - rounding);
+        }
+        assert_eq!(by_rotations(2, 2, &[0.0; 4]).unwrap().values, [0.0; 2]);
+        assert_eq!(by_rotations(2, 2, &[0.0, 3e300, 4e200, 0.0]).unwrap().values, [4e200, 3e300]);
     }
 }

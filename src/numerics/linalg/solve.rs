@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar, in_lanes};
 
 /// Solves `M_b x_b = r_b` for a batch of square matrices.
 ///
-/// Gaussian elimination with partial pivoting, on lanes or, for large matrices of `f32` and `f64`, faer's; one step of
+/// Gaussian elimination with partial pivoting, on lanes or, for matrices of 47 rows and more of `f32` and `f64` with the feature `faer`, faer's; one step of
 /// iterative refinement where a pivot is small or elements grow. `matrices` is `(batch, n, n)`, `rhs` and `solution` are
 /// `(batch, n)`.
 ///
@@ -355,4 +355,52 @@ pub(super) fn examine<S: Scalar>(
         return Some(Failure::Singular { condition: condition::condition_2(n, matrix, scratch) });
     }
     x.iter().any(|x| !x.is_finite()).then_some(Failure::NotFinite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Systems of one right-hand side and inverses, regular and singular, by lanes and by the choice between lanes and faer.
+    fn lanes_find_what_faer_finds<S: Scalar>() {
+        for n in [3, 40, 70] {
+            let batch = 2 * LANES + 1;
+            let singular = 5;
+            let mut m = vec![<S as Real>::zero(); batch * n * n];
+            for (b, m) in m.chunks_exact_mut(n * n).enumerate() {
+                for i in 0..n {
+                    for j in 0..n {
+                        let x = ((i * j * 7 + (i + j) * 13 + b * 5) % 101) as f64 / 101.0 - 0.5;
+                        m[i * n + j] = S::of_f64(if i == j { x + n as f64 / 4.0 } else { x });
+                    }
+                }
+                if b == singular {
+                    (0..n).for_each(|k| (m[k], m[k * n]) = (<S as Real>::zero(), <S as Real>::zero()));
+                }
+            }
+            let right: Vec<S> = (0..batch * n).map(|k| S::of_f64((k % 17) as f64 - 8.0)).collect();
+            for (columns, right) in [(1, Some(&right[..])), (n, None)] {
+                let systems = Systems { n, m: columns, matrices: &m, right };
+                let (mut x, mut workspace) = (vec![<S as Real>::zero(); batch * n * columns], Workspace::new());
+                let (mut chosen, mut its) = (x.clone(), Workspace::new());
+                systems.split::<LANES>(batch, &mut x, &mut workspace);
+                systems.solve(&mut chosen, &mut its);
+                assert_eq!(workspace.failures(), its.failures());
+                assert_eq!(workspace.failures().iter().map(|f| f.0).collect::<Vec<_>>(), [singular]);
+                let size = |x: &[S]| x.iter().fold(0.0, |m: f64, x| m.max(Real::abs(*x).to_f64()));
+                for (b, (x, chosen)) in x.chunks_exact(n * columns).zip(chosen.chunks_exact(n * columns)).enumerate() {
+                    let difference: Vec<S> = x.iter().zip(chosen).map(|(&x, &y)| x - y).collect();
+                    let bound = 64.0 * n as f64 * S::epsilon().to_f64() * size(x);
+                    assert!(b == singular || size(&difference) <= bound, "{} {n} {columns}, row {b}", S::NAME);
+                    assert!(b != singular || x.iter().all(|x| x.is_nan()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn solutions_without_faer_are_those_with_it() {
+        lanes_find_what_faer_finds::<f32>();
+        lanes_find_what_faer_finds::<f64>();
+    }
 }

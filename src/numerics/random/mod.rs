@@ -11,11 +11,12 @@
 
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Generator of random numbers of one [`RngStream`]: any function over [`rand::Rng`] takes it, its state can be stored.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(transparent))]
 pub struct RandomGenerator(ChaCha8Rng);
 
 impl RngCore for RandomGenerator {

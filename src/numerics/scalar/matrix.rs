@@ -92,34 +92,15 @@ impl<'a, S> MatMut<'a, S> {
 
 /// Products, and solutions of large systems, of one scalar.
 ///
-/// Those of `f32` and `f64` are faer's, in functions that this crate compiles. Code that is generic over the scalar calls them, so that a
-/// crate with a Lagrangian of its own does not compile faer again.
+/// Those of `f32` and `f64` are faer's, where it is a feature, in functions that this crate compiles. Code that is generic over the scalar calls them,
+/// so that a crate with a Lagrangian of its own does not compile faer again.
 pub trait Matrices: Sized {
-    /// `C = alpha A B`, or `C += alpha A B` if `accumulate`; the shapes fit. By loops: row `i` of `C` gathers rows of `B`.
+    /// `C = alpha A B`, or `C += alpha A B` if `accumulate`; the shapes fit.
     fn product(c: MatMut<'_, Self>, accumulate: bool, alpha: Self, a: MatRef<'_, Self>, b: MatRef<'_, Self>)
     where
         Self: Scalar,
     {
-        let at = |m: &MatRef<'_, Self>, i: usize, j: usize| {
-            if m.transposed { m.data[j * m.stride + i] } else { m.data[i * m.stride + j] }
-        };
-        for i in 0..c.rows {
-            let row = &mut c.data[i * c.stride..i * c.stride + c.cols];
-            if !accumulate {
-                row.fill(<Self as Real>::zero());
-            }
-            for k in 0..a.cols() {
-                let factor = alpha * at(&a, i, k);
-                if b.transposed {
-                    for (j, target) in row.iter_mut().enumerate() {
-                        *target += factor * b.data[j * b.stride + k];
-                    }
-                } else {
-                    let source = &b.data[k * b.stride..k * b.stride + b.cols];
-                    update(row, source, |target, value| *target += factor * value);
-                }
-            }
-        }
+        product_by_loops(c, accumulate, alpha, a, b);
     }
 
     /// Solves symmetric systems `A X = B` into `solutions`, `(batch, n, m)`, the identity for `B` if there is no right-hand side; the rows
@@ -138,6 +119,37 @@ pub trait Matrices: Sized {
     /// scalar has no routine.
     fn eigh(_n: usize, _matrix: &[Self], _values: &mut [Self], _vectors: &mut [Self]) -> bool {
         false
+    }
+}
+
+/// `C = alpha A B`, or `C += alpha A B` if `accumulate`; the shapes fit. Row `i` of `C` gathers rows of `B`.
+#[inline(always)]
+pub(crate) fn product_by_loops<S: Scalar>(
+    c: MatMut<'_, S>,
+    accumulate: bool,
+    alpha: S,
+    a: MatRef<'_, S>,
+    b: MatRef<'_, S>,
+) {
+    let at = |m: &MatRef<'_, S>, i: usize, j: usize| {
+        if m.transposed { m.data[j * m.stride + i] } else { m.data[i * m.stride + j] }
+    };
+    for i in 0..c.rows {
+        let row = &mut c.data[i * c.stride..i * c.stride + c.cols];
+        if !accumulate {
+            row.fill(<S as Real>::zero());
+        }
+        for k in 0..a.cols() {
+            let factor = alpha * at(&a, i, k);
+            if b.transposed {
+                for (j, target) in row.iter_mut().enumerate() {
+                    *target += factor * b.data[j * b.stride + k];
+                }
+            } else {
+                let source = &b.data[k * b.stride..k * b.stride + b.cols];
+                update(row, source, |target, value| *target += factor * value);
+            }
+        }
     }
 }
 

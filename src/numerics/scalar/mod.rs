@@ -37,6 +37,7 @@ pub(crate) use loops::{
     Column, Simd, WithSimd, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
 };
 #[doc(hidden)]
+pub(crate) use matrix::product_by_loops;
 pub use matrix::{MatMut, MatRef, Matrices};
 #[doc(hidden)]
 pub use sum::{Dots, Sum};

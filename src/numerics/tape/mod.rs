@@ -69,26 +69,21 @@ use crate::scalar::Real;
 ///
 /// Operators cannot fail, so the first error is kept by the tape, the number becomes `NaN`, and the call that asks
 /// for a result returns the error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TapeError {
     /// An operation joined variables of two tapes.
-    #[error("an operation mixes variables of two tapes")]
     MixedTapes,
     /// A program that is to be replayed read a value while it was recorded.
-    #[error("the recorded program reads a value (a data-dependent branch); express the branch by `select`")]
     DataDependentBranch,
     /// The tape is full.
-    #[error("the tape is full: {limit} nodes")]
     Full {
         /// Nodes it may hold.
         limit: u32,
     },
     /// A result was asked of a tape for a variable that it did not record.
-    #[error("the variable was not recorded on this tape")]
     Foreign,
     /// A slice has the wrong length.
-    #[error("{what}: expected {expected} numbers, found {found}")]
     Shape {
         /// Which argument.
         what: &'static str,
@@ -98,6 +93,22 @@ pub enum TapeError {
         found: usize,
     },
 }
+
+impl std::fmt::Display for TapeError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::MixedTapes => f.write_str("an operation mixes variables of two tapes"),
+            Self::DataDependentBranch => f.write_str(
+                "the recorded program reads a value (a data-dependent branch); express the branch by `select`",
+            ),
+            Self::Full { limit } => write!(f, "the tape is full: {limit} nodes"),
+            Self::Foreign => f.write_str("the variable was not recorded on this tape"),
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
+        }
+    }
+}
+
+impl std::error::Error for TapeError {}
 
 /// `Ok` if a slice has the expected length.
 fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(), TapeError> {

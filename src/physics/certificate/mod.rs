@@ -58,7 +58,6 @@ use search::{Tree, search};
 use spectrum::{Enclose, Source};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// Largest number of coordinates.
 const MOST_COORDINATES: usize = 32;
@@ -159,11 +158,10 @@ impl Certificate {
 }
 
 /// Why there is no certificate.
-#[derive(Clone, Debug, PartialEq, Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CertificateError {
     /// A region with bounds for another number of coordinates.
-    #[error("expected bounds of {expected} {what}, found {found}")]
     Shape {
         /// Coordinates or velocities.
         what: &'static str,
@@ -173,7 +171,6 @@ pub enum CertificateError {
         found: usize,
     },
     /// Bounds that hold no number, or too many.
-    #[error("bounds of {what} {index}: expected two finite numbers in order, found {low} and {high}")]
     Bounds {
         /// Coordinate or velocity.
         what: &'static str,
@@ -185,7 +182,6 @@ pub enum CertificateError {
         high: f64,
     },
     /// A signature of a matrix of another size.
-    #[error("expected a signature of {expected} eigenvalues, found {positive} positive and {negative} negative ones")]
     Signature {
         /// Number of coordinates.
         expected: usize,
@@ -195,15 +191,32 @@ pub enum CertificateError {
         negative: usize,
     },
     /// A condition number that no matrix has, or no number.
-    #[error("expected a condition number of at least 1, found {0}")]
     Condition(f64),
     /// More coordinates than the enclosures are made for.
-    #[error("expected at most {MOST_COORDINATES} coordinates, found {0}")]
     Coordinates(usize),
     /// A system that is not of the catalogue and has no description.
-    #[error("the system has no Lagrangian that can be evaluated")]
     NoLagrangian,
 }
+
+impl std::fmt::Display for CertificateError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Shape { what, expected, found } => write!(f, "expected bounds of {expected} {what}, found {found}"),
+            Self::Bounds { what, index, low, high } => {
+                write!(f, "bounds of {what} {index}: expected two finite numbers in order, found {low} and {high}")
+            }
+            Self::Signature { expected, positive, negative } => write!(
+                f,
+                "expected a signature of {expected} eigenvalues, found {positive} positive and {negative} negative ones"
+            ),
+            Self::Condition(found) => write!(f, "expected a condition number of at least 1, found {found}"),
+            Self::Coordinates(found) => write!(f, "expected at most {MOST_COORDINATES} coordinates, found {found}"),
+            Self::NoLagrangian => f.write_str("the system has no Lagrangian that can be evaluated"),
+        }
+    }
+}
+
+impl std::error::Error for CertificateError {}
 
 /// Searches a region for where the mass matrix of a Lagrangian has its signature.
 ///

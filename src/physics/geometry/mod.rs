@@ -129,23 +129,20 @@ pub fn geometries<S: Scalar>(
 }
 
 /// Why there is no geometry at a point.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum GeometryError {
     /// The metric has no inverse to working precision.
-    #[error("the metric is degenerate (condition number {condition:.3e})")]
     Degenerate {
         /// 2-norm condition number; infinite if exactly singular.
         condition: f64,
     },
     /// The metric, or a derivative of it, is infinite or not a number.
-    #[error("{what} is not finite")]
     NotFinite {
         /// Which quantity.
         what: &'static str,
     },
     /// A slice has the wrong length.
-    #[error("{what}: expected {expected} numbers, found {found}")]
     Shape {
         /// Which argument.
         what: &'static str,
@@ -155,7 +152,6 @@ pub enum GeometryError {
         found: usize,
     },
     /// Curvature of more coordinates than there is room for.
-    #[error("{found} coordinates are too many, at most {most}: curvature has n^4 components")]
     TooMany {
         /// Coordinates of the model.
         found: usize,
@@ -163,8 +159,29 @@ pub enum GeometryError {
         most: usize,
     },
     /// The model refused.
-    #[error(transparent)]
-    Mechanics(#[from] MechanicsError),
+    Mechanics(MechanicsError),
+}
+
+impl std::fmt::Display for GeometryError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Degenerate { condition } => write!(f, "the metric is degenerate (condition number {condition:.3e})"),
+            Self::NotFinite { what } => write!(f, "{what} is not finite"),
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
+            Self::TooMany { found, most } => {
+                write!(f, "{found} coordinates are too many, at most {most}: curvature has n^4 components")
+            }
+            Self::Mechanics(error) => write!(f, "{error}"),
+        }
+    }
+}
+
+impl std::error::Error for GeometryError {}
+
+impl From<MechanicsError> for GeometryError {
+    fn from(error: MechanicsError) -> Self {
+        Self::Mechanics(error)
+    }
 }
 
 /// Refuses a slice of the wrong length.

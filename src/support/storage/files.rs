@@ -6,7 +6,6 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{fs, io};
-use thiserror::Error;
 
 /// Operations of a file system. [`Disk`] is the real one; tests put one that fails in its place.
 pub trait Files: Send + Sync {
@@ -112,17 +111,14 @@ pub(super) fn write_all(files: &dyn Files, file: &mut File, mut bytes: &[u8]) ->
 }
 
 /// Why a file could not be read.
-#[derive(Debug, Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum ReadError {
     /// Nothing there.
-    #[error("no such file")]
     Missing,
     /// A directory, a pipe, a device.
-    #[error("expected a regular file, found {0}")]
     NotRegular(&'static str),
     /// More bytes than the reader takes.
-    #[error("{bytes} bytes are more than the {limit} this reader takes")]
     TooLarge {
         /// Size of the file.
         bytes: u64,
@@ -130,8 +126,33 @@ pub enum ReadError {
         limit: u64,
     },
     /// The system refused.
-    #[error("cannot read: {0}")]
-    Io(#[from] io::Error),
+    Io(io::Error),
+}
+
+impl std::fmt::Display for ReadError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Missing => f.write_str("no such file"),
+            Self::NotRegular(found) => write!(f, "expected a regular file, found {found}"),
+            Self::TooLarge { bytes, limit } => write!(f, "{bytes} bytes are more than the {limit} this reader takes"),
+            Self::Io(error) => write!(f, "cannot read: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for ReadError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Io(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<io::Error> for ReadError {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
 }
 
 /// Opens a regular file of at most `limit` bytes; its size comes second.

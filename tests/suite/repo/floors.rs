@@ -17,11 +17,10 @@ const FLOORS: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates with the only places that name them.
-const ADAPTERS: [(&str, &[&str]); 14] = [
+const ADAPTERS: [(&str, &[&str]); 13] = [
     ("pulp", &["numerics/scalar/"]),
-    ("xprec", &["numerics/scalar/"]),
     ("libm", &["numerics/scalar/"]),
-    ("faer", &["numerics/linalg/"]),
+    ("faer", &["numerics/linalg/by_faer.rs"]),
     ("nalgebra", &["mechanics/rollout/"]),
     ("ode_solvers", &["mechanics/rollout/"]),
     ("argmin", &["learning/training/", "learning/shooting/"]),

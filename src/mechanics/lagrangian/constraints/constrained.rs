@@ -12,14 +12,10 @@ use crate::scalar::{Dd, Real, Scalar};
 const REDUNDANT: f64 = 1e-6;
 
 /// Why constraints leave no motion.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConstraintError {
     /// No state was found that satisfies all of them.
-    #[error("constraint `{name}` {}", match defect.is_finite() {
-        true => format!("contradicts the others: the nearest states miss it by {defect:.3e}"),
-        false => "is not finite at any of the states that were tried".to_string(),
-    })]
     Contradiction {
         /// The constraint that is missed most.
         name: String,
@@ -27,7 +23,6 @@ pub enum ConstraintError {
         defect: f64,
     },
     /// As many independent rows as coordinates.
-    #[error("{independent} independent constraints leave no motion to {coordinates} coordinates, expected fewer")]
     TooMany {
         /// Rows.
         independent: usize,
@@ -35,7 +30,6 @@ pub enum ConstraintError {
         coordinates: usize,
     },
     /// Constraints of another number of coordinates or parameters.
-    #[error("{what}: expected {expected}, found {found}")]
     Shape {
         /// What there is of them.
         what: &'static str,
@@ -45,6 +39,26 @@ pub enum ConstraintError {
         found: usize,
     },
 }
+
+impl std::fmt::Display for ConstraintError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Contradiction { name, defect } if defect.is_finite() => {
+                write!(f, "constraint `{name}` contradicts the others: the nearest states miss it by {defect:.3e}")
+            }
+            Self::Contradiction { name, .. } => {
+                write!(f, "constraint `{name}` is not finite at any of the states that were tried")
+            }
+            Self::TooMany { independent, coordinates } => write!(
+                f,
+                "{independent} independent constraints leave no motion to {coordinates} coordinates, expected fewer"
+            ),
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected}, found {found}"),
+        }
+    }
+}
+
+impl std::error::Error for ConstraintError {}
 
 /// A model under constraints: `M a = g - c + Q + A^T lambda`, `A a = -gamma`, of any Lagrangian, written or learned.
 ///

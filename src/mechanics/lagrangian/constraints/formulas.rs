@@ -17,22 +17,16 @@ pub struct FormulaConstraints {
 }
 
 /// Why formulas do not constrain a model.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum FormulaError {
     /// No formula, or more than are taken.
-    #[error("constraints: expected 1 to {MOST} formulas, found {0}")]
     Number(usize),
     /// The name of a constraint that no message can show.
-    #[error("constraints: expected names of 1 to 100 characters on one line")]
     Name,
     /// A coordinate that no formula can name.
-    #[error(
-        "constraints: the coordinate {0:?} is no name that a formula can have: expected a letter or _, then letters, digits and _"
-    )]
     Coordinate(String),
     /// A mistake in a formula.
-    #[error("constraints.{name}: {error}")]
     Formula {
         /// Name of the constraint.
         name: String,
@@ -40,8 +34,37 @@ pub enum FormulaError {
         error: ExpressionError,
     },
     /// Constraints that contradict each other, or leave no motion.
-    #[error("constraints: {0}")]
-    Constraints(#[from] ConstraintError),
+    Constraints(ConstraintError),
+}
+
+impl std::fmt::Display for FormulaError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(found) => write!(f, "constraints: expected 1 to {MOST} formulas, found {found}"),
+            Self::Name => f.write_str("constraints: expected names of 1 to 100 characters on one line"),
+            Self::Coordinate(name) => write!(
+                f,
+                "constraints: the coordinate {name:?} is no name that a formula can have: expected a letter or _, then letters, digits and _"
+            ),
+            Self::Formula { name, error } => write!(f, "constraints.{name}: {error}"),
+            Self::Constraints(error) => write!(f, "constraints: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for FormulaError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Constraints(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<ConstraintError> for FormulaError {
+    fn from(error: ConstraintError) -> Self {
+        Self::Constraints(error)
+    }
 }
 
 /// A point in space that nothing moves: what constraints are beside before there is a model.

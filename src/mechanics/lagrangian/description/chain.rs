@@ -12,6 +12,7 @@ use super::quantity::Decimal;
 use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
 use crate::lagrangian::system::Range;
 use crate::names::unknown;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -26,29 +27,29 @@ const BOUNDS: (f64, f64) = (1.0, 3.0);
 const ROUNDING: f64 = 1e-15;
 
 /// What a chain of links has in common.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct ChainDescription {
     /// How the rows are meant.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     convention: Convention,
     /// Acceleration of gravity in the frame of the base, in m/s^2; `[0, 0, -9.81]` if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     gravity: Option<Vec<Quantity>>,
     /// Viscous and dry friction of every joint.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     friction: bool,
     /// Speed `s` of dry friction `Fc tanh(q_dot/s)`, in rad/s or m/s; 0.01 if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     coulomb_speed: Option<Quantity>,
     /// Inertia of every drive.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     armature: bool,
 }
 
 /// Where the frame of a link is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 enum Convention {
     /// On the axis of its own joint: `Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d)` (Craig, Khalil).
     #[default]
@@ -58,23 +59,23 @@ enum Convention {
 }
 
 /// A link with the joint that moves it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct LinkDescription {
     /// Length in m.
-    #[serde(default = "nothing")]
+    #[cfg_attr(feature = "serde", serde(default = "nothing"))]
     a: Quantity,
     /// Twist in rad.
-    #[serde(default = "nothing")]
+    #[cfg_attr(feature = "serde", serde(default = "nothing"))]
     alpha: Quantity,
     /// Offset along the joint in m; what a sliding joint adds to.
-    #[serde(default = "nothing")]
+    #[cfg_attr(feature = "serde", serde(default = "nothing"))]
     d: Quantity,
     /// Angle about the joint in rad; what a turning joint adds to.
-    #[serde(default = "nothing")]
+    #[cfg_attr(feature = "serde", serde(default = "nothing"))]
     theta: Quantity,
     /// `true` if the joint slides.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     prismatic: bool,
 }
 

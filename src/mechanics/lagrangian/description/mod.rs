@@ -4,8 +4,11 @@
 //! the header of a model file.
 
 mod chain;
+#[cfg(feature = "serde")]
 pub(crate) mod pair;
 mod quantity;
+#[cfg(feature = "serde")]
+mod read;
 mod system;
 
 use super::ExpressionLagrangian;
@@ -16,106 +19,120 @@ use crate::scalar::Real;
 use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use quantity::{Decimal, Quantity};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Description {
     /// Name: letters, digits, `-` and `_`; none of the catalogue's.
     pub name: String,
     /// Name in titles; the name if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub title: Option<String>,
     /// Unit of the evolution parameter.
-    #[serde(default = "second")]
+    #[cfg_attr(feature = "serde", serde(default = "second"))]
     pub time_unit: String,
     /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub lagrangian: Option<String>,
     /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<String>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
     /// What the links have in common.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     chain: Option<ChainDescription>,
     /// Links of a chain from its base on, each with the joint that moves it, one per coordinate; a Lagrangian and a dissipation function are
     /// added to theirs.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     links: Vec<LinkDescription>,
     /// Constants by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub(crate) parameters: BTreeMap<String, ParameterDescription>,
     /// Names for formulas; they may use each other in any order.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub definitions: BTreeMap<String, String>,
     /// Formulas that vanish, by the names of the constraints: of coordinates, or linear in velocities.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub constraints: BTreeMap<String, String>,
     /// Where constraints of these names stand in the file, if that is known.
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) constraint_lines: ConstraintLines,
     /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub metric: Option<BTreeMap<String, String>>,
     /// Bounds of training states by the names of their columns; the coordinates' own where left out.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
+    )]
     pub training: BTreeMap<String, [Quantity; 2]>,
     /// Bounds of the states on which errors are stated.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
+    )]
     pub validation: BTreeMap<String, [Quantity; 2]>,
     /// Motions on which a model is tried.
-    #[serde(default, skip_serializing_if = "TrajectoryDescription::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "TrajectoryDescription::is_empty"))]
     pub(crate) trajectory: TrajectoryDescription,
     /// Shell in which training states lie, of the metric of a field around a centre; those of the bounds if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub(crate) shell: Option<ShellDescription>,
 }
 
 /// Shell around a centre.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct ShellDescription {
     /// Names of the Cartesian coordinates around the centre.
     pub(crate) coordinates: Vec<String>,
     /// Lowest and highest distance from it.
-    #[serde(deserialize_with = "pair::one")]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "pair::one"))]
     pub radius: [Quantity; 2],
     /// Largest rapidity in a local frame; 1 if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub rapidity: Option<Quantity>,
 }
 
 /// A coordinate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct CoordinateDescription {
     /// Name, also of its column; the velocity's is the name and `_dot`.
     pub name: String,
     /// Unit.
-    #[serde(default = "one")]
+    #[cfg_attr(feature = "serde", serde(default = "one"))]
     pub unit: String,
     /// An angle in radians: adding `2 pi` changes nothing.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     pub periodic: bool,
     /// The coordinate that is a time, in a spacetime.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     pub time_like: bool,
     /// Lowest and highest value of interest; one turn for a periodic coordinate if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")
+    )]
     pub bounds: Option<[Quantity; 2]>,
     /// Lowest and highest velocity of interest; without them the velocity of the time-like coordinate of a metric follows from
     /// `g(v, v) = -1`.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")
+    )]
     pub velocity_bounds: Option<[Quantity; 2]>,
 }
 
 /// A constant: a number, or a table with more about it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize))]
 pub struct ParameterDescription {
     /// Value unless another one is given.
     pub default: Decimal,
@@ -124,22 +141,25 @@ pub struct ParameterDescription {
     /// Allowed values.
     pub range: Range,
     /// `true` if its value is to be found by the training.
-    #[serde(skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "is_false"))]
     pub learn: bool,
 }
 
 /// Motions on which a model is tried.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct TrajectoryDescription {
     /// End of the time span that starts at 0; 10 if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub t_end: Option<Quantity>,
     /// Step of the output; a hundredth of the span if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dt: Option<Quantity>,
     /// Bounds of the starts by columns; the middle half of the validation bounds where left out.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
+    )]
     pub start: BTreeMap<String, [Quantity; 2]>,
 }
 
@@ -206,14 +226,22 @@ impl Description {
 }
 
 /// Mistake in a description.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{problem}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescriptionError {
     /// Path of the key, such as `metric.t,t`.
     pub key: String,
     /// The mistake, with the column for a formula.
     pub problem: String,
 }
+
+impl std::fmt::Display for DescriptionError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { key, problem } = self;
+        if key.is_empty() { f.write_str(problem) } else { write!(f, "{key}: {problem}") }
+    }
+}
+
+impl std::error::Error for DescriptionError {}
 
 impl DescriptionError {
     fn new(key: impl Into<String>, problem: impl std::fmt::Display) -> Self {

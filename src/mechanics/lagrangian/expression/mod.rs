@@ -26,14 +26,22 @@ use std::fmt;
 use std::sync::Arc;
 
 /// A mistake in the text of a formula.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("column {column}: {problem}")]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExpressionError {
     /// Character of the text where it is, from 1.
     pub column: usize,
     /// The mistake, and what was expected.
     pub problem: String,
 }
+
+impl fmt::Display for ExpressionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { column, problem } = self;
+        write!(f, "column {column}: {problem}")
+    }
+}
+
+impl std::error::Error for ExpressionError {}
 
 impl ExpressionError {
     pub(in crate::mechanics::lagrangian) fn new(column: usize, problem: impl Into<String>) -> Self {

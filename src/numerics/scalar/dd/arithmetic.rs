@@ -1,4 +1,5 @@
-//! The operators: the arithmetic of `xprec`, completed at infinities and at the ends of the range; the traits of `num-traits` that make sense for a number of the library.
+//! The operators: the arithmetic of pairs of M. Joldes, J.-M. Muller and V. Popescu (ACM Trans. Math. Softw. 44, 2018), completed at infinities and at
+//! the ends of the range; the traits of `num-traits` that make sense for a number of the library.
 
 use super::Dd;
 use super::elementary::LN_2;
@@ -6,24 +7,68 @@ use super::trigonometry::HALF_PI;
 use crate::scalar::Scalar;
 use num_traits::{FloatConst, FromPrimitive, Num, NumCast, One, ToPrimitive, Zero};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Rem, RemAssign, Sub, SubAssign};
-use xprec::{CompensatedArithmetic, Df64};
+
+/// Pairs as the algorithms make them, not a number at infinities and at the ends of the range.
+impl Dd {
+    /// The exact sum of two `f64`, the first not the smaller (Algorithm 1).
+    #[inline(always)]
+    fn fast_sum(a: f64, b: f64) -> Self {
+        let high = a + b;
+        Self { high, low: b - (high - a) }
+    }
+    /// The exact sum of two `f64` (Algorithm 2).
+    #[inline(always)]
+    fn exact_sum(a: f64, b: f64) -> Self {
+        let high = a + b;
+        let first = high - b;
+        let second = high - first;
+        Self { high, low: (a - first) + (b - second) }
+    }
+    /// The same number with its leading part rounded to nearest.
+    #[inline(always)]
+    fn normal(self) -> Self {
+        Self::fast_sum(self.high, self.low)
+    }
+    /// The sum (Algorithm 6: error below `3 u^2 + 13 u^3`).
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        let (high, low) = (Self::exact_sum(self.high, other.high), Self::exact_sum(self.low, other.low));
+        let sum = Self::fast_sum(high.high, high.low + low.high);
+        Self::fast_sum(sum.high, low.low + sum.low)
+    }
+    /// The sum with an `f64` (Algorithm 4: error below `2 u^2`).
+    #[inline(always)]
+    fn plus_leading(self, other: f64) -> Self {
+        let sum = Self::exact_sum(self.high, other);
+        Self::fast_sum(sum.high, self.low + sum.low)
+    }
+    /// The product (Algorithm 12: error below `4 u^2`).
+    #[inline(always)]
+    fn times(self, other: Self) -> Self {
+        let high = self.high * other.high;
+        let rest = self.high.mul_add(other.high, -high);
+        let cross = self.low.mul_add(other.high, self.high.mul_add(other.low, self.low * other.low));
+        Self::fast_sum(high, rest + cross)
+    }
+    /// The product with an `f64` (Algorithm 9: error below `2 u^2`).
+    #[inline(always)]
+    fn times_leading(self, other: f64) -> Self {
+        let high = self.high * other;
+        let rest = self.high.mul_add(other, -high);
+        Self::fast_sum(high, self.low.mul_add(other, rest))
+    }
+}
 
 impl Dd {
-    /// Into the crate that does the arithmetic.
+    /// A pair that an algorithm made; `plain` is the answer of `f64` where that has none.
     #[inline(always)]
-    fn df(self) -> Df64 {
-        Df64::compensated_fast_sum(self.high, self.low)
-    }
-    /// Out of the crate that does the arithmetic; `plain` is the answer of `f64` where that one has none.
-    #[inline(always)]
-    fn finite_or(value: Df64, plain: f64) -> Self {
-        let (high, low) = (value.hi(), value.lo());
-        if high.is_finite() && low.is_finite() { Self { high, low } } else { Self::leading(plain) }
+    fn finite_or(self, plain: f64) -> Self {
+        if self.high.is_finite() && self.low.is_finite() { self } else { Self::leading(plain) }
     }
     /// The exact sum of two `f64`.
     #[inline]
     pub(super) fn sum(a: f64, b: f64) -> Self {
-        Self::finite_or(Df64::compensated_sum(a, b), a + b)
+        Self::exact_sum(a, b).finite_or(a + b)
     }
     /// The exact product of two `f64`, barring underflow.
     #[inline]
@@ -37,7 +82,7 @@ impl Dd {
     pub(super) fn over(self, divisor: f64) -> Self {
         let first = self.high / divisor;
         let rest = (-first).mul_add(divisor, self.high) + self.low;
-        Self::finite_or(Df64::compensated_fast_sum(first, rest / divisor), first)
+        Self::fast_sum(first, rest / divisor).finite_or(first)
     }
 }
 
@@ -52,21 +97,21 @@ impl Add for Dd {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
-        Self::finite_or(self.df() + other.df(), self.high + other.high)
+        self.normal().plus(other.normal()).finite_or(self.high + other.high)
     }
 }
 impl Sub for Dd {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
-        Self::finite_or(self.df() - other.df(), self.high - other.high)
+        self.normal().plus(-other.normal()).finite_or(self.high - other.high)
     }
 }
 impl Mul for Dd {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
-        Self::finite_or(self.df() * other.df(), self.high * other.high)
+        self.normal().times(other.normal()).finite_or(self.high * other.high)
     }
 }
 impl Div for Dd {
@@ -78,12 +123,12 @@ impl Div for Dd {
         if !first.is_finite() || first == 0.0 || !other.high.is_finite() {
             return Self::leading(first);
         }
-        let divisor = other.df();
-        let rest = self.df() - divisor * first;
-        let second = rest.hi() / other.high;
-        let rest = rest - divisor * second;
-        let third = rest.hi() / other.high;
-        Self::finite_or(Df64::compensated_fast_sum(first, second) + third, first)
+        let divisor = other.normal();
+        let rest = self.normal().plus(-divisor.times_leading(first));
+        let second = rest.high / other.high;
+        let rest = rest.plus(-divisor.times_leading(second));
+        let third = rest.high / other.high;
+        Self::fast_sum(first, second).plus_leading(third).finite_or(first)
     }
 }
 impl Rem for Dd {
@@ -143,9 +188,16 @@ impl Num for Dd {
 }
 
 /// A text that is no decimal number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("not a decimal number")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnreadableNumber;
+
+impl std::fmt::Display for UnreadableNumber {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("not a decimal number")
+    }
+}
+
+impl std::error::Error for UnreadableNumber {}
 
 impl std::str::FromStr for Dd {
     type Err = UnreadableNumber;

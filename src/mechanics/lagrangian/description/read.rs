@@ -1,0 +1,109 @@
+//! Numbers of a description as a file has them.
+
+use super::ParameterDescription;
+use super::quantity::{Decimal, Quantity};
+use crate::lagrangian::expression::{Compiler, Expression};
+use crate::lagrangian::system::Range;
+use serde::Deserialize;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserializer, Error, MapAccess, Visitor};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// A number or a text, as text.
+struct Written(&'static str);
+
+impl Visitor<'_> for Written {
+    type Value = String;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0)
+    }
+    fn visit_f64<E: Error>(self, value: f64) -> Result<String, E> {
+        // Text that reads back to the same number, without an exponent's sign that the grammar lacks.
+        Ok(value.to_string())
+    }
+    fn visit_i64<E: Error>(self, value: i64) -> Result<String, E> {
+        Ok(value.to_string())
+    }
+    fn visit_u64<E: Error>(self, value: u64) -> Result<String, E> {
+        Ok(value.to_string())
+    }
+    fn visit_str<E: Error>(self, value: &str) -> Result<String, E> {
+        Ok(value.to_string())
+    }
+}
+
+impl<'de> Deserialize<'de> for Quantity {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = deserializer.deserialize_any(Written("a number or a formula of numbers such as \"2*pi\""))?;
+        let evaluated = || {
+            let expression: Expression = text.parse()?;
+            let mut compiler = Compiler::default();
+            let value = compiler.add(&expression, &BTreeMap::new(), true)?;
+            Ok(compiler.formula(value).evaluate::<f64>(&[], &[], &[]))
+        };
+        match text.parse() {
+            Ok(number) => Ok(Self(number)),
+            Err(_) => {
+                evaluated().map(Self).map_err(|error: crate::lagrangian::ExpressionError| D::Error::custom(error))
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Decimal {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Written("a number, or a decimal number as text")).map(Self)
+    }
+}
+
+/// The table of a parameter.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ParameterTable {
+    default: Decimal,
+    #[serde(default = "super::one")]
+    unit: String,
+    #[serde(default)]
+    range: Range,
+    #[serde(default)]
+    learn: bool,
+}
+
+struct NumberOrTable;
+
+impl<'de> Visitor<'de> for NumberOrTable {
+    type Value = ParameterDescription;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, or a table { default, unit, range, learn }")
+    }
+    fn visit_f64<E: Error>(self, value: f64) -> Result<ParameterDescription, E> {
+        Ok(alone(value.to_string()))
+    }
+    fn visit_i64<E: Error>(self, value: i64) -> Result<ParameterDescription, E> {
+        Ok(alone(value.to_string()))
+    }
+    fn visit_u64<E: Error>(self, value: u64) -> Result<ParameterDescription, E> {
+        Ok(alone(value.to_string()))
+    }
+    fn visit_str<E: Error>(self, value: &str) -> Result<ParameterDescription, E> {
+        Ok(alone(value.to_string()))
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ParameterDescription, A::Error> {
+        let ParameterTable { default, unit, range, learn } =
+            ParameterTable::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(ParameterDescription { default, unit, range, learn })
+    }
+}
+
+fn alone(default: String) -> ParameterDescription {
+    ParameterDescription { default: Decimal(default), unit: super::one(), range: Range::Any, learn: false }
+}
+
+impl<'de> Deserialize<'de> for ParameterDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NumberOrTable)
+    }
+}
