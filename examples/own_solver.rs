@@ -22,9 +22,9 @@ impl Lagrangian for CartAndPendulum {
     }
 }
 
-struct Motion<'a>(&'a RightHandSide<'a, f64>);
+struct Motion<'r, 'a>(&'r RightHandSide<'a, f64>);
 
-impl System<f64, SVector<f64, 4>> for Motion<'_> {
+impl System<f64, SVector<f64, 4>> for Motion<'_, '_> {
     fn system(&self, _t: f64, x: &SVector<f64, 4>, dx: &mut SVector<f64, 4>) {
         self.0.evaluate(x.as_slice(), dx.as_mut_slice());
     }

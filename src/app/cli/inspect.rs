@@ -58,8 +58,9 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
     /// One JSON object per line, or text. csv is for --inverse: the external forces, after the time if there is a column t.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
-    format: Format,
+    /// [default: json, and text for --structure]
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    format: Option<Format>,
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
@@ -81,15 +82,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let Some(file) = &args.states else { return structure(args, &source) };
+    let format = args.format.unwrap_or(Format::Json);
     if args.inverse {
-        return inverse(file, args.format, &source);
+        return inverse(file, format, &source);
     }
-    if args.format == Format::Csv {
+    if format == Format::Csv {
         return Err(CliError::usage("--format csv: expected --inverse beside it; use json or table"));
     }
     let place = input::name(file);
-    let bytes =
-        input::read(file, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
+    let bytes = input::read(file, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
     let states: States<S> =
         parse_states(&bytes, &source.columns).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
     drop(bytes);
@@ -124,7 +125,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
             let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
             let mut fields = fields(n, k, &terms, &spectrum, &held[k], factor.as_ref());
             fields.extend(slopes.iter().flat_map(|slopes| slopes[k].fields()));
-            text += &show(args.format, row, &fields, problem.as_deref());
+            text += &show(format, row, &fields, problem.as_deref());
             failures.extend(problem.map(|text| (row, text)));
         }
         output::print(&text)?;
@@ -136,10 +137,11 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
 fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError> {
     let pattern = source.model.pattern();
     let pattern = pattern.ok_or_else(|| CliError::data("--structure: the Lagrangian is too large to be recorded"))?;
-    if args.format == Format::Table {
-        return output::print(&pattern.to_string());
+    if args.format == Some(Format::Json) || args.json {
+        let text = serde_json::to_string(&pattern).map_err(|error| CliError::data(error))?;
+        return output::print(&format!("{text}\n"));
     }
-    output::print(&format!("{}\n", pattern.to_json()))
+    output::print(&pattern.to_string())
 }
 
 /// A model with its Lagrangian.

@@ -4,7 +4,9 @@ use super::derivatives::{StateTerms, evaluate};
 use super::linearization::{ProgramSlopes, SlopePrograms};
 use super::programs::program_of_terms;
 use super::taylor::Taylor;
-use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Pattern, Request, Slopes, Solved, Terms, metric_jets};
+use super::{
+    EulerLagrange, Lagrangian, MechanicsError, MetricJet, Pattern, Request, Slopes, Solved, Terms, metric_jets,
+};
 use crate::linalg::Workspace;
 use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError};

@@ -3,10 +3,13 @@
 use crate::linalg::components;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Directions, Program, ROWS, TANGENTS, Tracer};
+#[cfg(feature = "serde")]
+use serde::Serialize;
 use std::fmt;
 
 /// What is known of an element before any state is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize), serde(rename_all = "lowercase"))]
 pub enum Element {
     /// The same at all states.
     Constant,
@@ -16,6 +19,7 @@ pub enum Element {
 
 /// The second derivatives of a Lagrangian that are not zero everywhere, known from its recording alone: rows, columns and what they are.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize))]
 pub struct Pattern {
     /// Number of coordinates `n`.
     pub coordinates: usize,
@@ -86,11 +90,8 @@ const PICTURE: usize = 64;
 impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let n = self.coordinates;
-        let matrices = [
-            ("M = d2L/dv dv", &self.mass_matrix),
-            ("d2L/dv dq", &self.mixed),
-            ("d2L/dq dq", &self.stiffness),
-        ];
+        let matrices =
+            [("M = d2L/dv dv", &self.mass_matrix), ("d2L/dv dq", &self.mixed), ("d2L/dq dq", &self.stiffness)];
         let cell = n.div_ceil(PICTURE).max(1);
         for (name, elements) in matrices {
             let constant = elements.iter().filter(|(.., element)| *element == Element::Constant).count();
@@ -133,8 +134,7 @@ mod tests {
         }
         fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
             let springs = q[..3].windows(2).fold(R::zero(), |sum, q| sum + (q[1] - q[0]).powi(4));
-            p[0] * v[0].sqr() * (R::one() + q[0].sqr()) + v[1].sqr() + v[2].sqr() + p[0] * v[1] * v[2]
-                - springs
+            p[0] * v[0].sqr() * (R::one() + q[0].sqr()) + v[1].sqr() + v[2].sqr() + p[0] * v[1] * v[2] - springs
                 + v[3].sqr()
                 + q[3].sqr() * p[0]
         }

@@ -169,9 +169,12 @@ impl<S: Scalar> NetworkLagrangian<S> {
 
     fn of_valid(architecture: Architecture, weights: Vec<S>) -> Self {
         let (model, idle) = (architecture.model(), Mutex::new(Vec::new()));
-        let code =
-            Code { terms: Self::evaluate_terms, metric_jets: Self::evaluate_metric_jets, slopes: Self::new_slopes,
-            pattern: Self::find_pattern };
+        let code = Code {
+            terms: Self::evaluate_terms,
+            metric_jets: Self::evaluate_metric_jets,
+            slopes: Self::new_slopes,
+            pattern: Self::find_pattern,
+        };
         Self { architecture, weights, model, idle, code }
     }
 

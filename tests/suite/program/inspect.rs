@@ -127,6 +127,24 @@ fn linearizations_are_slopes_of_the_accelerations() {
 }
 
 #[test]
+fn the_structure_of_a_lagrangian_is_a_picture() {
+    let picture = lnn(&["inspect", "--system", "henon-heiles", "--structure"]);
+    assert_eq!(picture.code, Some(0));
+    assert!(picture.stdout.contains("  =.\n  .=\n") && picture.stdout.contains("1 group "), "{}", picture.stdout);
+    let object = lnn(&["inspect", "--system", "kepler", "--structure", "--json"]);
+    let object: Value = serde_json::from_str(&object.stdout).unwrap();
+    assert_eq!(
+        (object["mass_matrix"][1][2].as_str(), object["mixed"].as_array().unwrap().len()),
+        (Some("constant"), 0)
+    );
+    assert_eq!(object["stiffness"][0][2], "varying");
+    // A network is as full as its form says.
+    let full = lnn(&["inspect", "--model", "examples/data/double_pendulum.safetensors", "--structure"]);
+    assert!(full.stdout.contains("M = d2L/dv dv: 4 of 4 elements"), "{}", full.stdout);
+    assert_eq!(lnn(&["inspect", "--system", "kepler"]).code, Some(2));
+}
+
+#[test]
 fn canonical_forms_agree_at_the_base_state() {
     let folder = Folder::new();
     let states = folder.file("s.csv", format!("{HEADER}0.3,0.2,1,-1\n0.7,-1.2,0.5,2\n"));
