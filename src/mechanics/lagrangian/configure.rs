@@ -396,10 +396,11 @@ fn assemble<S: Scalar>(
     };
     let coordinates = match system.size {
         Size::Fixed(n) => n,
-        Size::Chosen { symbol, default, least, most } => match size(symbol) {
-            None => default,
+        Size::Chosen { symbol, least, most, .. } => match size(symbol) {
+            None => system.size.default(),
             Some((found, text)) => found
                 .filter(|n| (least..=most).contains(n))
+                .map(|n| system.size.coordinates(n))
                 .ok_or_else(|| refused(symbol, format!("an integer from {least} to {most}"), text))?,
         },
     };
@@ -555,7 +556,7 @@ mod tests {
                 matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol, .. } if symbol == "m1")
             );
         }
-        for bad in ["0", "21", "-1", "2.5", "18446744073709551616"] {
+        for bad in ["0", "1001", "-1", "2.5", "18446744073709551616"] {
             assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
         }
         assert!(matches!(

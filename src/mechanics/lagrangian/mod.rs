@@ -65,7 +65,7 @@ pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
 pub use mechanics::Mechanics;
-pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
+pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
 #[doc(hidden)]
