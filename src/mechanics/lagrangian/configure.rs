@@ -7,7 +7,7 @@ use super::system::{Range, Size, System};
 use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, construct_once, visit_lagrangian};
 use super::{
     Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
-    Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_descriptions,
+    Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_description, constrained_descriptions,
 };
 use crate::linalg::Workspace;
 use crate::names::unknown;
@@ -119,10 +119,12 @@ pub fn find(name: &str) -> Result<&'static System, SystemError> {
 /// # Errors
 /// As [`find`].
 pub(crate) fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
-    let constrained = || constrained_descriptions().find(|description| description.name == name)?.compile().ok();
     match find(name) {
         Ok(system) => Ok(Cow::Borrowed(system)),
-        Err(unknown) => constrained().map(Cow::Owned).ok_or(unknown),
+        Err(unknown) => {
+            let constrained = constrained_description(name).and_then(|description| description.compile().ok());
+            constrained.map(Cow::Owned).ok_or(unknown)
+        }
     }
 }
 
@@ -153,6 +155,9 @@ impl<S: Scalar> SystemInstance<S> {
             problem: error.to_string(),
         };
         let model = Constrained::new(model, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
+        if self.system.described.as_ref().is_some_and(|described| described.independent) {
+            return Ok(Box::new(model));
+        }
         let (q, v) = self.anywhere();
         Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
     }

@@ -73,7 +73,7 @@ pub use wrappers::Interruptible;
 pub use wrappers::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
 
 use crate::scalar::Real;
-use constrained_systems::constrained_descriptions;
+use constrained_systems::{constrained_description, constrained_descriptions};
 
 /// A Lagrangian `L(q, v; parameters)` written once over [`Real`].
 ///
