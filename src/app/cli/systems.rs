@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 pub fn parameters(system: &System) -> Vec<[String; 4]> {
     let row = |p: &Parameter| [p.symbol.as_ref(), &p.default, &p.unit, p.range.text()].map(String::from);
     let mut rows: Vec<_> = system.parameters.iter().map(row).collect();
-    if let Size::Chosen { symbol, default, least, most } = system.size {
+    if let Size::Chosen { symbol, default, least, most, .. } = system.size {
         let range = format!("an integer from {least} to {most}");
         rows.push([symbol.to_string(), default.to_string(), "1".to_string(), range]);
     }

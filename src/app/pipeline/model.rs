@@ -37,8 +37,8 @@ pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
 pub(crate) fn all_parameters(system: &SystemInstance<f64>) -> BTreeMap<String, f64> {
     let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
     let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
-    if let Size::Chosen { symbol, .. } = system.system.size {
-        parameters.insert(symbol.to_string(), system.coordinates as f64);
+    if let Size::Chosen { symbol, layout, .. } = system.system.size {
+        parameters.insert(symbol.to_string(), layout.chosen(system.coordinates) as f64);
     }
     parameters
 }

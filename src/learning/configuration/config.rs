@@ -4,7 +4,7 @@ use crate::configuration::error::{ConfigError, Faults, place};
 use crate::configuration::penalty::Regularizer;
 use crate::configuration::table::{Below, Key, Ranges as _, count, from_zero, table};
 use crate::lagrangian::{Description, SystemInstance, pair};
-use crate::network::file::MAX_WIDTH;
+use crate::network::file::{MAX_COORDINATES, MAX_WIDTH};
 use crate::network::{ActivationChoice, Factor, Form, Initialization, InputLayer, JointFriction, Radial, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
@@ -468,6 +468,8 @@ impl Config {
     /// What several keys decide together.
     fn common_faults(&self, n: usize, drawn: bool, faults: &mut Faults) {
         let (data, network) = (&self.data, &self.network);
+        let most = format!("a system of at most {MAX_COORDINATES} coordinates, as a model has");
+        faults.check(n <= MAX_COORDINATES, "system", most, format!("{n} coordinates"));
         match data.shell() {
             Ok(Some(Shell { radius: [low, high], .. })) => {
                 let ok = low > 0.0 && low < high && high.is_finite();

@@ -7,7 +7,7 @@ use super::system::{Range, Size, System};
 use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, construct_once, visit_lagrangian};
 use super::{
     Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
-    Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_descriptions,
+    Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_description, constrained_descriptions,
 };
 use crate::linalg::Workspace;
 use crate::names::unknown;
@@ -136,10 +136,12 @@ pub fn find(name: &str) -> Result<&'static System, SystemError> {
 /// # Errors
 /// As [`find`].
 pub(crate) fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
-    let constrained = || constrained_descriptions().find(|description| description.name == name)?.compile().ok();
     match find(name) {
         Ok(system) => Ok(Cow::Borrowed(system)),
-        Err(unknown) => constrained().map(Cow::Owned).ok_or(unknown),
+        Err(unknown) => {
+            let constrained = constrained_description(name).and_then(|description| description.compile().ok());
+            constrained.map(Cow::Owned).ok_or(unknown)
+        }
     }
 }
 
@@ -172,6 +174,9 @@ impl<S: Scalar> SystemInstance<S> {
         };
         let model = Constrained::new(model, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
         let model = model.with_parameters_of_model();
+        if self.system.described.as_ref().is_some_and(|described| described.independent) {
+            return Ok(Box::new(model));
+        }
         let (q, v) = self.anywhere();
         Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
     }
@@ -421,10 +426,11 @@ fn assemble<S: Scalar>(
     };
     let coordinates = match system.size {
         Size::Fixed(n) => n,
-        Size::Chosen { symbol, default, least, most } => match size(symbol) {
-            None => default,
+        Size::Chosen { symbol, least, most, .. } => match size(symbol) {
+            None => system.size.default(),
             Some((found, text)) => found
                 .filter(|n| (least..=most).contains(n))
+                .map(|n| system.size.coordinates(n))
                 .ok_or_else(|| refused(symbol, format!("an integer from {least} to {most}"), text))?,
         },
     };
@@ -580,7 +586,7 @@ mod tests {
                 matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol, .. } if symbol == "m1")
             );
         }
-        for bad in ["0", "21", "-1", "2.5", "18446744073709551616"] {
+        for bad in ["0", "1001", "-1", "2.5", "18446744073709551616"] {
             assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
         }
         assert!(matches!(

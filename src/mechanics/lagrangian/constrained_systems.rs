@@ -7,10 +7,22 @@ use super::system::System;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Most bobs of a chain.
-const MOST_BOBS: usize = 20;
+/// Bobs of the longest chain that is listed, and of the longest one there is.
+const LISTED_BOBS: usize = 20;
+const MOST_BOBS: usize = 500;
+/// Name of a chain, before the number of its bobs.
+const CHAIN: &str = "cartesian-chain-";
 
-/// What the systems are.
+/// What the system of a name is; chains that are too long for the list have names as well.
+pub(super) fn constrained_description(name: &str) -> Option<Description> {
+    let bobs = name.strip_prefix(CHAIN).and_then(|bobs| bobs.parse().ok());
+    match bobs.filter(|bobs| (1..=MOST_BOBS).contains(bobs)).map(chain) {
+        Some(chain) => Some(chain).filter(|chain| chain.name == name),
+        None => constrained_descriptions().find(|description| description.name == name),
+    }
+}
+
+/// What the listed systems are.
 pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     let single = [
         on_surface("particle-on-sphere", "Heavy particle on a sphere", &["R"], "x^2 + y^2 + z^2 - R^2", 1.0),
@@ -53,10 +65,10 @@ pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
             "(L/z)^2*(-t_dot^2 + x_dot^2 + y_dot^2 + z_dot^2)",
         ),
     ];
-    single.into_iter().chain((1..=MOST_BOBS).map(chain))
+    single.into_iter().chain((1..=LISTED_BOBS).map(chain))
 }
 
-/// The systems under constraints, made anew.
+/// The listed systems under constraints, made anew.
 pub fn constrained_systems() -> Vec<System> {
     // Formulas of this file, which a test compiles.
     constrained_descriptions().filter_map(|description| description.compile().ok()).collect()
@@ -140,11 +152,11 @@ fn chain(bobs: usize) -> Description {
         1 => "x1^2 + y1^2 - l^2".to_string(),
         _ => format!("(x{k} - x{})^2 + (y{k} - y{})^2 - l^2", k - 1, k - 1),
     };
-    let rods = (1..=bobs).map(|k| (format!("rod {k:02}"), rod(k))).collect();
+    let digits = bobs.to_string().len().max(2);
+    let rods = (1..=bobs).map(|k| (format!("rod {k:0digits$}"), rod(k))).collect();
     let parameters = [("l", "1", "m"), ("m", "1", "kg"), ("g", "9.81", "m/s^2")];
-    let text = |text: &str| text.replace('#', &bobs.to_string());
     described(
-        (&text("cartesian-chain-#"), &text("Chain of # pendula in Cartesian coordinates"), "s"),
+        (&format!("{CHAIN}{bobs}"), &format!("Chain of {bobs} pendula in Cartesian coordinates"), "s"),
         format!("m*({kinetic})/2 - m*g*({heights})"),
         &coordinates,
         &parameters,
@@ -236,4 +248,41 @@ fn by_clock(name: &str, title: &str, space: &[Bounded<'_>], length: &str, metric
     let coordinates: Vec<_> = [("t", (0.0, 10.0), (0.9, 1.1))].into_iter().chain(space.iter().copied()).collect();
     let lagrangian = format!("-sqrt(-({metric}))");
     described((name, title, "m"), lagrangian, &coordinates, &[(length, "1", "m")], one("clock", "t_dot - 1"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{Accelerations, configure, configure_system};
+    use std::borrow::Cow;
+
+    #[test]
+    fn constraints_of_the_catalogue_are_independent() {
+        for description in constrained_descriptions() {
+            // As a description of a file they are examined.
+            let system = description.system().unwrap();
+            let model = configure_system::<f64>(Cow::Owned(system), &[]).unwrap().build().unwrap();
+            let manifold = model.manifold().unwrap();
+            assert!(manifold.redundant().is_empty() && manifold.names().len() < model.coordinates());
+        }
+    }
+
+    #[test]
+    fn long_chains_hang_still_and_fall_freely_where_nothing_pulls() {
+        for bobs in [1, 20, 21, 150, MOST_BOBS] {
+            let system = configure::<f64>(&format!("{CHAIN}{bobs}"), &[]).unwrap();
+            let (model, n) = (system.build().unwrap(), 2 * bobs);
+            let at = |x: f64, y: f64| -> Vec<f64> { (1..=bobs).flat_map(|k| [x * k as f64, y * k as f64]).collect() };
+            let mut accelerations = Accelerations::new(model.as_ref());
+            let mut a = vec![1.0; n];
+            accelerations.at(&at(0.0, -1.0), &vec![0.0; n], &mut a).unwrap();
+            assert!(a.iter().all(|a| a.abs() < 1e-9), "{bobs}");
+            // Level rods carry nothing: every bob falls freely.
+            accelerations.at(&at(1.0, 0.0), &vec![0.0; n], &mut a).unwrap();
+            assert!(a.chunks_exact(2).all(|a| a[0].abs() < 1e-9 && (a[1] + 9.81).abs() < 1e-9), "{bobs}");
+        }
+        for name in ["cartesian-chain-0", "cartesian-chain-501", "cartesian-chain-01", "cartesian-chain-+1"] {
+            assert!(configure::<f64>(name, &[]).is_err(), "{name}");
+        }
+    }
 }

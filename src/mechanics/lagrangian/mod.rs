@@ -75,7 +75,7 @@ pub use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;
 pub use pattern::{Element, Pattern};
 pub use right_hand_side::RightHandSide;
-pub use system::{Bounds, ClosedForm, Coordinate, Parameter, Range, Size, System};
+pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
 #[doc(hidden)]
@@ -83,7 +83,7 @@ pub use wrappers::Interruptible;
 pub use wrappers::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
 
 use crate::scalar::Real;
-use constrained_systems::constrained_descriptions;
+use constrained_systems::{constrained_description, constrained_descriptions};
 
 /// A Lagrangian `L(q, v; parameters)` written once over [`Real`].
 ///

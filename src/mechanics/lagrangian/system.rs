@@ -68,7 +68,35 @@ pub enum Size {
         least: usize,
         /// Largest value.
         most: usize,
+        /// What stands at so many places.
+        layout: Layout,
     },
+}
+
+/// How many coordinates a chosen integer gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// A line: as many.
+    Line,
+    /// A square net of points in space, the integer along each side: three times its square.
+    Net,
+}
+
+impl Layout {
+    /// Coordinates of the chosen integer.
+    const fn coordinates(self, chosen: usize) -> usize {
+        match self {
+            Self::Line => chosen,
+            Self::Net => 3 * chosen * chosen,
+        }
+    }
+    /// The integer that gives so many coordinates.
+    pub(crate) const fn chosen(self, coordinates: usize) -> usize {
+        match self {
+            Self::Line => coordinates,
+            Self::Net => (coordinates / 3).isqrt(),
+        }
+    }
 }
 
 impl Size {
@@ -77,7 +105,15 @@ impl Size {
     pub const fn default(self) -> usize {
         match self {
             Self::Fixed(n) => n,
-            Self::Chosen { default, .. } => default,
+            Self::Chosen { default, layout, .. } => layout.coordinates(default),
+        }
+    }
+    /// The number of coordinates if this integer, which is within the bounds, is chosen.
+    #[doc(hidden)]
+    pub const fn coordinates(self, chosen: usize) -> usize {
+        match self {
+            Self::Fixed(n) => n,
+            Self::Chosen { layout, .. } => layout.coordinates(chosen),
         }
     }
 }

@@ -377,6 +377,11 @@ fn sizes_are_refused_before_anything_is_allocated() {
         within(1 << 20, &arguments).refused(2, &["n-pendulum", "an integer from"]);
         within(1 << 20, &["train", "n-pendulum", "--param", &n, "--out", &out]).refused(2, &["an integer from"]);
     }
+    for (system, n) in [("n-pendulum", "n=1000"), ("lattice", "n=257"), ("cloth", "n=18")] {
+        let found = within(1 << 20, &["train", system, "--param", n, "--out", &out]);
+        found.refused(2, &["at most 256 coordinates"]);
+    }
+    within(1 << 20, &["train", "cartesian-chain-500", "--out", &out]).refused(2, &["at most 256 coordinates"]);
     assert_eq!(folder.names(), ["m", "s.csv"]);
 }
 

@@ -27,6 +27,8 @@ fn systems_are_listed() {
         "harmonic-oscillator",
         "kepler",
         "henon-heiles",
+        "lattice",
+        "cloth",
         "charged-particle",
         "ads2-geodesic",
         "ads3-geodesic",

@@ -275,6 +275,8 @@ pub struct Described {
     pub dissipation: Option<ExpressionLagrangian>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
+    /// `true` if these are known to be independent: nothing has to be examined.
+    pub independent: bool,
     /// The velocity of the time-like coordinate on the mass shell.
     shell: Option<Formula>,
     /// Where training states lie, if not within their bounds.

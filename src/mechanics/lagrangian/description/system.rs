@@ -6,7 +6,7 @@ use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_nam
 use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
-use crate::lagrangian::{ExpressionLagrangian, constrained_descriptions, systems};
+use crate::lagrangian::{ExpressionLagrangian, constrained_description, systems};
 use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Most coordinates of a system.
+/// Most coordinates of a system in a file.
 const MAX_COORDINATES: usize = 64;
 /// Most parameters, most definitions, and most constraints.
 const MAX_NAMES: usize = 256;
@@ -32,29 +32,31 @@ impl Description {
     /// The first key that is wrong, and how.
     #[doc(hidden)]
     pub fn system(&self) -> Outcome<System> {
-        let taken = constrained_descriptions().find(|description| description.name == self.name);
+        let taken = constrained_description(&self.name);
         if systems().iter().any(|system| system.name == self.name)
             || taken.is_some_and(|description| description != *self)
         {
             let problem = format!("{} is a system of the catalogue, expected another name", self.name);
             return Err(DescriptionError::new("name", problem));
         }
-        self.compile()
+        self.unfolded()?.compile_plain(self, false)
     }
 
-    /// Compiles the description without a look at its name.
+    /// Compiles a description of the catalogue, which may be larger than one of a file and has constraints that are independent.
     ///
     /// # Errors
     /// The first key that is wrong, and how.
     pub(in crate::mechanics::lagrangian) fn compile(&self) -> Outcome<System> {
-        let plain = self.unfolded()?;
-        let written = (plain != *self).then(|| self.clone());
-        plain.compile_plain(written)
+        self.unfolded()?.compile_plain(self, true)
     }
 
-    /// Compiles a description without links, which may have been `written` with some.
-    fn compile_plain(self, written: Option<Self>) -> Outcome<System> {
+    /// Compiles a description without links, which may be `written` with some; it is of the catalogue or of a file.
+    fn compile_plain(self, written: &Self, catalogued: bool) -> Outcome<System> {
+        let written = (self != *written).then(|| written.clone());
         self.check_texts()?;
+        if !catalogued {
+            self.check_counts()?;
+        }
         let n = self.coordinates.len();
         let mut compiler = Compiler::default();
         let mut scope = self.scope()?;
@@ -107,6 +109,7 @@ impl Description {
                 dissipation: dissipation
                     .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),
                 constraints,
+                independent: catalogued,
                 shell: shell.map(|shell| compiler.formula(shell)),
                 around_centre,
             })),
@@ -130,6 +133,11 @@ impl Description {
                 return Err(DescriptionError::new(key, "expected 1 to 100 characters on one line"));
             }
         }
+        Ok(())
+    }
+
+    /// How much there may be in a file.
+    fn check_counts(&self) -> Outcome<()> {
         let n = self.coordinates.len();
         if n == 0 || n > MAX_COORDINATES {
             let problem = format!("expected 1 to {MAX_COORDINATES} tables [[coordinates]], found {n}");

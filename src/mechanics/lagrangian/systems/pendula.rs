@@ -1,14 +1,14 @@
 //! Pendula: point masses on massless rods, two, three or any number, angles from the downward vertical; a point mass on a
 //! spring that swings in a plane.
 //!
-//! In a chain of pendula, rod `i` of length `l_i` carries the load `mu_i = m_i + m_(i+1) + ..`. Angles enter through their differences first,
-//! so that a common turn costs no accuracy.
+//! In a chain of pendula, rod `i` of length `l_i` carries the load `mu_i = m_i + m_(i+1) + ..`. Angles of two and three pendula, and those of
+//! closed forms, enter through their differences first, so that a common turn costs no accuracy.
 
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, ClosedForm, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Range, Size,
-    StateAdvice, System, TrajectoryTest,
+    Bounds, ClosedForm, Coordinate, Layout, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Range,
+    Size, StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -162,6 +162,9 @@ impl ClosedForm for TriplePendulum {
 }
 
 /// `n` equal masses `m` on rods of equal length `l`: rod `i` carries `(n - i) m`, `i` from 0.
+///
+/// `L = m l^2 sum_i (n - i) v_i (v_i / 2 + x_i cos q_i + y_i sin q_i) + m g l sum_i (n - i) cos q_i` with the velocity of the bob before in
+/// rods per time, the running sums `x_i = sum_(j<i) v_j cos q_j` and `y_i = sum_(j<i) v_j sin q_j`: operations grow with `n`.
 #[derive(Clone, Copy, Debug)]
 pub struct NPendulum {
     /// Number of pendula.
@@ -176,7 +179,7 @@ pub const N_PENDULUM: System = System {
     title: Cow::Borrowed("Chain of n equal pendula"),
     coordinates: PerSize::Rule(angles),
     parameters: Cow::Borrowed(&OF_N_PENDULUM),
-    size: Size::Chosen { symbol: "n", default: 4, least: 1, most: 20 },
+    size: Size::Chosen { symbol: "n", default: 4, least: 1, most: 1000, layout: Layout::Line },
     time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
@@ -215,10 +218,15 @@ impl Lagrangian for NPendulum {
     }
     #[inline]
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let Some((loads, lengths, g)) = self.loads(parameters) else {
-            return R::constant(crate::scalar::Scalar::nan());
-        };
-        chain_lagrangian(&loads, &lengths, g, q, v)
+        let [m, l, g] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
+        let (mut x, mut y, mut squares, mut height) = (R::zero(), R::zero(), R::zero(), R::zero());
+        for (i, (&q, &v)) in q.iter().zip(v).enumerate() {
+            let (carried, (sin, cos)) = (R::of((self.n - i) as f64), q.sin_cos());
+            squares += carried * v * (R::half() * v + x * cos + y * sin);
+            height += carried * cos;
+            (x, y) = (x + v * cos, y + v * sin);
+        }
+        m * l * (l * squares + g * height)
     }
 }
 

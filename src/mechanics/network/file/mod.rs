@@ -191,7 +191,7 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
 pub const FORMAT: u32 = 1;
 
 /// Most coordinates of a model: the memory of an evaluation grows with their square, that of a file does not.
-const MAX_COORDINATES: usize = 256;
+pub(crate) const MAX_COORDINATES: usize = 256;
 
 /// Largest width of a hidden layer.
 pub(crate) const MAX_WIDTH: usize = 1 << 16;
