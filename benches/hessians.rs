@@ -6,7 +6,7 @@
 //! functions.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
-use lnn::lagrangian::{Accelerations, EulerLagrange, Lagrangian, Mechanics, Request, Terms};
+use lnn::lagrangian::{Accelerations, EulerLagrange, Lagrangian, Linearizer, Mechanics, Request, Terms};
 use lnn::scalar::Real;
 use lnn::tape::{Function, ScalarFunction, hessian};
 use std::hint::black_box;
@@ -164,21 +164,51 @@ fn lagrangians(c: &mut Criterion) {
 fn count(name: &str, n: usize, times: usize) {
     let x = numbers(2 * n);
     let (q, v) = x.split_at(n);
-    let model: Box<dyn EulerLagrange<f64>> = match name {
-        "chain" => Box::new(Mechanics::new(Chain(n), [])),
-        "lattice" => Box::new(Mechanics::new(Lattice(n), [])),
-        _ => {
-            let mut function = Function::<f64>::record(n, |x| Rosenbrock.eval(x)).expect("no branches");
-            let (mut value, mut gradient, mut dense) = ([0.0], vec![0.0; n], vec![0.0; n * n]);
-            for _ in 0..times {
-                function.hessians(black_box(q), &mut value, &mut gradient, &mut dense).expect("a program");
-            }
-            return;
-        }
-    };
+    let recorded = || Function::<f64>::record(n, |x| Rosenbrock.eval(x)).expect("no branches");
+    let chain = Mechanics::<_, f64>::new(Chain(n), []);
     let mut terms = Terms::default();
-    for _ in 0..times {
-        model.terms(black_box(q), v, Request::ACCELERATION, &mut terms).expect("regular mass matrices");
+    let repeat = |f: &mut dyn FnMut()| (0..times).for_each(|_| f());
+    let regular = "regular mass matrices";
+    match name {
+        "chain" => repeat(&mut || chain.terms(black_box(q), v, Request::ACCELERATION, &mut terms).expect(regular)),
+        "lattice" => {
+            let lattice = Mechanics::<_, f64>::new(Lattice(n), []);
+            repeat(&mut || lattice.terms(black_box(q), v, Request::ACCELERATION, &mut terms).expect(regular));
+        }
+        "handle" => {
+            let (mut handle, mut a) = (Accelerations::new(&chain), vec![0.0; n]);
+            repeat(&mut || handle.at(black_box(q), v, &mut a).expect(regular));
+        }
+        "linearization" => {
+            let mut linearizer = Linearizer::new(&chain);
+            repeat(&mut || {
+                black_box(linearizer.at(black_box(q), v).expect(regular));
+            });
+        }
+        "gradient" => {
+            let mut linearizer = Linearizer::new(&chain);
+            repeat(&mut || {
+                black_box(linearizer.gradient(black_box(q), v, q).expect(regular));
+            });
+        }
+        "batch" => {
+            let arm = lnn::lagrangian::build::<f64>("double-pendulum", &[]).expect("of the catalogue");
+            let request = Request::MASS_MATRIX | Request::CORIOLIS;
+            repeat(&mut || arm.terms(black_box(q), v, request, &mut terms).expect(regular));
+        }
+        "pattern" => {
+            let mut function = recorded();
+            let mut entries = vec![0.0; function.pattern().expect("a program").len()];
+            let (mut value, mut gradient) = ([0.0], vec![0.0; n]);
+            repeat(&mut || {
+                function.sparse_hessians(black_box(q), &mut value, &mut gradient, &mut entries).expect("a program");
+            });
+        }
+        _ => {
+            let mut function = recorded();
+            let (mut value, mut gradient, mut dense) = ([0.0], vec![0.0; n], vec![0.0; n * n]);
+            repeat(&mut || function.hessians(black_box(q), &mut value, &mut gradient, &mut dense).expect("a program"));
+        }
     }
 }
 
@@ -190,7 +220,11 @@ fn main() {
         let number = |k: usize| arguments.get(at + k).and_then(|text| text.parse().ok());
         match (arguments.get(at + 1), number(2), number(3)) {
             (Some(name), Some(n), Some(times)) => return count(name, n, times),
-            _ => return eprintln!("--count chain|lattice|rosenbrock COORDINATES TIMES"),
+            _ => {
+                return eprintln!(
+                    "--count chain|lattice|handle|linearization|gradient|batch|pattern|rosenbrock NUMBERS TIMES"
+                );
+            }
         }
     }
     hessian_benches();
