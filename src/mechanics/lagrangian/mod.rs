@@ -17,12 +17,14 @@ mod expression;
 mod groups;
 mod mechanics;
 mod programs;
+mod recursion;
 #[doc(hidden)]
 pub mod system;
 #[doc(hidden)]
 pub mod systems;
 mod taylor;
 mod terms;
+mod torques;
 mod wrappers;
 
 pub use accelerations::Accelerations;
@@ -65,9 +67,12 @@ pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
 pub use mechanics::Mechanics;
+#[doc(hidden)]
+pub use recursion::Chain;
 pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
+pub use torques::Torques;
 #[doc(hidden)]
 pub use wrappers::Interruptible;
 pub use wrappers::{Dissipation, GeneralizedForce, Rayleigh, WithForces};

@@ -1,9 +1,9 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
-use super::Solved;
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
 use super::error::MechanicsError;
+use super::{Chain, Solved};
 use crate::scalar::{Dd, Scalar};
 use crate::tape::Depth;
 use std::ops::BitOr;
@@ -259,6 +259,12 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         None
     }
 
+    /// The chain of links that it is, whose recursions give what [`Torques`](super::Torques) asks for; `None` of any other model.
+    #[doc(hidden)]
+    fn links(&self) -> Option<&Chain<S>> {
+        None
+    }
+
     /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {
         self.inner().is_some_and(|inner| inner.prefers_batches())
@@ -278,6 +284,10 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
         (**self).solved()
     }
 
+    fn links(&self) -> Option<&Chain<S>> {
+        (**self).links()
+    }
+
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         Some(&**self)
     }
@@ -294,6 +304,10 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 
     fn solved(&self) -> Option<Solved<S>> {
         (**self).solved()
+    }
+
+    fn links(&self) -> Option<&Chain<S>> {
+        (**self).links()
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
