@@ -30,6 +30,7 @@
 //! | store and load models | [`network::ModelFile`] |
 //! | differentiate your own function | [`tape::Function`], recorded once; [`tape::gradient`], [`tape::hessian`] of one point |
 //! | call accelerations from your own solver, of few or many coordinates | [`lagrangian::Accelerations`] |
+//! | call the torques of an arm from your own controller | [`lagrangian::Torques`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |

@@ -47,14 +47,22 @@ impl<S: Scalar> Solved<'static, S> {
             outputs.extend(guards.into_iter().flatten());
             Some(outputs)
         });
-        let program = Arc::new(program.ok()?);
-        Some(Self { program, parameters: parameters.to_vec(), pivots, flag: None })
+        Some(Self::of(program.ok()?, parameters.to_vec(), pivots))
+    }
+
+    /// A program of accelerations with so many pairs of an element and a pivot behind them, and the values of its parameters.
+    pub(super) fn of(program: Program<S>, parameters: Vec<S>, pivots: usize) -> Self {
+        Self { program: Arc::new(program), parameters, pivots, flag: None }
     }
 }
 
 /// Solves with the lower triangle of a symmetric matrix in at most so many products: the solution, and every pivot behind the element of the
 /// diagonal that it was.
-fn eliminate<R: Real>(lower: Vec<Vec<(usize, R)>>, mut right: Vec<R>, most: usize) -> Option<(Vec<R>, Vec<[R; 2]>)> {
+pub(super) fn eliminate<R: Real>(
+    lower: Vec<Vec<(usize, R)>>,
+    mut right: Vec<R>,
+    most: usize,
+) -> Option<(Vec<R>, Vec<[R; 2]>)> {
     let n = lower.len();
     let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
     let diagonal: Vec<R> = lower.iter().enumerate().map(own).collect::<Option<_>>()?;

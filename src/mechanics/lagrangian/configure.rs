@@ -3,8 +3,9 @@
 
 use super::derivatives::{StateTerms, evaluate};
 use super::equations::Friction;
+use super::recursion::Recursive;
 use super::system::{Range, Size, System};
-use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, construct_once, visit_lagrangian};
+use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, unconstrained, visit_lagrangian};
 use super::{
     Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
     Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_description, constrained_descriptions,
@@ -152,12 +153,21 @@ impl<S: Scalar> SystemInstance<S> {
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
     /// [`Dd`](crate::scalar::Dd).
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
-        self.constrain(match self.friction() {
+        self.constrain(unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?)
+    }
+    /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.
+    pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {
+        let model = match self.friction() {
             None => free,
             Some((friction, false)) => Box::new(WithForces::new(free, friction)),
             Some((friction, true)) => Box::new(WithForces::vanishing(free, friction)),
-        })
+        };
+        let chain = self.system.described.as_ref().and_then(|described| described.chain.as_ref());
+        // The rows of a chain are numbers of double precision.
+        match chain.filter(|_| S::epsilon().to_f64() >= f64::EPSILON) {
+            Some(shape) => Box::new(Recursive::new(model, shape, &self.parameters)),
+            None => model,
+        }
     }
     /// A model of the same coordinates, learned for instance, under the constraints of the system; without any, as it is.
     ///

@@ -2,6 +2,7 @@
 
 use super::constraints::{Motion, accelerate, along_rows, dot, length};
 use super::error::not_finite;
+use super::torques::recursive_forces;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar, update};
@@ -293,8 +294,11 @@ pub(crate) fn force_parts_by_rows<S: Scalar>(
 ) -> Result<(ForceParts<S>, Vec<MechanicsError>), MechanicsError> {
     let still = vec![<S as Real>::zero(); v.len()];
     let (moving, failures) = inverse_dynamics_by_rows(model, q, v, a)?;
-    let coasting = all_forces(model, q, v, &still)?.0;
-    let gravity = all_forces(model, q, &still, &still)?.0;
+    let generalized = |v: &[S]| match recursive_forces(model, [q, v, &still]) {
+        Some(found) => Ok(found.generalized),
+        None => Ok(all_forces(model, q, v, &still)?.0),
+    };
+    let (coasting, gravity) = (generalized(v)?, generalized(&still)?);
     let less = |from: &[S], what: &[S]| from.iter().zip(what).map(|(&from, &what)| from - what).collect::<Vec<S>>();
     let (inertial, coriolis) = (less(&moving.generalized, &coasting), less(&coasting, &gravity));
     Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
@@ -310,6 +314,9 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
     v: &[S],
     a: &[S],
 ) -> Result<(InverseDynamics<S>, Vec<MechanicsError>), MechanicsError> {
+    if let Some(found) = recursive_forces(model, [q, v, a]) {
+        return Ok((found, Vec::new()));
+    }
     let n = model.coordinates();
     let (mut generalized, mut terms) = all_forces(model, q, v, a)?;
     let held = Held::of(n, &terms, (&generalized, a));

@@ -19,6 +19,7 @@ mod linearization;
 mod mechanics;
 mod pattern;
 mod programs;
+mod recursion;
 mod right_hand_side;
 #[doc(hidden)]
 pub mod system;
@@ -26,6 +27,7 @@ pub mod system;
 pub mod systems;
 mod taylor;
 mod terms;
+mod torques;
 mod wrappers;
 
 pub use accelerations::Accelerations;
@@ -74,10 +76,13 @@ pub use linearization::{Gradient, Linearization, Linearizer};
 pub use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;
 pub use pattern::{Element, Pattern};
+#[doc(hidden)]
+pub use recursion::Chain;
 pub use right_hand_side::RightHandSide;
 pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
+pub use torques::Torques;
 #[doc(hidden)]
 pub use wrappers::Interruptible;
 pub use wrappers::{Dissipation, GeneralizedForce, Rayleigh, WithForces};

@@ -3,7 +3,7 @@
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
 use super::error::MechanicsError;
-use super::{Pattern, RightHandSide, Slopes, Solved};
+use super::{Chain, Pattern, RightHandSide, Slopes, Solved};
 use crate::scalar::{Dd, Scalar};
 use crate::tape::Depth;
 use std::ops::BitOr;
@@ -279,6 +279,12 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         None
     }
 
+    /// The chain of links that it is, whose recursions give what [`Torques`](super::Torques) asks for; `None` of any other model.
+    #[doc(hidden)]
+    fn links(&self) -> Option<&Chain<S>> {
+        None
+    }
+
     /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {
         self.inner().is_some_and(|inner| inner.prefers_batches())
@@ -302,6 +308,10 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
         (**self).slopes()
     }
 
+    fn links(&self) -> Option<&Chain<S>> {
+        (**self).links()
+    }
+
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         Some(&**self)
     }
@@ -322,6 +332,10 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
         (**self).slopes()
+    }
+
+    fn links(&self) -> Option<&Chain<S>> {
+        (**self).links()
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

@@ -10,10 +10,12 @@
 
 use super::quantity::Decimal;
 use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
+use crate::lagrangian::recursion::{Row, Shape};
 use crate::lagrangian::system::Range;
 use crate::names::unknown;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// Most links.
@@ -146,6 +148,44 @@ pub(crate) fn loss_symbols(link: usize) -> [String; 3] {
 }
 
 impl Description {
+    /// The chain of its links if there is nothing beside them; constants stand where their names do in `parameters`.
+    pub(super) fn shape(&self, parameters: &BTreeMap<String, ParameterDescription>) -> Option<Shape> {
+        let beside = [&self.lagrangian, &self.dissipation].into_iter().flatten().next().is_some();
+        if self.links.is_empty() || beside || !self.constraints.is_empty() {
+            return None;
+        }
+        let chain = self.chain.clone().unwrap_or_default();
+        let place = |name: &String| parameters.keys().position(|known| known == name);
+        let row = |(k, link): (usize, &LinkDescription)| {
+            let [armature, viscous, dry] = loss_symbols(k + 1);
+            let ([a, alpha], [m, hx, hy, hz, rest @ ..]) =
+                (self.before(k), inertia_symbols(k + 1).each_ref().map(place));
+            Some(Row {
+                a,
+                twist: sine_cosine(alpha),
+                d: link.d.0,
+                theta: link.theta.0,
+                slides: link.prismatic,
+                inertia: [m?, hx?, hy?, hz?, rest[0]?, rest[1]?, rest[2]?, rest[3]?, rest[4]?, rest[5]?],
+                armature: if chain.armature { Some(place(&armature)?) } else { None },
+                friction: if chain.friction { Some([place(&viscous)?, place(&dry)?]) } else { None },
+            })
+        };
+        let rows = self.links.iter().enumerate().map(row).collect::<Option<_>>()?;
+        let gravity = chain.gravity.and_then(|given| given.iter().map(|x| x.0).collect::<Vec<_>>().try_into().ok());
+        let coulomb_speed = chain.coulomb_speed.map_or(COULOMB_SPEED, |speed| speed.0);
+        Some(Shape { rows, gravity: gravity.unwrap_or(GRAVITY), coulomb_speed })
+    }
+
+    /// Length and twist before the joint of a link: the standard row ends where the modified row of the next joint begins.
+    fn before(&self, k: usize) -> [f64; 2] {
+        let of = |link: &LinkDescription| [link.a.0, link.alpha.0];
+        match self.chain.as_ref().map_or(Convention::Modified, |chain| chain.convention) {
+            Convention::Modified => of(&self.links[k]),
+            Convention::Standard => k.checked_sub(1).map_or([0.0; 2], |k| of(&self.links[k])),
+        }
+    }
+
     /// The same with links written out; as it is if they are wrong, which its compilation says.
     pub(crate) fn plain(&self) -> Self {
         self.unfolded().unwrap_or_else(|_| self.clone())
@@ -195,19 +235,12 @@ impl Description {
             height: Term::number(0.0),
         };
         for (k, link) in self.links.iter().enumerate() {
-            // The standard row ends where the modified row of the next joint begins.
-            let before = match chain.convention {
-                Convention::Modified => [link.a.0, link.alpha.0],
-                Convention::Standard => {
-                    k.checked_sub(1).map_or([0.0; 2], |k| [self.links[k].a.0, self.links[k].alpha.0])
-                }
-            };
             for (key, x) in [("a", link.a.0), ("alpha", link.alpha.0), ("d", link.d.0), ("theta", link.theta.0)] {
                 if !x.is_finite() {
                     return fault(&format!("links[{k}].{key}"), format!("expected a finite number, found {x}"));
                 }
             }
-            sums.push(Term::name(plain.add_link((k + 1, link, before), &mut base, chain.armature)?));
+            sums.push(Term::name(plain.add_link((k + 1, link, self.before(k)), &mut base, chain.armature)?));
             if chain.friction {
                 losses.extend(plain.add_friction((k + 1, link), speed)?);
             }

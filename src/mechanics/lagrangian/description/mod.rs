@@ -14,6 +14,7 @@ mod system;
 use super::ExpressionLagrangian;
 use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
+use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
 use crate::scalar::Real;
 use chain::{ChainDescription, LinkDescription};
@@ -22,6 +23,7 @@ use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
 #[derive(Clone, Debug, PartialEq)]
@@ -277,6 +279,8 @@ pub struct Described {
     pub constraints: Option<ExpressionConstraints>,
     /// `true` if these are known to be independent: nothing has to be examined.
     pub independent: bool,
+    /// The links, if it has nothing else.
+    pub(super) chain: Option<Arc<Shape>>,
     /// The velocity of the time-like coordinate on the mass shell.
     shell: Option<Formula>,
     /// Where training states lie, if not within their bounds.

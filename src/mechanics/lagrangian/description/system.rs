@@ -52,6 +52,7 @@ impl Description {
 
     /// Compiles a description without links, which may be `written` with some; it is of the catalogue or of a file.
     fn compile_plain(self, written: &Self, catalogued: bool) -> Outcome<System> {
+        let chain = written.shape(&self.parameters).map(Arc::new);
         let written = (self != *written).then(|| written.clone());
         self.check_texts()?;
         if !catalogued {
@@ -110,6 +111,7 @@ impl Description {
                     .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),
                 constraints,
                 independent: catalogued,
+                chain,
                 shell: shell.map(|shell| compiler.formula(shell)),
                 around_centre,
             })),

@@ -108,17 +108,17 @@ catalogue! {
     kerr_schild::KERR_CARTESIAN: |_| KerrSchild::Kerr;
 }
 
-/// [`construct`], compiled in this crate once for each of its scalars instead of again in every crate that calls it: all
+/// [`construct`] with friction, compiled in this crate once for each of its scalars instead of again in every crate that calls it: all
 /// systems under all forward numbers are much code.
-pub(super) fn construct_once<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+pub(super) fn unconstrained<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
     fn single(configured: &SystemInstance<f32>) -> Option<Box<dyn EulerLagrange<f32>>> {
-        construct(configured)
+        Some(configured.with_friction(construct(configured)?))
     }
     fn double(configured: &SystemInstance<f64>) -> Option<Box<dyn EulerLagrange<f64>>> {
-        construct(configured)
+        Some(configured.with_friction(construct(configured)?))
     }
     fn double_double(configured: &SystemInstance<Dd>) -> Option<Box<dyn EulerLagrange<Dd>>> {
-        construct(configured)
+        Some(configured.with_friction(construct(configured)?))
     }
     let configured: &dyn Any = configured;
     let built: Box<dyn Any> = if let Some(configured) = configured.downcast_ref() {

@@ -1,0 +1,81 @@
+//! A chain of links as a model: terms by its Lagrangian, accelerations and forces of single states by recursion.
+
+use super::{Chain, Shape};
+use crate::lagrangian::accelerations::eliminate;
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Solved, Terms};
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Program, ROWS, Tracer};
+use std::sync::{Arc, OnceLock};
+
+/// The model of a chain of links with its recursions.
+pub(in crate::mechanics::lagrangian) struct Recursive<S> {
+    model: Box<dyn EulerLagrange<S>>,
+    chain: Chain<S>,
+    shape: Arc<Shape>,
+    parameters: Vec<S>,
+    /// The program of the accelerations, recorded on first use.
+    solved: OnceLock<Option<Solved<'static, S>>>,
+}
+
+impl<S: Scalar> Recursive<S> {
+    /// The model of a Lagrangian and a friction that are those of a chain.
+    pub(in crate::mechanics::lagrangian) fn new(
+        model: Box<dyn EulerLagrange<S>>,
+        shape: &Arc<Shape>,
+        parameters: &[S],
+    ) -> Self {
+        let chain = Chain::new(shape, parameters);
+        Self { model, chain, shape: Arc::clone(shape), parameters: parameters.to_vec(), solved: OnceLock::new() }
+    }
+
+    /// Records the accelerations: the mass matrix is eliminated in the program. What the constants leave out is not computed.
+    fn solve(&self) -> Option<Solved<'static, S>> {
+        let (n, mut pivots) = (self.shape.rows.len(), 0);
+        let program = Program::record_within(ROWS, (2 * n, 0), |x, _| {
+            let constants: Vec<_> = self.parameters.iter().map(|&value| Tracer::constant(value)).collect();
+            let (chain, (q, v)) = (Chain::new(&self.shape, &constants), x.split_at(n));
+            let (still, mut force) = (vec![Tracer::zero(); n], vec![Tracer::zero(); n]);
+            chain.inverse_dynamics([q, v, &still], &mut Vec::new(), &mut force);
+            for (k, force) in force.iter_mut().enumerate() {
+                *force = chain.friction(k, v[k]) - *force;
+            }
+            let rows = chain.mass_matrix(q).into_iter().enumerate().map(sparse).collect();
+            let (mut outputs, guards) = eliminate(rows, force, usize::MAX)?;
+            pivots = guards.len();
+            outputs.extend(guards.into_iter().flatten());
+            Some(outputs)
+        });
+        Some(Solved::of(program.ok()?, Vec::new(), pivots))
+    }
+}
+
+/// A row of a lower triangle with the columns of what is not zero, and of its diagonal.
+fn sparse<R: Real>((k, row): (usize, Vec<R>)) -> Vec<(usize, R)> {
+    row.into_iter().enumerate().filter(|(j, m)| *j == k || !m.is_exact_zero()).collect()
+}
+
+impl<S: Scalar> EulerLagrange<S> for Recursive<S> {
+    fn coordinates(&self) -> usize {
+        self.model.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        self.model.terms(q, v, request, terms)
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.model)
+    }
+
+    fn solved(&self) -> Option<Solved<'_, S>> {
+        self.solved.get_or_init(|| self.solve()).clone()
+    }
+
+    fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
+        self.model.slopes()
+    }
+
+    fn links(&self) -> Option<&Chain<S>> {
+        Some(&self.chain)
+    }
+}

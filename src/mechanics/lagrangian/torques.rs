@@ -1,0 +1,89 @@
+//! Forces that make a motion by the recursion of a chain of links, and a handle for those of one state after the other.
+
+use super::recursion::Passes;
+use super::{EulerLagrange, InverseDynamics, MechanicsError, inverse_dynamics};
+use crate::scalar::{Real, Scalar};
+
+/// The forces of states `(batch, n)` with accelerations by the recursion of a model; `None` of a model without one, and where a force is not
+/// finite or there are not as many numbers as there should be: what is wrong is found by the terms.
+pub(super) fn recursive_forces<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    [q, v, a]: [&[S]; 3],
+) -> Option<InverseDynamics<S>> {
+    let mut external = vec![S::nan(); q.len()];
+    if !write_torques(model, [q, v, a], &mut Vec::new(), &mut external) {
+        return None;
+    }
+    let (mut generalized, mut friction, n) = (external.clone(), Vec::new(), model.coordinates());
+    if let Some(chain) = model.links().filter(|_| !model.conserves_energy()) {
+        friction.extend(v.iter().enumerate().map(|(k, &v)| chain.friction(k % n, v)));
+        generalized.iter_mut().zip(&friction).for_each(|(all, &friction)| *all += friction);
+    }
+    Some(InverseDynamics { generalized, friction, external, constraint: Vec::new(), multipliers: Vec::new() })
+}
+
+/// Writes the external forces of states with accelerations by the recursion of a model, if it has one; `true` if they are all finite.
+fn write_torques<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    [q, v, a]: [&[S]; 3],
+    buffer: &mut Passes<S>,
+    torques: &mut [S],
+) -> bool {
+    let (Some(chain), n) = (model.links(), model.coordinates()) else { return false };
+    if [v.len(), a.len(), torques.len()] != [q.len(); 3] || !q.len().is_multiple_of(n) {
+        return false;
+    }
+    let zero = <S as Real>::zero();
+    let mut probe = zero;
+    for (row, torques) in torques.chunks_exact_mut(n).enumerate() {
+        let [q, v, a] = [q, v, a].map(|x| &x[row * n..][..n]);
+        chain.inverse_dynamics([q, v, a], buffer, torques);
+        for (k, torque) in torques.iter_mut().enumerate() {
+            *torque -= chain.friction(k, v[k]);
+            probe += *torque * zero;
+        }
+    }
+    probe == zero
+}
+
+/// The external forces that make a motion, the torques of an arm's motors for instance, state after state, with buffers of its own: what a
+/// controller calls.
+///
+/// They are those of [`inverse_dynamics`]. Of a chain of links they are computed by the recursion of Newton and Euler, and nothing is allocated
+/// after the first call.
+///
+/// ```
+/// use lnn::lagrangian::{Torques, configure};
+///
+/// // What holds an arm of two rods of 1 m and 1 kg level, g = 9.8 m/s^2.
+/// let arm = configure::<f64>("double-pendulum", &[])?.build()?;
+/// let (level, still, mut torques) = ([std::f64::consts::FRAC_PI_2; 2], [0.0; 2], [0.0; 2]);
+/// Torques::new(arm.as_ref()).at(&level, &still, &still, &mut torques)?;
+/// assert!((torques[0] - 2.0 * 9.8).abs() < 1e-12 && (torques[1] - 9.8).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Torques<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    buffer: Passes<S>,
+}
+
+impl<'a, S: Scalar> Torques<'a, S> {
+    /// Buffers for a model.
+    pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
+        Self { model, buffer: Vec::new() }
+    }
+
+    /// The forces of states `q`, `v` with accelerations `a`, all `(batch, n)` in physical units.
+    ///
+    /// # Errors
+    /// As of [`inverse_dynamics`]; another length of `torques`.
+    pub fn at(&mut self, q: &[S], v: &[S], a: &[S], torques: &mut [S]) -> Result<(), MechanicsError> {
+        if torques.len() != q.len() {
+            return Err(MechanicsError::Shape { what: "torques", expected: q.len(), found: torques.len() });
+        }
+        if !write_torques(self.model, [q, v, a], &mut self.buffer, torques) {
+            torques.copy_from_slice(&inverse_dynamics(self.model, q, v, a)?.external);
+        }
+        Ok(())
+    }
+}
