@@ -153,6 +153,17 @@ fn lagrangians(c: &mut Criterion) {
             group.bench_function(BenchmarkId::new(format!("{name}, acceleration, one state, by the handle"), n), |b| {
                 b.iter(|| handle.at(black_box(&x[..n]), &x[n..], &mut a).expect("regular mass matrices"));
             });
+            // Of more coordinates the derivatives are the solution of dense systems.
+            if n > 32 {
+                continue;
+            }
+            let (mut linearizer, w) = (Linearizer::new(model.as_ref()), vec![1.0; n]);
+            group.bench_function(BenchmarkId::new(format!("{name}, linearization, one state"), n), |b| {
+                b.iter(|| linearizer.at(black_box(&x[..n]), &x[n..]).map(|found| found.by_q[0]));
+            });
+            group.bench_function(BenchmarkId::new(format!("{name}, gradient of an acceleration, one state"), n), |b| {
+                b.iter(|| linearizer.gradient(black_box(&x[..n]), &x[n..], &w).map(|found| found.by_q[0]));
+            });
         }
     };
     row("chain", &|n| Box::new(Mechanics::new(Chain(n), [])), &[2, 4, 8, 16, 32, 64, 128, 256]);
