@@ -6,7 +6,7 @@ mod ratio;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::cli::parse_system;
 use lnn::geometry::geometries;
-use lnn::lagrangian::{self, Request, Terms};
+use lnn::lagrangian::{self, Accelerations, Request, Terms, Torques};
 use lnn::scalar::Scalar;
 use nalgebra_of_num_dual::SVector;
 use num_dual::{Dual2SVec32, Dual2SVec64, DualNum, hessian};
@@ -71,7 +71,37 @@ fn described(text: &str, name: &str) {
     ratio::compare(&format!("{name} of a file, acceleration, the same as code"), batch, "at least 0.67", file, code);
 }
 
+/// Torques and accelerations of an arm of seven joints with general inertias, one state, by recursion over the links and by the Lagrangian.
+fn seven_joints(c: &mut Criterion) {
+    let mut group = c.benchmark_group("seven joints, one state");
+    for friction in ["false", "true"] {
+        let text = include_str!("../examples/systems/seven_joints.toml");
+        let text = text.replace("friction = true", &format!("friction = {friction}"));
+        let mut configured =
+            lagrangian::configure_system::<f64>(Cow::Owned(parse_system(&text).expect("an example is valid")), &[])
+                .expect("the defaults are valid");
+        // No constant of an arm is zero.
+        configured.parameters.iter_mut().enumerate().for_each(|(k, p)| *p += 0.02 + 0.01 * (k as f64).sin());
+        let arm = configured.build().expect("regular constants");
+        let [q, v, a] =
+            [0.3, 1.1, 2.7].map(|shift| (0..7).map(|i| (shift + 1.3 * f64::from(i)).sin()).collect::<Vec<_>>());
+        let (mut torques, mut accelerations) = (Torques::new(&*arm), Accelerations::new(&*arm));
+        let (mut out, mut terms) = (vec![0.0; 7], Terms::default());
+        group.bench_function(BenchmarkId::new("inverse dynamics, friction", friction), |b| {
+            b.iter(|| torques.at(black_box(&q), &v, &a, &mut out).expect("finite"));
+        });
+        group.bench_function(BenchmarkId::new("accelerations, friction", friction), |b| {
+            b.iter(|| accelerations.at(black_box(&q), &v, &mut out).expect("regular"));
+        });
+        group.bench_function(BenchmarkId::new("accelerations by the Lagrangian, friction", friction), |b| {
+            b.iter(|| arm.terms(black_box(&q), &v, Request::ACCELERATION, &mut terms).expect("regular"));
+        });
+    }
+    group.finish();
+}
+
 fn benches(c: &mut Criterion) {
+    seven_joints(c);
     described(include_str!("../examples/systems/two_pendula.toml"), "double-pendulum");
     described(include_str!("../examples/systems/black_hole.toml"), "schwarzschild-geodesic");
     ratios::<f32>(hessian_f32);

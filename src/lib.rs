@@ -30,7 +30,10 @@
 //! | store and load models | [`network::ModelFile`] |
 //! | differentiate your own function | [`tape::Function`], recorded once; [`tape::gradient`], [`tape::hessian`] of one point |
 //! | call accelerations from your own solver, of few or many coordinates | [`lagrangian::Accelerations`] |
+//! | call the motion from a solver of another crate | [`lagrangian::EulerLagrange::rhs`] |
 //! | call the torques of an arm from your own controller | [`lagrangian::Torques`] |
+//! | linearize accelerations, by state, force and parameters | [`lagrangian::Linearizer`] |
+//! | differentiate the end of a motion, by start, force and parameters | [`rollout::Flow`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |

@@ -4,13 +4,13 @@ use crate::certificate::{Certificate, CertificateError, Options, Signature, cert
 use crate::cli::format::TableOrJson;
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, seconds, thread_count, threads, whole};
-use crate::cli::source::SystemOrModel;
+use crate::cli::source::{SystemOrModel, require_at_most};
 use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
 use crate::names::{pluralize, unknown};
-use crate::network::file::Header;
+use crate::network::file::{Header, MAX_COORDINATES};
 use serde_json::{Map, Value, json};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -91,6 +91,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         None => {
             let system = system_arg::system(args.subject.system.as_deref().unwrap_or_default())?;
             let configured = configure_system::<f64>(system, &args.subject.param).map_err(CliError::usage)?;
+            require_at_most(MAX_COORDINATES, configured.coordinates)?;
             let n = configured.coordinates;
             let columns = configured.system.columns(n);
             let options = args.options(n, configured.system.time_like.is_some(), &stop);

@@ -8,6 +8,11 @@ use crate::scalar::Scalar;
 /// States evaluated together; bounds the memory whatever the length of the file.
 pub const CHUNK: usize = 256;
 
+/// The same of `n` coordinates, whose matrices have `n^2` numbers: those of a chunk have at most a million.
+pub fn chunk(n: usize) -> usize {
+    ((1 << 20) / (n * n).max(1)).clamp(1, CHUNK)
+}
+
 /// Form of a result that has no table of numbers alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum TableOrJson {

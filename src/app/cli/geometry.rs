@@ -2,7 +2,7 @@
 
 use crate::cli::format::{CHUNK, TableOrJson, report_failures};
 use crate::cli::number::{Precision, count, list};
-use crate::cli::source::{Source, SystemOrModel};
+use crate::cli::source::{Source, SystemOrModel, require_at_most};
 use crate::cli::states::parse_table;
 use crate::cli::surfaces::Line;
 use crate::cli::{CliError, input, output, states, tensors};
@@ -69,9 +69,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
 }
 
+/// Most coordinates: curvature has `n^4` components.
+const MOST: usize = 64;
+
 fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let n = source.columns.len() / 2;
+    require_at_most(MOST, n)?;
     let names = &source.columns[..n];
     let velocity = match &args.velocity {
         Some(text) => list("--velocity", text, names)?,

@@ -1,7 +1,7 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
 use crate::cli::constraints::constrained;
-use crate::cli::format::{CHUNK, Field, Format, Shape, explain, report_failures, show};
+use crate::cli::format::{Field, Format, Shape, chunk, explain, report_failures, show};
 use crate::cli::inverse::inverse;
 use crate::cli::number::{Precision, list};
 use crate::cli::source::{Source, SystemOrModel};
@@ -113,7 +113,8 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let mut failures: Vec<(usize, String)> = Vec::new();
     let mut terms = Terms::default();
     let mut linearizer = args.linearize.then(|| Linearizer::new(model.as_ref()));
-    for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
+    let size = chunk(n);
+    for ((q, v), rows) in states.q.chunks(size * n).zip(states.v.chunks(size * n)).zip(states.rows.chunks(size)) {
         let mut text = String::new();
         let outcome = model.terms(q, v, Request::ALL, &mut terms);
         let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;

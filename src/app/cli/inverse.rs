@@ -1,6 +1,6 @@
 //! `lnn inspect --inverse`: the forces that make known accelerations.
 
-use crate::cli::format::{CHUNK, Field, Format, Shape, explain, report_failures, show};
+use crate::cli::format::{Field, Format, Shape, chunk, explain, report_failures, show};
 use crate::cli::source::Source;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, input, json, output, states};
@@ -33,7 +33,8 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
     }
     let width = columns.len();
     let mut failures: Vec<(usize, String)> = Vec::new();
-    for (values, rows) in table.values.chunks(CHUNK * width).zip(table.rows.chunks(CHUNK)) {
+    let size = chunk(n);
+    for (values, rows) in table.values.chunks(size * width).zip(table.rows.chunks(size)) {
         let part = |range: std::ops::Range<usize>| -> Vec<S> {
             values.chunks_exact(width).flat_map(|row| row[range.clone()].iter().copied()).collect()
         };

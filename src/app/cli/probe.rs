@@ -3,10 +3,11 @@
 use crate::cli::CliError;
 use crate::cli::learned::{Learned, held};
 use crate::cli::number::{bounds, positive};
-use crate::cli::source::Source;
+use crate::cli::source::{Source, require_at_most};
 use crate::cli::system_arg::{self, learned_system};
 use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::names::unknown;
+use crate::network::file::MAX_COORDINATES;
 use crate::symmetry::{
     Basis, Chart, Degrees, MOST_UNKNOWNS, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states,
     most_symmetries, unknowns,
@@ -101,6 +102,7 @@ impl Probe {
         let Source { model, columns, .. } = Source::configured(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
         let n = configured.coordinates;
+        require_at_most(MAX_COORDINATES, n)?;
         let (bounds, coordinates) = (configured.system.validation(n), configured.system.coordinates(n));
         let pairs = |list: Vec<(f64, f64)>| list.into_iter().map(|(low, high)| [low, high]).collect();
         Ok(Self {

@@ -57,6 +57,17 @@ impl<S: Scalar> Source<S> {
     }
 }
 
+/// Refuses more coordinates than a command serves, whose memory or time grows with a power of their number.
+///
+/// # Errors
+/// A usage error with the numbers.
+pub fn require_at_most(most: usize, found: usize) -> Result<(), CliError> {
+    match found <= most {
+        true => Ok(()),
+        false => Err(CliError::usage(format_args!("expected at most {most} coordinates, found {found}"))),
+    }
+}
+
 /// A system or a trained model, as arguments.
 #[derive(Debug, clap::Args)]
 pub struct SystemOrModel {

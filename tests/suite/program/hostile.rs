@@ -380,6 +380,10 @@ fn sizes_are_refused_before_anything_is_allocated() {
     for (system, n) in [("n-pendulum", "n=1000"), ("lattice", "n=257"), ("cloth", "n=18")] {
         let found = within(1 << 20, &["train", system, "--param", n, "--out", &out]);
         found.refused(2, &["at most 256 coordinates"]);
+        within(1 << 20, &["symmetries", "--system", system, "--param", n]).refused(2, &["at most 256 coordinates"]);
+        let states = one_state(&folder);
+        let arguments = ["geometry", "--system", system, "--param", n, "--points", &states];
+        within(1 << 20, &arguments).refused(2, &["at most 64 coordinates"]);
     }
     within(1 << 20, &["train", "cartesian-chain-500", "--out", &out]).refused(2, &["at most 256 coordinates"]);
     assert_eq!(folder.names(), ["m", "s.csv"]);
