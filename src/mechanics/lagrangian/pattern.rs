@@ -112,7 +112,7 @@ impl fmt::Display for Pattern {
             }
         }
         let blocks = self.blocks().len();
-        writeln!(f, "{blocks} {} of coordinates that do not couple", if blocks == 1 { "group" } else { "groups" })?;
+        writeln!(f, "{blocks} {} of coupled coordinates", if blocks == 1 { "group" } else { "groups" })?;
         if cell > 1 {
             writeln!(f, "a sign stands for {cell} rows and columns")?;
         }
