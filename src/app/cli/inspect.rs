@@ -139,7 +139,7 @@ fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError>
     let pattern = source.model.pattern();
     let pattern = pattern.ok_or_else(|| CliError::data("--structure: the Lagrangian is too large to be recorded"))?;
     if args.format == Some(Format::Json) || args.json {
-        let text = serde_json::to_string(&pattern).map_err(|error| CliError::data(error))?;
+        let text = serde_json::to_string(&pattern).map_err(CliError::data)?;
         return output::print(&format!("{text}\n"));
     }
     output::print(&pattern.to_string())

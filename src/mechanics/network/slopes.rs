@@ -43,11 +43,11 @@ impl<'a, S: Scalar> NetworkSlopes<'a, S> {
         }
         // The sweeps differentiate `-s.f` in scaled coordinates.
         directions.s.iter_mut().enumerate().for_each(|(k, x)| *x = -*x / scale[k % n]);
-        directions.t.iter_mut().enumerate().for_each(|(k, a)| *a = *a / scale[k % n]);
+        directions.t.iter_mut().enumerate().for_each(|(k, a)| *a /= scale[k % n]);
         dynamics.evaluate(network.weights(), q, v, Depth::Training, true);
         dynamics.add_gradient(network.weights(), directions, by_weights, Some((by_q, by_v)));
         for field in [by_q, by_v] {
-            field.iter_mut().enumerate().for_each(|(k, x)| *x = *x / scale[k % n]);
+            field.iter_mut().enumerate().for_each(|(k, x)| *x /= scale[k % n]);
         }
     }
 
