@@ -13,7 +13,7 @@
 //! g - c - M a - dD/dv + A^T lambda = dR/dw - dR/dv,    -(A a + gamma) = dR/dy.
 //! ```
 //!
-//! What is asked for are therefore second derivatives of `R`, of each part of it apart.
+//! All their derivatives are therefore second derivatives of `R`. The Lagrangian, the friction and the constraints have programs of their own.
 
 use super::{Held, Products, Slopes};
 use crate::forward::{Dual, HyperDual};
