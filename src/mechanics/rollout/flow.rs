@@ -73,7 +73,8 @@ impl<'a, S: Scalar> Flow<'a, S> {
     pub fn end(&self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<Vec<S>, MechanicsError> {
         let mut y = self.start(q, v)?;
         let Some(force) = force else {
-            self.visit(&mut y, |_| ())?;
+            let mut accelerations = Accelerations::new(self.model);
+            self.visit(&mut y, &mut |q, v, a| accelerations.at(q, v, a), |_| ())?;
             return Ok(y);
         };
         let (mut terms, mut workspace) = (Terms::default(), Workspace::new());
@@ -83,9 +84,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
             a.copy_from_slice(&terms.acceleration);
             Ok(())
         };
-        for _ in 0..self.steps {
-            y = self.combined(&y, &WEIGHTS, &self.stages(&y, &mut accelerate)?.1);
-        }
+        self.visit(&mut y, &mut accelerate, |_| ())?;
         Ok(y)
     }
 
@@ -142,9 +141,8 @@ impl<'a, S: Scalar> Flow<'a, S> {
         }
         let mut y = self.start(q, v)?;
         let mut before = Vec::with_capacity(self.steps);
-        self.visit(&mut y, |state| before.push(state.to_vec()))?;
-        let mut linearizer = Linearizer::new(self.model);
-        let mut accelerations = Accelerations::new(self.model);
+        let (mut linearizer, mut accelerations) = (Linearizer::new(self.model), Accelerations::new(self.model));
+        self.visit(&mut y, &mut |q, v, a| accelerations.at(q, v, a), |state| before.push(state.to_vec()))?;
         let (mut weights, mut by_parameters) = (w.to_vec(), Vec::new());
         for state in before.iter().rev() {
             let (stages, _) = self.stages(state, &mut |q, v, a| accelerations.at(q, v, a))?;
@@ -183,11 +181,15 @@ impl<'a, S: Scalar> Flow<'a, S> {
     }
 
     /// Moves a state to the end; shows it before every step.
-    fn visit(&self, y: &mut Vec<S>, mut show: impl FnMut(&[S])) -> Result<(), MechanicsError> {
-        let mut accelerations = Accelerations::new(self.model);
+    fn visit(
+        &self,
+        y: &mut Vec<S>,
+        accelerate: &mut Accelerate<'_, S>,
+        mut show: impl FnMut(&[S]),
+    ) -> Result<(), MechanicsError> {
         for _ in 0..self.steps {
             show(y);
-            let (_, slopes) = self.stages(y, &mut |q, v, a| accelerations.at(q, v, a))?;
+            let (_, slopes) = self.stages(y, accelerate)?;
             *y = self.combined(y, &WEIGHTS, &slopes);
         }
         Ok(())

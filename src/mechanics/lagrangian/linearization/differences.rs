@@ -1,6 +1,6 @@
 //! Derivatives of models and forces that are given as values alone: central differences of the fourth order.
 
-use super::{Held, Products, Slopes};
+use super::{Held, Slopes};
 use crate::lagrangian::{EulerLagrange, GeneralizedForce, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar, update};
 
@@ -37,13 +37,12 @@ pub(crate) struct Differences<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     terms: Terms<S>,
     equations: Vec<S>,
-    matrices: Vec<S>,
 }
 
 impl<'a, S: Scalar> Differences<'a, S> {
     /// Buffers for a model.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
-        Self { model, terms: Terms::default(), equations: Vec::new(), matrices: Vec::new() }
+        Self { model, terms: Terms::default(), equations: Vec::new() }
     }
 
     /// The equations of motion at one state with `a` and `lambda` held.
@@ -84,34 +83,6 @@ impl<S: Scalar> Slopes<S> for Differences<'_, S> {
             moved.map_err(|error| error.at_row(row))?;
         }
         Ok(())
-    }
-
-    fn add_products(
-        &mut self,
-        held: &Held<'_, S>,
-        weights: &[S],
-        products: &mut Products<'_, S>,
-    ) -> Result<(), MechanicsError> {
-        let (n, m, zero) = (self.model.coordinates(), held.constraints, <S as Real>::zero());
-        let mut matrices = std::mem::take(&mut self.matrices);
-        matrices.clear();
-        matrices.resize(held.a.len() * (n + m) * 2, zero);
-        let outcome = self.add_matrices(held, &mut matrices);
-        products.add(n, &matrices, weights);
-        self.matrices = matrices;
-        outcome
-    }
-}
-
-impl<S: Scalar> Products<'_, S> {
-    /// Adds `weights` times matrices `(batch, rows, 2 n)`.
-    pub(super) fn add(&mut self, n: usize, matrices: &[S], weights: &[S]) {
-        let rows = weights.len() / (self.by_q.len() / n.max(1)).max(1);
-        for (k, (row, &weight)) in matrices.chunks_exact((2 * n).max(1)).zip(weights).enumerate() {
-            let at = k / rows * n;
-            update(&mut self.by_q[at..at + n], row, |sum, x| *sum += weight * x);
-            update(&mut self.by_v[at..at + n], &row[n..], |sum, x| *sum += weight * x);
-        }
     }
 }
 

@@ -68,22 +68,4 @@ impl<S: Scalar> Slopes<S> for ForceSlopes<'_, S> {
         }
         Ok(())
     }
-
-    fn add_products(
-        &mut self,
-        held: &Held<'_, S>,
-        weights: &[S],
-        products: &mut Products<'_, S>,
-    ) -> Result<(), MechanicsError> {
-        let n = self.n;
-        for (row, weights) in weights.chunks_exact((n + held.constraints).max(1)).enumerate() {
-            self.evaluate(held, row);
-            for (i, &weight) in weights[..n].iter().enumerate() {
-                let at = row * n..(row + 1) * n;
-                update(&mut products.by_q[at.clone()], &self.by[0][i * n..][..n], |sum, x| *sum += weight * x);
-                update(&mut products.by_v[at], &self.by[1][i * n..][..n], |sum, x| *sum += weight * x);
-            }
-        }
-        Ok(())
-    }
 }

@@ -18,6 +18,8 @@ use differences::Differences;
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Held<'a, S> {
+    /// Number of coordinates `n`.
+    pub n: usize,
     /// Coordinates and velocities, `(batch, n)`.
     pub state: (&'a [S], &'a [S]),
     /// Accelerations, `(batch, n)`.
@@ -41,6 +43,16 @@ pub struct Products<'a, S> {
 }
 
 impl<S: Scalar> Products<'_, S> {
+    /// Adds `weights`, `(batch, n + m)`, times matrices `(batch, n + m, 2 n)`.
+    fn add(&mut self, held: &Held<'_, S>, matrices: &[S], weights: &[S]) {
+        let (n, rows) = (held.n, held.n + held.constraints);
+        for (k, (row, &weight)) in matrices.chunks_exact((2 * n).max(1)).zip(weights).enumerate() {
+            let at = k / rows * n;
+            update(&mut self.by_q[at..at + n], row, |sum, x| *sum += weight * x);
+            update(&mut self.by_v[at..at + n], &row[n..], |sum, x| *sum += weight * x);
+        }
+    }
+
     /// Adds the derivatives by the parameters of a state.
     pub(crate) fn add_parameters(&mut self, by_parameters: &[S]) {
         if self.by_parameters.is_empty() {
@@ -60,7 +72,7 @@ pub trait Slopes<S: Scalar> {
     /// As of [`EulerLagrange::terms`].
     fn add_matrices(&mut self, held: &Held<'_, S>, matrices: &mut [S]) -> Result<(), MechanicsError>;
 
-    /// Adds the derivatives of `weights.f`, weights `(batch, n + m)`.
+    /// Adds the derivatives of `weights.f`, weights `(batch, n + m)`; by the matrices where there is no shorter way.
     ///
     /// # Errors
     /// As of [`EulerLagrange::terms`].
@@ -69,7 +81,12 @@ pub trait Slopes<S: Scalar> {
         held: &Held<'_, S>,
         weights: &[S],
         products: &mut Products<'_, S>,
-    ) -> Result<(), MechanicsError>;
+    ) -> Result<(), MechanicsError> {
+        let mut matrices = vec![<S as Real>::zero(); weights.len() * 2 * held.n];
+        self.add_matrices(held, &mut matrices)?;
+        products.add(held, &matrices, weights);
+        Ok(())
+    }
 }
 
 /// The accelerations of a batch of states and their derivatives; matrices are row-major, a row for each acceleration.
@@ -169,7 +186,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         let (rows, zero) = (n + m, <S as Real>::zero());
         self.right.clear();
         self.right.resize(batch * rows * 2 * n, zero);
-        self.slopes.add_matrices(&held((q, v), &self.terms), &mut self.right)?;
+        self.slopes.add_matrices(&held(n, (q, v), &self.terms), &mut self.right)?;
         self.solution.resize(batch * rows * rows, zero);
         let matrices = if m == 0 { &self.terms.mass_matrix } else { self.bordered.matrices() };
         let inverted = linalg::inverse(rows, matrices, &mut self.solution, &mut self.workspace);
@@ -230,7 +247,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
             field.resize(q.len(), zero);
         }
         let mut products = Products { by_q, by_v, by_parameters };
-        self.slopes.add_products(&held((q, v), &self.terms), &self.solution, &mut products)?;
+        self.slopes.add_products(&held(n, (q, v), &self.terms), &self.solution, &mut products)?;
         Ok(&self.gradient)
     }
 
@@ -257,8 +274,8 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
 }
 
 /// States with their accelerations.
-fn held<'a, S>((q, v): (&'a [S], &'a [S]), terms: &'a Terms<S>) -> Held<'a, S> {
-    Held { state: (q, v), a: &terms.acceleration, constraints: terms.constraints, multipliers: &terms.multipliers }
+fn held<'a, S>(n: usize, (q, v): (&'a [S], &'a [S]), terms: &'a Terms<S>) -> Held<'a, S> {
+    Held { n, state: (q, v), a: &terms.acceleration, constraints: terms.constraints, multipliers: &terms.multipliers }
 }
 
 #[cfg(test)]

@@ -11,8 +11,6 @@
 //! Source: R. Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapters 5 to 7; W. Khalil and E. Dombre, "Modeling, Identification and
 //! Control of Robots", 2002, for the modified convention and for the constants that have no effect of their own.
 
-#[cfg(test)]
-mod articulated;
 mod composite;
 mod model;
 #[cfg(test)]

@@ -102,9 +102,6 @@ fn recursions_are_the_terms_of_the_lagrangian() {
         };
         let torques = torques(&chain, [q, v, a]);
         assert!(distance(&torques, &forces(a)) < 1e-11, "torques: {what}");
-        let (found, pivots) = chain.forward_dynamics(q, v, &torques);
-        assert!(distance(&forces(&found), &torques) < 1e-11 && distance(&found, a) < 1e-11, "accelerations: {what}");
-        assert!(pivots.iter().all(|pivot| *pivot > 0.0), "{what}");
         if !terms.force.is_empty() {
             assert!(
                 distance(&(0..n).map(|k| chain.friction(k, v[k])).collect::<Vec<_>>(), &terms.force) < 1e-11,
