@@ -134,7 +134,7 @@ class Mechanics:
         """
         n = self._n
         q, v, shape = states(q, v, n)
-        forces = force
+        forces = None
         if force is not None:
             forces = np.ascontiguousarray(np.broadcast_to(doubles("force", force), (*shape, n)).reshape(-1, n))
         acceleration, *matrices = self._subject.linearize(q, v, forces)
