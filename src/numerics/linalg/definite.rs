@@ -31,19 +31,39 @@ impl<S: Scalar> Systems<'_, S> {
             false => self.definite_blocks::<LANES>(batch, solutions, workspace, &mut refused),
         };
         let (buffer, retry, _) = workspace.parts();
-        let (system, factors) = (buffer.lanes::<CHUNK>(n * stride(n)), retry.block.lanes::<1>(n * n));
+        let (system, factors) = (buffer.lanes::<CHUNK>(n * chunks(n + 1)), retry.block.lanes::<1>(n * n));
         for row in done..batch {
             let (matrix, right) = (&self.matrices[row * n * n..][..n * n], &right[row * n..][..n]);
             let x = &mut solutions[row * n..][..n];
             let safe = vectorized(
                 #[inline(always)]
-                || alone(matrix, right, x, system, factors.as_flattened_mut()),
+                || solve_alone(matrix, right, x, system, factors.as_flattened_mut()),
             );
             if !safe {
                 refused.push(row);
             }
         }
         Some(refused)
+    }
+
+    /// Inverts all that are safely positive definite, one after the other; the rows that are left, `None` if it is not worth trying.
+    pub(super) fn invert_definite(&self, inverses: &mut [S], workspace: &mut Workspace<S>) -> Option<Vec<usize>> {
+        let n = self.n;
+        if n < SIZE {
+            return None;
+        }
+        let (buffer, retry, _) = workspace.parts();
+        let (system, factors) =
+            (buffer.lanes::<CHUNK>(n * lines_of_inverse(n).0), retry.block.lanes::<1>(n * (n + 1)).as_flattened_mut());
+        let matrices = self.matrices.chunks_exact(n * n).zip(inverses.chunks_exact_mut(n * n)).enumerate();
+        let refused = matrices.filter_map(|(row, (matrix, inverse))| {
+            let safe = vectorized(
+                #[inline(always)]
+                || invert_alone(n, matrix, inverse, system, factors),
+            );
+            (!safe).then_some(row)
+        });
+        Some(refused.collect())
     }
 
     /// Whole blocks of `W` rows, and a last one that is at least half full; the rows that were treated.
@@ -125,64 +145,87 @@ fn side_by_side<S: Scalar, const W: usize>(n: usize, system: &mut [Lane<S, W>]) 
     pivots
 }
 
-/// Chunks of a line of `[M | b]`.
-fn stride(n: usize) -> usize {
-    (n + 1).div_ceil(CHUNK)
+/// Chunks of so many numbers.
+fn chunks(numbers: usize) -> usize {
+    numbers.div_ceil(CHUNK)
 }
 
-/// Solves one system, step by step as [`side_by_side`] does, along its rows; `false` if it is not safely positive definite.
+/// Copies a matrix into lines of `stride` chunks; its largest element.
 #[inline(always)]
-fn alone<S: Scalar>(matrix: &[S], right: &[S], x: &mut [S], system: &mut [[S; CHUNK]], factors: &mut [S]) -> bool {
-    let (n, zero, stride) = (x.len(), <S as Real>::zero(), stride(x.len()));
-    let width = stride * CHUNK;
+fn load<S: Scalar>(n: usize, matrix: &[S], system: &mut [[S; CHUNK]], stride: usize) -> S {
+    let zero = <S as Real>::zero();
     let mut largest = [zero; CHUNK];
     for i in 0..n {
-        let row = system[i * stride..][..stride].as_flattened_mut();
-        row[..n].copy_from_slice(&matrix[i * n..][..n]);
-        row[n] = right[i];
-        for part in matrix[i * n..][..n].as_chunks::<CHUNK>().0 {
+        let row = &matrix[i * n..][..n];
+        system[i * stride..][..stride].as_flattened_mut()[..n].copy_from_slice(row);
+        let (parts, rest) = row.as_chunks::<CHUNK>();
+        for part in parts {
             for l in 0..CHUNK {
                 let size = part[l].abs();
                 largest[l] = if size > largest[l] { size } else { largest[l] };
             }
         }
-        for &element in matrix[i * n..][..n].as_chunks::<CHUNK>().1 {
+        for &element in rest {
             let size = element.abs();
             largest[0] = if size > largest[0] { size } else { largest[0] };
         }
     }
+    let mut bound = zero;
+    for size in largest {
+        bound = if size > bound { size } else { bound };
+    }
+    bound
+}
+
+/// Eliminates below the diagonal of `[M | B]`, `n` lines of `stride` chunks, step by step as [`side_by_side`] does, along the lines. Of the
+/// line of a pivot `k` there are `end(k)` chunks. Keeps the factors, row by row, and the inverse pivots on their diagonal. Gives the smallest pivot, 0 where
+/// it ended at one that is not positive, and the largest.
+#[inline(always)]
+fn eliminate<S: Scalar>(
+    n: usize,
+    system: &mut [[S; CHUNK]],
+    stride: usize,
+    end: impl Fn(usize) -> usize,
+    factors: &mut [S],
+) -> (S, S) {
+    let zero = <S as Real>::zero();
     let (mut smallest, mut growth) = (S::infinity(), zero);
     for first in (0..n).step_by(BLOCK) {
         let last = n.min(first + BLOCK);
+        let end = end(last - 1);
         let mut inverse = [zero; BLOCK];
         for k in first..last {
             let (above, below) = system.split_at_mut((k + 1) * stride);
-            let pivot_row = &mut above[k * stride..];
+            let pivot_row = &above[k * stride..][..end];
             let pivot = pivot_row[k / CHUNK][k % CHUNK];
             let inverse = &mut inverse[k - first];
             *inverse = pivot.recip();
+            factors[k * n + k] = *inverse;
             let size = if pivot > zero { pivot } else { zero };
             smallest = if size >= smallest { smallest } else { size };
             growth = if size > growth { size } else { growth };
             for i in k + 1..last {
-                let row = &mut below[(i - k - 1) * stride..][..stride];
+                let row = &mut below[(i - k - 1) * stride..][..end];
                 let factor = pivot_row[i / CHUNK][i % CHUNK] * *inverse;
                 factors[i * n + k] = factor;
-                for j in i / CHUNK..stride {
+                for j in i / CHUNK..end {
                     for l in 0..CHUNK {
                         row[j][l] = (-factor).lane_fused(pivot_row[j][l], row[j][l]);
                     }
                 }
             }
         }
+        if smallest == zero {
+            break;
+        }
         // Rows are left only below a full block.
         if last < n {
             let (above, below) = system.split_at_mut(last * stride);
             let above = &above[first * stride..];
-            let (a, b) = (&above[..stride], &above[stride..][..stride]);
-            let (c, d) = (&above[2 * stride..][..stride], &above[3 * stride..][..stride]);
+            let (a, b) = (&above[..end], &above[stride..][..end]);
+            let (c, d) = (&above[2 * stride..][..end], &above[3 * stride..][..end]);
             for i in last..n {
-                let row = &mut below[(i - last) * stride..][..stride];
+                let row = &mut below[(i - last) * stride..][..end];
                 let (at, lane) = (i / CHUNK, i % CHUNK);
                 let f0 = a[at][lane] * inverse[0];
                 let f1 = b[at][lane] * inverse[1];
@@ -190,7 +233,7 @@ fn alone<S: Scalar>(matrix: &[S], right: &[S], x: &mut [S], system: &mut [[S; CH
                 let f3 = d[at][lane] * inverse[3];
                 let kept = &mut factors[i * n + first..][..BLOCK];
                 (kept[0], kept[1], kept[2], kept[3]) = (f0, f1, f2, f3);
-                for j in at..stride {
+                for j in at..end {
                     let (mut y, a, b, c, d) = (row[j], &a[j], &b[j], &c[j], &d[j]);
                     for l in 0..CHUNK {
                         y[l] = (-f0).lane_fused(a[l], y[l]);
@@ -208,10 +251,48 @@ fn alone<S: Scalar>(matrix: &[S], right: &[S], x: &mut [S], system: &mut [[S; CH
                 }
             }
         }
-        let flat = system.as_flattened();
-        for k in first..last {
-            x[k] = flat[k * width + n] * inverse[k - first];
+    }
+    (smallest, growth)
+}
+
+/// `true` if all numbers are finite.
+#[inline(always)]
+fn are_finite<S: Scalar>(x: &[S]) -> bool {
+    let zero = <S as Real>::zero();
+    let mut probe = [zero; CHUNK];
+    let (parts, rest) = x.as_chunks::<CHUNK>();
+    for part in parts {
+        for l in 0..CHUNK {
+            probe[l] += part[l] * zero;
         }
+    }
+    let mut sum = zero;
+    for &x in rest {
+        sum += x * zero;
+    }
+    for x in probe {
+        sum += x;
+    }
+    sum == zero
+}
+
+/// Solves one system; `false` if it is not safely positive definite.
+#[inline(always)]
+fn solve_alone<S: Scalar>(
+    matrix: &[S],
+    right: &[S],
+    x: &mut [S],
+    system: &mut [[S; CHUNK]],
+    factors: &mut [S],
+) -> bool {
+    let (n, stride) = (x.len(), chunks(x.len() + 1));
+    let largest = load(n, matrix, system, stride);
+    for i in 0..n {
+        system[i * stride + n / CHUNK][n % CHUNK] = right[i];
+    }
+    let (smallest, growth) = eliminate(n, system, stride, |_| stride, factors);
+    for k in 0..n {
+        x[k] = system[k * stride + n / CHUNK][n % CHUNK] * factors[k * n + k];
     }
     for k in (1..n).rev() {
         let (known, found) = x[..=k].split_at_mut(k);
@@ -220,15 +301,52 @@ fn alone<S: Scalar>(matrix: &[S], right: &[S], x: &mut [S], system: &mut [[S; CH
             known[i] = (-factors[i]).lane_fused(found[0], known[i]);
         }
     }
-    let mut bound = zero;
-    for l in 0..CHUNK {
-        bound = if largest[l] > bound { largest[l] } else { bound };
-    }
-    let mut probe = zero;
+    is_harmless(smallest, growth, largest) & are_finite(x)
+}
+
+/// Chunks of a line of `[M | I]`, and the one with which `I` begins.
+fn lines_of_inverse(n: usize) -> (usize, usize) {
+    (2 * chunks(n), chunks(n))
+}
+
+/// Inverts one matrix, `M^-1 = L^-T D^-1 L^-1`; `false` if it is not safely positive definite.
+#[inline(always)]
+fn invert_alone<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    inverse: &mut [S],
+    system: &mut [[S; CHUNK]],
+    factors: &mut [S],
+) -> bool {
+    let (zero, (stride, middle)) = (<S as Real>::zero(), lines_of_inverse(n));
+    system[..n * stride].as_flattened_mut().fill(zero);
+    let largest = load(n, matrix, system, stride);
     for i in 0..n {
-        probe += x[i] * zero;
+        system[i * stride + middle + i / CHUNK][i % CHUNK] = <S as Real>::one();
     }
-    is_harmless(smallest, growth, bound) & (probe == zero)
+    let (smallest, growth) = eliminate(n, system, stride, |k| middle + k / CHUNK + 1, factors);
+    // The right half holds the lower triangle of L^-1.
+    let (diagonal, weights) = factors.split_at_mut(n * n);
+    for i in 0..n {
+        for k in i..n {
+            weights[k] = system[k * stride + middle + i / CHUNK][i % CHUNK] * diagonal[k * n + k];
+        }
+        for c in 0..=i / CHUNK {
+            let mut sum = [zero; CHUNK];
+            for k in i..n {
+                let part = &system[k * stride + middle + c];
+                for l in 0..CHUNK {
+                    sum[l] = weights[k].lane_fused(part[l], sum[l]);
+                }
+            }
+            for l in 0..CHUNK.min(i + 1 - c * CHUNK) {
+                let j = c * CHUNK + l;
+                inverse[i * n + j] = sum[l];
+                inverse[j * n + i] = sum[l];
+            }
+        }
+    }
+    is_harmless(smallest, growth, largest) & are_finite(inverse)
 }
 
 #[cfg(test)]

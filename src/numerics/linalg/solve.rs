@@ -39,27 +39,15 @@ pub fn solve_symmetric<S: Scalar>(
 ) -> Result<(), LinalgError> {
     let systems = Systems::of(n, matrices, rhs, solution)?;
     workspace.clear_failures();
-    match systems.solve_definite(solution, workspace) {
-        Some(refused) if refused.len() * n < solution.len() => {
-            for row in refused {
-                let one = Systems {
-                    matrices: &matrices[row * n * n..][..n * n],
-                    right: Some(&rhs[row * n..][..n]),
-                    ..systems
-                };
-                let before = workspace.failures().len();
-                one.solve_pivoted(&mut solution[row * n..][..n], workspace);
-                workspace.failures_mut()[before..].iter_mut().for_each(|(failed, _)| *failed = row);
-            }
-        }
-        _ => systems.solve_pivoted(solution, workspace),
-    }
+    let refused = systems.solve_definite(solution, workspace);
+    systems.solve_refused(refused, solution, workspace);
     workspace.outcome()
 }
 
 /// Inverses of a batch of symmetric matrices, `(batch, n, n)`, symmetric by construction.
 ///
-/// Column `k` of each solves `M x = e_k`; the mean of the two triangles is returned.
+/// Of five rows and more each is first taken to be positive definite, as by [`solve_symmetric`]. Otherwise column `k` solves `M x = e_k`, and
+/// the mean of the two triangles is returned.
 ///
 /// # Errors
 /// As [`solve`](fn@super::solve); inverses of failed rows are `NaN`.
@@ -73,7 +61,10 @@ pub fn inverse<S: Scalar>(
     let batch = matrices.len() / size.max(1);
     expect_length("matrices", batch * size, matrices.len())?;
     expect_length("inverses", batch * size, inverses.len())?;
-    Systems { n, m: n, matrices, right: None }.solve(inverses, workspace);
+    let systems = Systems { n, m: n, matrices, right: None };
+    workspace.clear_failures();
+    let refused = systems.invert_definite(inverses, workspace);
+    systems.solve_refused(refused, inverses, workspace);
     workspace.outcome()
 }
 
@@ -114,6 +105,26 @@ impl<'a, S: Scalar> Systems<'a, S> {
     pub fn solve(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
         workspace.clear_failures();
         self.solve_pivoted(solutions, workspace);
+    }
+
+    /// Solves with pivots what was refused as not definite, a row at a time; all of it if nothing was tried or everything refused.
+    fn solve_refused(&self, refused: Option<Vec<usize>>, solutions: &mut [S], workspace: &mut Workspace<S>) {
+        let &Self { n, m, .. } = self;
+        match refused {
+            Some(refused) if refused.len() * n * m < solutions.len() => {
+                for row in refused {
+                    let one = Systems {
+                        matrices: &self.matrices[row * n * n..][..n * n],
+                        right: self.right.map(|right| &right[row * n * m..][..n * m]),
+                        ..*self
+                    };
+                    let before = workspace.failures().len();
+                    one.solve_pivoted(&mut solutions[row * n * m..][..n * m], workspace);
+                    workspace.failures_mut()[before..].iter_mut().for_each(|(failed, _)| *failed = row);
+                }
+            }
+            _ => self.solve_pivoted(solutions, workspace),
+        }
     }
 
     /// The same, failures added to those that are known.
