@@ -528,10 +528,13 @@ mod tests {
     #[test]
     fn operations_of_a_chain_grow_with_the_square_of_its_length() {
         let terms = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ;
-        for (n, operations) in [(8, 428), (16, 1184), (32, 3656), (64, 12440)] {
+        for (n, operations, of_slopes) in [(8, 408, 1685), (16, 1132, 5925), (32, 3540, 22085), (64, 12196, 85125)] {
             let model = Mechanics::<_, f64>::new(Plain(n), []);
             let program = model.evaluator.program(&model.system, terms).unwrap();
             assert!(program.lane_operations() <= operations, "{n}: {}", program.lane_operations());
+            let value = model.evaluator.value(&model.system).unwrap();
+            let slopes = SlopePrograms::of_lagrangian(&value.value).unwrap();
+            assert!(slopes.operations() <= of_slopes, "{n}: {}", slopes.operations());
         }
     }
 

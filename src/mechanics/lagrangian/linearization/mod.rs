@@ -11,7 +11,7 @@ pub(super) use programs::{ProgramSlopes, SlopePrograms};
 use super::constraints::Bordered;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{self, Workspace};
-use crate::scalar::{Real, Scalar, update};
+use crate::scalar::{Real, Scalar, update, vectorized};
 use differences::Differences;
 
 /// A batch of states with their accelerations and multipliers, which are held.
@@ -183,13 +183,13 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
     pub fn under(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<&Linearization<S>, MechanicsError> {
         let n = self.model.coordinates();
         let (m, batch) = (self.solve_motion(q, v, force)?, q.len() / n.max(1));
-        let (rows, zero) = (n + m, <S as Real>::zero());
+        let (size, zero) = (n + m, <S as Real>::zero());
         self.right.clear();
-        self.right.resize(batch * rows * 2 * n, zero);
+        self.right.resize(batch * size * 2 * n, zero);
         self.slopes.add_matrices(&held(n, (q, v), &self.terms), &mut self.right)?;
-        self.solution.resize(batch * rows * rows, zero);
+        self.solution.resize(batch * size * size, zero);
         let matrices = if m == 0 { &self.terms.mass_matrix } else { self.bordered.matrices() };
-        let inverted = linalg::inverse(rows, matrices, &mut self.solution, &mut self.workspace);
+        let inverted = linalg::inverse(size, matrices, &mut self.solution, &mut self.workspace);
         self.check(inverted.is_ok())?;
         let Linearization { acceleration, by_q, by_v, by_force } = &mut self.linearization;
         acceleration.clear();
@@ -197,15 +197,15 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         for field in [&mut *by_q, &mut *by_v, by_force] {
             field.clear();
         }
-        let mut row = vec![zero; 2 * n];
+        let mut rows = vec![zero; n * 2 * n];
         let states =
-            self.solution.chunks_exact((rows * rows).max(1)).zip(self.right.chunks_exact((rows * 2 * n).max(1)));
+            self.solution.chunks_exact((size * size).max(1)).zip(self.right.chunks_exact((size * 2 * n).max(1)));
         for (inverse, slopes) in states {
-            for inverse in inverse.chunks_exact(rows).take(n) {
-                row.fill(zero);
-                for (&factor, slopes) in inverse.iter().zip(slopes.chunks_exact(2 * n)) {
-                    update(&mut row, slopes, |sum, x| *sum += factor * x);
-                }
+            vectorized(
+                #[inline(always)]
+                || multiply((size, 2 * n), inverse, slopes, &mut rows),
+            );
+            for (row, inverse) in rows.chunks_exact(2 * n).zip(inverse.chunks_exact(size)) {
                 by_q.extend_from_slice(&row[..n]);
                 by_v.extend_from_slice(&row[n..]);
                 by_force.extend_from_slice(&inverse[..n]);
@@ -269,6 +269,29 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         match self.workspace.failures().first() {
             Some(&(row, failure)) if !solved => Err(MechanicsError::unsolved(row, failure)),
             _ => Ok(()),
+        }
+    }
+}
+
+/// Rows of a product `A B`, `A` of so many columns, `B` of so many: four rows of `B` at a time.
+#[inline(always)]
+fn multiply<S: Scalar>((inner, width): (usize, usize), a: &[S], b: &[S], out: &mut [S]) {
+    for i in 0..out.len() / width {
+        let (a, out) = (&a[i * inner..][..inner], &mut out[i * width..][..width]);
+        out.fill(<S as Real>::zero());
+        let (fours, rest) = a.as_chunks::<4>();
+        for k in 0..fours.len() {
+            let (factors, b) = (fours[k], &b[4 * k * width..][..4 * width]);
+            let (b0, b1, b2, b3) =
+                (&b[..width], &b[width..][..width], &b[2 * width..][..width], &b[3 * width..][..width]);
+            for j in 0..width {
+                let first = factors[0].lane_fused(b0[j], out[j]);
+                let second = factors[1].lane_fused(b1[j], first);
+                out[j] = factors[3].lane_fused(b3[j], factors[2].lane_fused(b2[j], second));
+            }
+        }
+        for k in 0..rest.len() {
+            update(out, &b[(4 * fours.len() + k) * width..], |sum, x| *sum = rest[k].lane_fused(x, *sum));
         }
     }
 }

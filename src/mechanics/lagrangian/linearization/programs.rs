@@ -67,19 +67,19 @@ impl<S: Scalar> SlopePrograms<S> {
     pub(crate) fn of_lagrangian(value: &Program<S>) -> Option<Self> {
         let (n, k) = (value.inputs() / 2, value.parameters());
         let rate = Program::record_within(ROWS, (4 * n + k, 0), |x, _| {
-            let by = value.derivatives(&x[..2 * n], &x[4 * n..], None)?.first;
-            // By the coordinates along `w`, by the velocities along `a`.
-            let terms = by.iter().zip(&x[2 * n..]).map(|(&by, &speed)| by * speed);
-            Some(vec![terms.fold(Tracer::zero(), |sum, term| sum + term)])
+            // The coordinates move along `w`, the velocities along `a`.
+            let moving = x[..2 * n].iter().zip(&x[2 * n..]).map(|(&value, &tangent)| Dual { value, tangent });
+            let parameters: Vec<_> = x[4 * n..].iter().map(|&p| Dual::lift(p)).collect();
+            Some(vec![value.interpret(&moving.collect::<Vec<_>>(), &parameters).ok()?[0].tangent])
         });
-        Self::of_rate((n, 0), &rate.ok()?)
+        Self::of_rate((n, 0), &rate.ok()?, true)
     }
 
     /// Of the dissipation function with this value.
     pub(crate) fn of_dissipation(value: &Program<S>) -> Option<Self> {
         let (n, k) = (value.inputs() / 2, value.parameters());
         let rate = Program::record_within(ROWS, (4 * n + k, 0), |x, _| value.interpret(&x[..2 * n], &x[4 * n..]).ok());
-        Self::of_rate((n, 0), &rate.ok()?)
+        Self::of_rate((n, 0), &rate.ok()?, true)
     }
 
     /// Of those rows of constraints with these numbers; `shared` if their parameters are the Lagrangian's.
@@ -124,34 +124,80 @@ impl<S: Scalar> SlopePrograms<S> {
             }
             Some(vec![sum])
         });
-        Self::of_rate((n, m), &rate.ok()?)
+        let symmetric = kept.iter().all(|&row| constraints.is_holonomic(row));
+        Self::of_rate((n, m), &rate.ok()?, symmetric)
     }
 
-    /// Of a rate `R`.
-    fn of_rate((n, m): (usize, usize), rate: &Program<S>) -> Option<Self> {
+    /// Operations of a state.
+    #[cfg(test)]
+    pub(crate) fn operations(&self) -> usize {
+        self.matrices.lane_operations()
+    }
+    /// Of a rate `R`, whose `d2R/dw dq` may be known to be symmetric.
+    fn of_rate((n, m): (usize, usize), rate: &Program<S>, symmetric: bool) -> Option<Self> {
         let inputs = Inputs { n, m };
         let k = rate.inputs() - inputs.count();
         let mut places = Vec::new();
         let matrices = Program::record_within(ROWS, (3 * n + m, k), |x, p| {
-            // Each coordinate moves along a direction of its own, each velocity together with its `w`.
-            let seed = |input: usize| match input {
-                input if input < 2 * n => vec![(input as u32, Tracer::one())],
-                input if input < 3 * n => vec![((input - n) as u32, Tracer::one())],
+            // Velocities move along the first directions, coordinates along the others.
+            let seed = |input: usize| match input / n {
+                0 => vec![((n + input) as u32, Tracer::one())],
+                1 => vec![((input - n) as u32, Tracer::one())],
                 _ => Vec::new(),
             };
-            let is_row = |input: usize| (n..3 * n).contains(&input) || (4 * n + m..4 * n + 2 * m).contains(&input);
+            // The last direction of an input: of symmetric blocks the lower triangle is enough.
+            let last = |input: usize| match (input / n, input.checked_sub(4 * n + m)) {
+                (_, Some(y)) => (y < m).then_some(2 * n - 1),
+                (0, _) => Some(n - 1),
+                (1, _) => Some(input - n),
+                (2, _) => Some(if symmetric { input - n } else { 2 * n - 1 }),
+                _ => None,
+            };
             let directions = Directions {
                 seeds: (0..rate.inputs()).map(seed).collect(),
-                rows: (0..rate.inputs()).map(|input| is_row(input).then_some(0)).collect(),
-                shared: 0,
+                rows: (0..rate.inputs()).map(|input| last(input).map(|last| last as u32)).collect(),
+                shared: 2 * n as u32,
                 budget: TANGENTS,
             };
             let second = rate.derivatives(&inputs.at_motion(x, p), &[], Some(&directions))?.second;
+            let mut rows: Vec<BTreeMap<usize, Tracer<'_, S>>> = vec![BTreeMap::new(); n + m];
+            let mut add = |i: usize, j: usize, x| {
+                rows[i].entry(j).and_modify(|sum| *sum += x).or_insert(x);
+            };
+            for (input, elements) in second.into_iter().enumerate() {
+                for (direction, x) in elements {
+                    let direction = direction as usize;
+                    let (moves, j) = (direction >= n, direction % n);
+                    match (input / n, input.checked_sub(4 * n + m)) {
+                        (_, Some(y)) => add(n + y, if moves { j } else { n + j }, x),
+                        // -d2R/dv dq.
+                        (0, _) => add(j, input, -x),
+                        // -d2R/dv dv.
+                        (1, _) => {
+                            add(input - n, n + j, -x);
+                            if j < input - n {
+                                add(j, input, -x);
+                            }
+                        }
+                        // d2R/dw dq.
+                        (_, _) if moves => {
+                            add(input - 2 * n, j, x);
+                            if symmetric && j < input - 2 * n {
+                                add(j, input - 2 * n, x);
+                            }
+                        }
+                        // d2R/dw dv and, as w moves with v, -d2R/dv dw.
+                        (_, _) => {
+                            add(input - 2 * n, n + j, x);
+                            add(j, input - n, -x);
+                        }
+                    }
+                }
+            }
             let mut outputs = Vec::new();
-            for i in 0..n + m {
-                let row = inputs.equation(i, |input| second[input].iter().copied().collect(), |a, b| difference(a, &b));
-                for (j, x) in row.into_iter().filter(|(_, x): &(u32, Tracer<'_, S>)| !x.is_exact_zero()) {
-                    places.push((i, j as usize));
+            for (i, row) in rows.into_iter().enumerate() {
+                for (j, x) in row.into_iter().filter(|(_, x)| !x.is_exact_zero()) {
+                    places.push((i, j));
                     outputs.push(x);
                 }
             }
@@ -172,14 +218,6 @@ impl<S: Scalar> SlopePrograms<S> {
         let (matrices, products) = (Arc::new(matrices.ok()?), Arc::new(products.ok()?));
         Some(Self { size: (n, m), matrices, places: places.into(), products })
     }
-}
-
-/// `a - b` of lists of columns.
-fn difference<R: Real>(mut a: BTreeMap<u32, R>, b: &BTreeMap<u32, R>) -> BTreeMap<u32, R> {
-    for (&column, &x) in b {
-        a.entry(column).and_modify(|own| *own -= x).or_insert(-x);
-    }
-    a
 }
 
 /// [`Slopes`] of a part by its programs.

@@ -2,7 +2,7 @@
 
 use super::Tracer;
 use crate::ops::{Binary, Unary};
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 use crate::tape::TapeError;
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -211,13 +211,29 @@ impl<S: Scalar> Recorder<S> {
     }
     /// The operation that fills a row, if it is the negation of another row: that row.
     pub(super) fn negated(&self, row: u32) -> Option<u32> {
+        self.looked_up(row, |_, node| match node {
+            Node::Unary(Unary::Neg, a) => Some(*a),
+            _ => None,
+        })
+    }
+    /// The operation that fills a row, if it is a product: its factors.
+    pub(super) fn factors(&self, row: u32) -> Option<[Tracer<'_, S>; 2]> {
+        self.looked_up(row, |graph, node| match node {
+            Node::Binary(Binary::Mul, a, b) => {
+                Some([*a, *b].map(|row| match graph.nodes[graph.node_of_row[row as usize] as usize] {
+                    Node::Constant(value) => Tracer::constant(value),
+                    _ => self.tracer(row),
+                }))
+            }
+            _ => None,
+        })
+    }
+    /// What there is to know of the operation that fills a row.
+    fn looked_up<T>(&self, row: u32, look: impl FnOnce(&Graph<S>, &Node<S>) -> Option<T>) -> Option<T> {
         if row & PARAMETER != 0 {
             return None;
         }
         let graph = self.graph.borrow();
-        match graph.nodes[graph.node_of_row[row as usize] as usize] {
-            Node::Unary(Unary::Neg, a) => Some(a),
-            _ => None,
-        }
+        look(&graph, &graph.nodes[graph.node_of_row[row as usize] as usize])
     }
 }

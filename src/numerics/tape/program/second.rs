@@ -7,7 +7,8 @@
 //! t_y = f' t_a,    w_a += f' w_y,    z_a += f' z_y + w_y f'' t_a.
 //! ```
 //!
-//! Tangents are lists of the directions along which a value moves at all. On numbers of another recording the result is a program of the
+//! Tangents are lists of the directions along which a value moves at all. Those of adjoints are kept as sums of a few lists with factors, as
+//! long as that takes fewer products: on the way through operations of one operand a factor is multiplied instead of a list. On numbers of another recording the result is a program of the
 //! derivatives, in which what is zero or constant does not occur.
 
 use super::Program;
@@ -63,6 +64,29 @@ impl<S: Scalar> Program<S> {
     }
 }
 
+/// The tangents of an adjoint: long lists with factors, each by its number, and the sum of short ones.
+#[derive(Clone)]
+struct Curve<R> {
+    /// A factor of 1 is left out.
+    long: Vec<(usize, Option<R>)>,
+    short: Sparse<R>,
+}
+
+impl<R> Curve<R> {
+    /// Of nothing.
+    fn none() -> Self {
+        Self { long: Vec::new(), short: Vec::new() }
+    }
+    fn is_empty(&self) -> bool {
+        self.long.is_empty() && self.short.is_empty()
+    }
+}
+
+/// Shorter lists are multiplied at once.
+const LONG: usize = 4;
+/// Most lists in a sum.
+const LISTS: usize = 8;
+
 /// Partial derivatives of an operation by its operands.
 enum Partials<R> {
     /// `y = f(a)`, `f'`.
@@ -77,6 +101,7 @@ struct Sweep<'a, S, R> {
     directions: Option<&'a Directions<R>>,
     /// The last direction of its own among the inputs that a value depends on, and by which second derivatives are wanted.
     last: Vec<Option<u32>>,
+    /// Tangents of all values, and then sums that were computed for adjoints.
     tangents: Vec<Sparse<R>>,
     spent: usize,
 }
@@ -154,7 +179,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         let inputs = program.inputs;
         let output = program.outputs[0] as usize;
         let mut adjoints = vec![R::zero(); self.values.len()];
-        let mut curved: Vec<Sparse<R>> = vec![Vec::new(); self.values.len()];
+        let mut curved: Vec<Curve<R>> = vec![Curve::none(); self.values.len()];
         let mut derivatives = Derivatives {
             value: self.values[output],
             first: vec![R::zero(); inputs],
@@ -163,20 +188,22 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         adjoints[output] = R::one();
         // Of uniform rows nothing is asked.
         for step in program.steps().rev().take_while(|step| step.out >= program.uniform_rows) {
-            let (w, z) = (adjoints[step.out], std::mem::take(&mut curved[step.out]));
+            let (w, z) = (adjoints[step.out], std::mem::replace(&mut curved[step.out], Curve::none()));
             let operand = |k: usize| step.operands[k] as usize;
             if step.kind == Kind::Input {
                 derivatives.first[operand(0)] = w;
-                derivatives.second[operand(0)] = z;
+                derivatives.second[operand(0)] = self.sum(z, step.out);
                 continue;
             }
             if step.kind == Kind::SinCos {
                 let (sin, cos) = (self.values[step.out], self.values[step.out + 1]);
-                let (other, z_cos) = (adjoints[step.out + 1], std::mem::take(&mut curved[step.out + 1]));
+                let other = adjoints[step.out + 1];
+                let z_cos = std::mem::replace(&mut curved[step.out + 1], Curve::none());
                 let x = operand(0);
+                let (z, z_cos) = (self.passed_on(z, step.out, 1), self.passed_on(z_cos, step.out + 1, 1));
                 adjoints[x] += w * cos - other * sin;
-                self.curve(&mut curved, x, (cos, &z), None);
-                self.curve(&mut curved, x, (-sin, &z_cos), Some((-(w * sin + other * cos), x)));
+                self.curve(&mut curved, x, (Some(cos), &z), None);
+                self.curve(&mut curved, x, (Some(-sin), &z_cos), Some((-(w * sin + other * cos), x)));
                 continue;
             }
             if w.is_exact_zero() && z.is_empty() {
@@ -184,14 +211,16 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
             }
             if step.kind == Kind::Select {
                 let condition = self.values[operand(0)];
+                let z = self.sum(z, step.out);
                 for (x, of_first) in [(operand(1), true), (operand(2), false)] {
                     let pick = |w: R| match of_first {
                         true => condition.select(w, R::zero()),
                         false => condition.select(R::zero(), w),
                     };
                     adjoints[x] += pick(w);
-                    let picked: Sparse<R> = z.iter().map(|&(direction, z)| (direction, pick(z))).collect();
-                    self.curve(&mut curved, x, (R::one(), &picked), None);
+                    let picked = z.iter().map(|&(direction, z)| (direction, pick(z))).collect();
+                    let picked = self.kept(picked);
+                    self.curve(&mut curved, x, (None, &picked), None);
                 }
                 continue;
             }
@@ -199,9 +228,10 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
             match self.partials(&step) {
                 Some(Partials::One(f, first)) => {
                     let x = operand(0);
+                    let z = self.passed_on(z, step.out, 1);
                     adjoints[x] += w * first;
                     let bend = second.then(|| w * f.second(self.values[x], self.values[step.out], first));
-                    self.curve(&mut curved, x, (first, &z), bend.map(|bend| (bend, x)));
+                    self.curve(&mut curved, x, (Some(first), &z), bend.map(|bend| (bend, x)));
                 }
                 Some(Partials::Two(f, first)) => {
                     let (a, b) = (operand(0), operand(1));
@@ -209,10 +239,14 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
                     adjoints[b] += w * first.1;
                     if second {
                         let (aa, ab, bb) = f.second(self.values[a], self.values[b], self.values[step.out], first);
-                        self.curve(&mut curved, a, (first.0, &z), Some((w * aa, a)));
-                        self.curve(&mut curved, a, (R::zero(), &z), Some((w * ab, b)));
-                        self.curve(&mut curved, b, (first.1, &z), Some((w * bb, b)));
-                        self.curve(&mut curved, b, (R::zero(), &z), Some((w * ab, a)));
+                        let ways = [a, b].iter().filter(|&&x| self.last[x].is_some()).count();
+                        let z = self.passed_on(z, step.out, ways);
+                        let of_a = (!matches!(f, Binary::Add | Binary::Sub)).then_some(first.0);
+                        let of_b = (f != Binary::Add).then_some(first.1);
+                        self.curve(&mut curved, a, (of_a, &z), Some((w * aa, a)));
+                        self.curve(&mut curved, a, (None, &Curve::none()), Some((w * ab, b)));
+                        self.curve(&mut curved, b, (of_b, &z), Some((w * bb, b)));
+                        self.curve(&mut curved, b, (None, &Curve::none()), Some((w * ab, a)));
                     }
                 }
                 None => {}
@@ -225,15 +259,81 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
     }
 
     /// Adds `factor z` and `bend t`, as far as they reach a second derivative that is wanted.
-    fn curve(&mut self, curved: &mut [Sparse<R>], x: usize, (factor, z): (R, &Sparse<R>), bend: Option<(R, usize)>) {
+    fn curve(
+        &mut self,
+        curved: &mut [Curve<R>],
+        x: usize,
+        (factor, z): (Option<R>, &Curve<R>),
+        bend: Option<(R, usize)>,
+    ) {
         let (Some(directions), Some(last)) = (self.directions, self.last[x]) else { return };
         let keep = |direction: u32| direction <= last || direction >= directions.shared;
-        let before = curved[x].len();
-        add(&mut curved[x], factor, z, keep);
-        if let Some((bend, of)) = bend {
-            add(&mut curved[x], bend, &self.tangents[of], keep);
+        let Curve { long, short } = &mut curved[x];
+        let before = short.len();
+        add(short, factor.unwrap_or(R::one()), &z.short, keep);
+        let passed = z.long.iter().map(|&(list, own)| (list, product(factor, own)));
+        for (list, factor) in passed.chain(bend.map(|(bend, list)| (list, Some(bend)))) {
+            let tangents = &self.tangents[list];
+            if tangents.len() < LONG {
+                add(short, factor.unwrap_or(R::one()), tangents, keep);
+                continue;
+            }
+            let is_wanted = keep(tangents[0].0) || tangents.last().is_some_and(|(direction, _)| keep(*direction));
+            if !is_wanted || factor.is_some_and(R::is_exact_zero) {
+                continue;
+            }
+            self.spent += 1;
+            match long.iter_mut().find(|(of, _)| *of == list) {
+                Some((_, own)) => *own = Some(own.unwrap_or(R::one()) + factor.unwrap_or(R::one())),
+                None => long.push((list, factor)),
+            }
         }
-        self.spent += curved[x].len() - before;
+        long.retain(|(_, factor)| !factor.is_some_and(R::is_exact_zero));
+        self.spent += short.len().saturating_sub(before);
+    }
+
+    /// The list of the tangents, as far as it reaches a second derivative by what row `x` depends on.
+    fn sum(&mut self, z: Curve<R>, x: usize) -> Sparse<R> {
+        let (Some(directions), Some(last)) = (self.directions, self.last[x]) else { return Vec::new() };
+        let mut sum = z.short;
+        for (list, factor) in z.long {
+            let keep = |direction: u32| direction <= last || direction >= directions.shared;
+            add(&mut sum, factor.unwrap_or(R::one()), &self.tangents[list], keep);
+        }
+        self.spent += sum.len();
+        sum
+    }
+
+    /// A list as it is.
+    fn kept(&mut self, list: Sparse<R>) -> Curve<R> {
+        if list.len() < LONG {
+            return Curve { long: Vec::new(), short: list };
+        }
+        self.tangents.push(list);
+        Curve { long: vec![(self.tangents.len() - 1, None)], short: Vec::new() }
+    }
+
+    /// The tangents of the adjoint of row `x` as they go on to so many operands: added now where that takes no more products than later.
+    fn passed_on(&mut self, z: Curve<R>, x: usize, ways: usize) -> Curve<R> {
+        let is_plain = z.long.iter().all(|(_, factor)| factor.is_none());
+        let later = match z.long.len() {
+            0 => z.short.len() < LONG,
+            1 => z.short.len() < LONG,
+            count => ways < 2 && !is_plain && count <= LISTS,
+        };
+        if later {
+            return z;
+        }
+        let sum = self.sum(z, x);
+        self.kept(sum)
+    }
+}
+
+/// The product of factors that may be 1.
+fn product<R: Real>(a: Option<R>, b: Option<R>) -> Option<R> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a * b),
+        (a, b) => a.or(b),
     }
 }
 

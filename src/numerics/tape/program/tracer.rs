@@ -63,11 +63,40 @@ impl<'t, S: Scalar> Tracer<'t, S> {
             }
         }
     }
+    /// The product of this constant with `b`, if `b` has a constant factor with which this one can be joined without a rounding.
+    fn joined(self, b: Self) -> Option<Self> {
+        let factors = |x: Self| x.recorder?.factors(x.row);
+        let constant = |c: Self| {
+            let exact = c.recorder.is_none() && (is_power_of_two(c.value) || is_power_of_two(self.value));
+            exact.then(|| Self::constant(c.value * self.value))
+        };
+        let [x, y] = factors(b)?;
+        for (x, y) in [(x, y), (y, x)] {
+            if let Some(c) = constant(x) {
+                return Some(c * y);
+            }
+            // Half of `(2 u) y` is `u y`.
+            if let Some([u, w]) = factors(x) {
+                for (u, w) in [(u, w), (w, u)] {
+                    if let Some(c) = constant(u).filter(|c| c.is(1.0)) {
+                        return Some(c * (w * y));
+                    }
+                }
+            }
+        }
+        None
+    }
     /// `Some(x)` if this is `-x`.
     fn negated(self) -> Option<Self> {
         let recorder = self.recorder?;
         recorder.negated(self.row).map(|row| recorder.tracer(row))
     }
+}
+
+/// `true` for numbers by which a product has no rounding, far from those that are too large or too small.
+fn is_power_of_two<S: Scalar>(x: S) -> bool {
+    let x = x.to_f64().abs();
+    x.to_bits() & ((1 << 52) - 1) == 0 && (1e-6..1e6).contains(&x)
 }
 
 impl<S: Scalar> Neg for Tracer<'_, S> {
@@ -120,6 +149,12 @@ impl<S: Scalar> Mul for Tracer<'_, S> {
                 }
                 if a.is(-1.0) {
                     return -b;
+                }
+                if let Some(x) = b.negated() {
+                    return -a * x;
+                }
+                if let Some(product) = a.joined(b) {
+                    return product;
                 }
             }
         }
