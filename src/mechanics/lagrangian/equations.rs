@@ -1,15 +1,14 @@
 //! The equations of motion of a system as recorded programs: what they need to be solved, and their slopes by state and parameters.
 //!
 //! With the residual `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q` a change of anything that it depends on, `a` held fixed,
-//! changes the acceleration by `-M^-1 dr`: one reverse sweep per coordinate gives all slopes, however many parameters there are.
+//! changes the acceleration by `-M^-1 dr`.
 
-use super::derivatives::{StateTerms, evaluate};
-use super::linearization::{ProgramSlopes, SlopePrograms};
-use super::mechanics::RecordedValue;
+use super::linearization::{ProgramSlopes, Rate, SlopePrograms, add};
+use super::programs::derivatives;
 use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Rayleigh, Request, Slopes, SystemInstance};
-use crate::forward::HyperDual;
 use crate::scalar::Real;
-use crate::tape::{Program, TapeError, Tracer, VectorFunction, jacobian};
+use crate::tape::{Program, ROWS, TapeError, Tracer};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Equations of motion of `n` coordinates and `m` parameters.
@@ -31,7 +30,7 @@ impl Equations {
     pub fn record(instance: &SystemInstance<f64>, chosen: &[usize]) -> Result<Option<Self>, TapeError> {
         let (n, count) = (instance.coordinates, instance.parameters.len());
         let Some(value) = instance.visit(Value { parameters: count }).transpose()? else { return Ok(None) };
-        let mut parts = vec![EquationPart { value: RecordedValue { value }, friction: false }];
+        let mut parts = vec![EquationPart::of(value, false)?];
         if let Some(dissipation) = instance.dissipation() {
             parts.push(EquationPart::record(dissipation, count, true)?);
         }
@@ -49,74 +48,56 @@ impl Equations {
         parts: &[EquationPart],
         (chosen, terms): (&[usize], &[EquationPart]),
     ) -> Result<Self, TapeError> {
-        let motion = Program::record(2 * n, count, |x, p| {
-            let (q, v) = x.split_at(n);
+        let motion = Program::record_within(ROWS, (2 * n, count), |x, p| {
             let zero = Tracer::zero();
-            let (mut mass_matrix, mut coriolis) = (vec![zero; n * n], vec![zero; n]);
-            let (mut rest, mut friction) = (vec![zero; n], vec![zero; n]);
+            let (mut mass_matrix, mut rest) = (vec![zero; n * n], vec![zero; n]);
+            for EquationPart { value, friction, .. } in parts {
+                if *friction {
+                    let first = value.derivatives(x, p, None)?.first;
+                    rest.iter_mut().zip(&first[n..]).for_each(|(rest, &force)| *rest -= force);
+                    continue;
+                }
+                let found = derivatives(value, x, p, Request::ACCELERATION)?;
+                for (rest, (g, c)) in rest.iter_mut().zip(found.dl_dq.into_iter().zip(found.coriolis)) {
+                    *rest += g - c;
+                }
+                for (i, row) in found.mass_matrix.into_iter().enumerate() {
+                    for (j, m) in row {
+                        mass_matrix[i * n + j] += m;
+                        if j < i {
+                            mass_matrix[j * n + i] += m;
+                        }
+                    }
+                }
+            }
+            mass_matrix.extend(rest);
+            Some(mass_matrix)
+        })?;
+        // The residual r is less the equations f of the rates.
+        let slopes = Program::record_within(ROWS, (3 * n, count), |x, p| {
+            let mut rows = vec![BTreeMap::new(); n];
             for part in parts {
-                let (need, mut state) = if part.friction {
-                    let nothing = StateTerms {
-                        lagrangian: &mut [],
-                        momentum: &mut friction,
-                        dl_dq: &mut [],
-                        mass_matrix: &mut [],
-                        coriolis: &mut [],
-                    };
-                    (Request::MOMENTUM, nothing)
-                } else {
-                    let all = StateTerms {
-                        lagrangian: &mut [],
-                        momentum: &mut [],
-                        dl_dq: &mut rest,
-                        mass_matrix: &mut mass_matrix,
-                        coriolis: &mut coriolis,
-                    };
-                    (Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ, all)
-                };
-                evaluate(&part.value, p, q, v, need, &mut state);
-            }
-            for (rest, (c, f)) in rest.iter_mut().zip(coriolis.into_iter().zip(friction)) {
-                *rest = *rest - c - f;
-            }
-            mass_matrix.into_iter().chain(rest).collect()
-        })?;
-        let mut failure = None;
-        let slopes = Program::record(3 * n, count, |x, p| {
-            let all = [x, p].concat();
-            let width = all.len();
-            let single = terms.iter().map(|term| {
-                let mut column = vec![Tracer::zero(); n];
-                Equation { n, parts: std::slice::from_ref(term) }.eval(&all, &mut column);
-                column
-            });
-            let single: Vec<Vec<_>> = single.collect();
-            match jacobian(&Equation { n, parts }, &all) {
-                Ok((_, matrix)) => {
-                    let columns = || (0..2 * n).chain(chosen.iter().map(|k| 3 * n + k));
-                    let row = |i: usize| columns().map(move |k| i * width + k);
-                    let of = |i: usize| {
-                        row(i).map(|at| matrix[at]).chain(single.iter().map(|column| column[i])).collect::<Vec<_>>()
-                    };
-                    (0..n).flat_map(of).collect()
-                }
-                Err(error) => {
-                    failure = Some(error);
-                    Vec::new()
+                for (row, own) in rows.iter_mut().zip(part.rate.slopes(x, p, chosen)?) {
+                    own.into_iter().for_each(|(column, f)| add(row, column, -f));
                 }
             }
+            let width = 2 * n + chosen.len();
+            for (k, term) in terms.iter().enumerate() {
+                let column = term.rate.equations(x, p)?;
+                rows.iter_mut().zip(column).for_each(|(row, f)| add(row, width + k, -f));
+            }
+            let element = |row: &BTreeMap<_, _>, column| row.get(&column).copied().unwrap_or_else(Tracer::zero);
+            Some(rows.iter().flat_map(|row| (0..width + terms.len()).map(move |column| element(row, column))).collect())
         })?;
-        match failure {
-            Some(error) => Err(error),
-            None => Ok(Self { n, motion: Arc::new(motion), slopes: Arc::new(slopes) }),
-        }
+        Ok(Self { n, motion: Arc::new(motion), slopes: Arc::new(slopes) })
     }
 }
 
-/// A recorded function of state and parameters: a part of the Lagrangian, or of the dissipation function.
+/// A recorded function of state and parameters, a part of the Lagrangian or of the dissipation function, and its rate.
 #[derive(Debug)]
 pub struct EquationPart {
-    value: RecordedValue<f64>,
+    value: Program<f64>,
+    rate: Rate<f64>,
     friction: bool,
 }
 
@@ -126,7 +107,12 @@ impl EquationPart {
     /// # Errors
     /// [`TapeError`] for one that branches on its data.
     pub fn record(function: &impl Lagrangian, parameters: usize, friction: bool) -> Result<Self, TapeError> {
-        Ok(Self { value: RecordedValue { value: Value { parameters }.visit(function)? }, friction })
+        Self::of(Value { parameters }.visit(function)?, friction)
+    }
+
+    fn of(value: Program<f64>, friction: bool) -> Result<Self, TapeError> {
+        let rate = if friction { Rate::of_dissipation(&value) } else { Rate::of_lagrangian(&value) };
+        Ok(Self { rate: rate?, value, friction })
     }
 }
 
@@ -140,49 +126,6 @@ impl LagrangianVisitor for Value {
     fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
         let n = lagrangian.coordinates();
         Program::record(2 * n, self.parameters, |x, p| vec![lagrangian.lagrangian(p, &x[..n], &x[n..])])
-    }
-}
-
-/// The residual `r` without `Q`, a function of `(q, v, a, p)`.
-struct Equation<'a> {
-    n: usize,
-    parts: &'a [EquationPart],
-}
-
-impl VectorFunction for Equation<'_> {
-    fn outputs(&self) -> usize {
-        self.n
-    }
-
-    /// `d/dt (dL/dv_i)` is the mixed second derivative of `L` along `(0, e_i)` and `(v, a)`.
-    fn eval<R: Real>(&self, x: &[R], out: &mut [R]) {
-        let n = self.n;
-        let (q, v, a, p) = (&x[..n], &x[n..2 * n], &x[2 * n..3 * n], &x[3 * n..]);
-        let still = |x: &[R]| x.iter().map(|&x| HyperDual::lift(x)).collect::<Vec<_>>();
-        let moving = |x: &[R], by: &[R]| {
-            let pairs = x.iter().zip(by);
-            pairs.map(|(&x, &by)| HyperDual::new(x, R::zero(), by, R::zero())).collect::<Vec<_>>()
-        };
-        let p = still(p);
-        let (moving_q, mut moving_v) = (moving(q, v), moving(v, a));
-        let (mut still_q, mut still_v) = (still(q), still(v));
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = R::zero();
-            for EquationPart { value, friction } in self.parts {
-                if *friction {
-                    still_v[i].s = R::one();
-                    *out += value.lagrangian(&p, &still_q, &still_v).s;
-                    still_v[i].s = R::zero();
-                    continue;
-                }
-                moving_v[i].s = R::one();
-                *out += value.lagrangian(&p, &moving_q, &moving_v).st;
-                moving_v[i].s = R::zero();
-                still_q[i].s = R::one();
-                *out -= value.lagrangian(&p, &still_q, &still_v).s;
-                still_q[i].s = R::zero();
-            }
-        }
     }
 }
 
@@ -209,7 +152,7 @@ impl<S: crate::scalar::Scalar> super::GeneralizedForce<S> for Friction<S> {
     fn slopes(&self, n: usize) -> Option<Box<dyn Slopes<S> + '_>> {
         let k = self.parameters.len();
         let value = Program::record(2 * n, k, |x, p| vec![self.function.lagrangian(p, &x[..n], &x[n..])]).ok()?;
-        Some(Box::new(ProgramSlopes::new(SlopePrograms::of_dissipation(&value)?, &self.parameters)))
+        Some(Box::new(ProgramSlopes::new(SlopePrograms::of(&Rate::of_dissipation(&value).ok()?)?, &self.parameters)))
     }
 }
 

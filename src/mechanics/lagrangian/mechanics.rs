@@ -1,7 +1,7 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
 use super::derivatives::{StateTerms, evaluate};
-use super::linearization::{ProgramSlopes, SlopePrograms};
+use super::linearization::{ProgramSlopes, Rate, SlopePrograms};
 use super::programs::program_of_terms;
 use super::taylor::Taylor;
 use super::{
@@ -185,7 +185,7 @@ impl<S: Scalar> Evaluator<S> {
     /// The derivatives of the equations of motion by programs that are recorded on first use.
     fn slopes(&self, form: &dyn Form<S>) -> Option<Box<dyn Slopes<S>>> {
         self.require_parameters(form).ok()?;
-        let record = || SlopePrograms::of_lagrangian(&self.value(form)?.value);
+        let record = || SlopePrograms::of(&Rate::of_lagrangian(&self.value(form)?.value).ok()?);
         let programs = self.slopes.get_or_init(record).clone()?;
         Some(Box::new(ProgramSlopes::new(programs, &self.parameters)))
     }
@@ -533,7 +533,7 @@ mod tests {
             let program = model.evaluator.program(&model.system, terms).unwrap();
             assert!(program.lane_operations() <= operations, "{n}: {}", program.lane_operations());
             let value = model.evaluator.value(&model.system).unwrap();
-            let slopes = SlopePrograms::of_lagrangian(&value.value).unwrap();
+            let slopes = SlopePrograms::of(&Rate::of_lagrangian(&value.value).unwrap()).unwrap();
             assert!(slopes.operations() <= of_slopes, "{n}: {}", slopes.operations());
         }
     }

@@ -1,7 +1,7 @@
 //! Models around a model: with forces beside its Lagrangian, generalized forces `Q(q, v)` or Rayleigh's dissipation, and
 //! with a flag that ends it.
 
-use super::linearization::{ProgramSlopes, SlopePrograms, add_jacobian, with_force};
+use super::linearization::{ProgramSlopes, Rate, SlopePrograms, add_jacobian, with_force};
 use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
 use crate::forward::Dual;
 use crate::scalar::{Dd, Real, Scalar};
@@ -73,7 +73,7 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
 
     fn slopes(&self, n: usize) -> Option<Box<dyn Slopes<S> + '_>> {
         let value = Program::record(2 * n, 0, |x, _| vec![self.0.dissipation(&x[..n], &x[n..])]).ok()?;
-        Some(Box::new(ProgramSlopes::new(SlopePrograms::of_dissipation(&value)?, &[])))
+        Some(Box::new(ProgramSlopes::new(SlopePrograms::of(&Rate::of_dissipation(&value).ok()?)?, &[])))
     }
 }
 

@@ -4,7 +4,7 @@ use super::projection::project;
 use super::rows::independent;
 use super::{Constraints, Manifold, ManifoldRows, RowAdjoint};
 use crate::forward::{Dual, HyperDual};
-use crate::lagrangian::linearization::{ProgramSlopes, SlopePrograms, Sum};
+use crate::lagrangian::linearization::{ProgramSlopes, Rate, SlopePrograms, Sum};
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Slopes, Terms};
 use crate::scalar::{Dd, Real, Scalar};
 
@@ -340,7 +340,8 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
         let rows = (self.rows, &self.kept[..]);
-        let programs = SlopePrograms::of_constraints(&self.constraints, rows, &self.parameters, self.shared)?;
+        let rate = Rate::of_constraints(&self.constraints, rows, &self.parameters, self.shared).ok()?;
+        let programs = SlopePrograms::of(&rate)?;
         let parameters = if self.shared { &self.parameters[..] } else { &[] };
         Some(Box::new(Sum(self.model.slopes()?, Box::new(ProgramSlopes::new(programs, parameters)))))
     }

@@ -3,10 +3,12 @@
 mod differences;
 mod forces;
 mod programs;
+mod rate;
 
 pub(super) use differences::add_jacobian;
 pub(super) use forces::{Sum, with_force};
 pub(super) use programs::{ProgramSlopes, SlopePrograms};
+pub(super) use rate::{Rate, add};
 
 use super::constraints::Bordered;
 use super::{EulerLagrange, MechanicsError, Request, Terms};

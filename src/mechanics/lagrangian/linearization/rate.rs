@@ -1,0 +1,197 @@
+//! The rate along the motion, from whose derivatives all equations of motion follow.
+//!
+//! Of a Lagrangian it is `w.dL/dq + a.dL/dv`, `w = v`. With a dissipation function `D`, with the rows `A` of constraints, their multipliers
+//! `lambda` and weights `y` of their second derivatives,
+//!
+//! ```text
+//! R(q, v, w, a, lambda, y) = w.dL/dq + a.dL/dv + D + lambda.(A w) - y.(A a + gamma)
+//! ```
+//!
+//! holds the equations
+//!
+//! ```text
+//! g - c - M a - dD/dv + A^T lambda = dR/dw - dR/dv,    -(A a + gamma) = dR/dy.
+//! ```
+//!
+//! All their derivatives are therefore second derivatives of `R`. The Lagrangian, the friction and the constraints have rates of their own,
+//! which add up.
+
+use crate::forward::{Dual, HyperDual};
+use crate::lagrangian::Constraints;
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Directions, Program, ROWS, TANGENTS, TapeError, Tracer};
+use std::collections::BTreeMap;
+
+/// The rate of a part as a program of `q`, `v`, `w`, `a`, `lambda`, `y` and parameters.
+#[derive(Debug)]
+pub(crate) struct Rate<S> {
+    program: Program<S>,
+    /// Numbers of coordinates, and of constraints that the part knows.
+    pub size: (usize, usize),
+    /// `true` if `d2R/dw dq` is known to be symmetric.
+    symmetric: bool,
+}
+
+/// Rows by their columns; what is not there is zero.
+pub(crate) type SparseRows<R> = Vec<BTreeMap<usize, R>>;
+
+impl<S: Scalar> Rate<S> {
+    /// Of the Lagrangian with this value.
+    ///
+    /// # Errors
+    /// [`TapeError::Full`], here and below.
+    pub fn of_lagrangian(value: &Program<S>) -> Result<Self, TapeError> {
+        let (n, k) = (value.inputs() / 2, value.parameters());
+        let program = Program::record_within(ROWS, (4 * n + k, 0), |x, _| {
+            // The coordinates move along `w`, the velocities along `a`.
+            let moving = x[..2 * n].iter().zip(&x[2 * n..]).map(|(&value, &tangent)| Dual { value, tangent });
+            let parameters: Vec<_> = x[4 * n..].iter().map(|&p| Dual::lift(p)).collect();
+            Some(vec![value.interpret(&moving.collect::<Vec<_>>(), &parameters).ok()?[0].tangent])
+        });
+        Ok(Self { program: program?, size: (n, 0), symmetric: true })
+    }
+
+    /// Of the dissipation function with this value.
+    pub fn of_dissipation(value: &Program<S>) -> Result<Self, TapeError> {
+        let (n, k) = (value.inputs() / 2, value.parameters());
+        let program =
+            Program::record_within(ROWS, (4 * n + k, 0), |x, _| value.interpret(&x[..2 * n], &x[4 * n..]).ok());
+        Ok(Self { program: program?, size: (n, 0), symmetric: true })
+    }
+
+    /// Of those rows of constraints with these numbers; `shared` if their parameters are the Lagrangian's.
+    pub fn of_constraints(
+        constraints: &impl Constraints,
+        (all, kept): (usize, &[usize]),
+        parameters: &[S],
+        shared: bool,
+    ) -> Result<Self, TapeError> {
+        let (n, m) = (constraints.coordinates(), kept.len());
+        let (before, k) = (4 * n + 2 * m, if shared { parameters.len() } else { 0 });
+        let program = Program::record_within(ROWS, (before + k, 0), |x, _| {
+            let own: Vec<_> = match shared {
+                true => x[before..].to_vec(),
+                false => parameters.iter().map(|&p| Tracer::constant(p)).collect(),
+            };
+            let (zero, at) = (Tracer::zero(), |field: usize, i: usize| x[field * n + i]);
+            let p: Vec<_> = own.iter().map(|&p| Dual::lift(p)).collect();
+            let mut sum = zero;
+            // Of a function the row is the gradient by the coordinates, of a row that is linear in the velocities by those.
+            for holonomic in [true, false] {
+                let along = |field: usize, moves: bool| -> Vec<_> {
+                    let tangent = |i: usize| if moves { at(2, i) } else { zero };
+                    (0..n).map(|i| Dual { value: at(field, i), tangent: tangent(i) }).collect()
+                };
+                let (q, v) = (along(0, holonomic), along(1, !holonomic));
+                let mut values = vec![Dual::lift(zero); all];
+                constraints.values(&p, &q, &v, &mut values);
+                for (c, &row) in kept.iter().enumerate().filter(|(_, row)| constraints.is_holonomic(**row) == holonomic)
+                {
+                    sum += x[4 * n + c] * values[row].tangent;
+                }
+            }
+            let p: Vec<_> = own.iter().map(|&p| HyperDual::new(p, zero, zero, zero)).collect();
+            let q: Vec<_> = (0..n).map(|i| HyperDual::new(at(0, i), at(1, i), at(1, i), at(3, i))).collect();
+            let v: Vec<_> = (0..n).map(|i| HyperDual::new(at(1, i), at(3, i), zero, zero)).collect();
+            let mut values = vec![HyperDual::new(zero, zero, zero, zero); all];
+            constraints.values(&p, &q, &v, &mut values);
+            for (c, &row) in kept.iter().enumerate() {
+                let second = if constraints.is_holonomic(row) { values[row].st } else { values[row].s };
+                sum -= x[4 * n + m + c] * second;
+            }
+            Some(vec![sum])
+        });
+        let symmetric = kept.iter().all(|&row| constraints.is_holonomic(row));
+        Ok(Self { program: program?, size: (n, m), symmetric })
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        let (n, m) = self.size;
+        self.program.inputs() - 4 * n - 2 * m
+    }
+
+    /// The inputs at a state that moves: `x` holds `q`, `v`, `a`, `lambda`, and `y` is zero.
+    fn at_motion<R: Real>(&self, x: &[R], parameters: &[R]) -> Vec<R> {
+        let (n, m) = self.size;
+        [&x[..2 * n], &x[n..3 * n + m], &vec![R::zero(); m], parameters].concat()
+    }
+
+    /// The `n + m` equations `f` at `x`, which holds `q`, `v`, `a`, `lambda`.
+    pub fn equations<R: Real>(&self, x: &[R], parameters: &[R]) -> Option<Vec<R>> {
+        let (n, m) = self.size;
+        let by = self.program.derivatives(&self.at_motion(x, parameters), &[], None)?.first;
+        let of_motion = (0..n).map(|i| by[2 * n + i] - by[n + i]);
+        Some(of_motion.chain(by[4 * n + m..4 * n + 2 * m].iter().copied()).collect())
+    }
+
+    /// The elements of `df/d(q, v)` that are not zero, `n + m` rows and `2 n` columns, and behind those the derivatives by chosen parameters.
+    pub fn slopes<R: Real>(&self, x: &[R], parameters: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
+        let ((n, m), count) = (self.size, self.program.inputs());
+        // Velocities move along the first directions, coordinates along the next, parameters along the others.
+        let direction = |input: usize| match input.checked_sub(4 * n + 2 * m) {
+            Some(parameter) => chosen.iter().position(|&of| of == parameter).map(|place| 2 * n + place),
+            None if input < n => Some(n + input),
+            None => (input < 2 * n).then(|| input - n),
+        };
+        // The last direction of an input: of symmetric blocks the lower triangle is enough.
+        let last = |input: usize| match (input / n, input.checked_sub(4 * n + m)) {
+            (_, Some(y)) => (y < m).then_some(2 * n - 1),
+            (0, _) => Some(n - 1),
+            (1, _) => Some(input - n),
+            (2, _) => Some(if self.symmetric { input - n } else { 2 * n - 1 }),
+            _ => None,
+        };
+        let directions = Directions {
+            seeds: (0..count).map(|k| direction(k).map(|at| (at as u32, R::one())).into_iter().collect()).collect(),
+            rows: (0..count).map(|input| last(input).map(|last| last as u32)).collect(),
+            shared: 2 * n as u32,
+            budget: TANGENTS,
+        };
+        let second = self.program.derivatives(&self.at_motion(x, parameters), &[], Some(&directions))?.second;
+        let mut rows: SparseRows<R> = vec![BTreeMap::new(); n + m];
+        for (input, elements) in second.into_iter().enumerate() {
+            for (direction, x) in elements {
+                let direction = direction as usize;
+                let (of_q, j) = (direction / n.max(1) == 1, direction % n);
+                match (input / n, input.checked_sub(4 * n + m)) {
+                    _ if direction >= 2 * n => match (input / n, input.checked_sub(4 * n + m)) {
+                        (_, Some(y)) => add(&mut rows[n + y], direction, x),
+                        (1, _) => add(&mut rows[input - n], direction, -x),
+                        (2, _) => add(&mut rows[input - 2 * n], direction, x),
+                        _ => {}
+                    },
+                    (_, Some(y)) => add(&mut rows[n + y], if of_q { j } else { n + j }, x),
+                    // -d2R/dv dq.
+                    (0, _) => add(&mut rows[j], input, -x),
+                    // -d2R/dv dv.
+                    (1, _) => {
+                        add(&mut rows[input - n], n + j, -x);
+                        if j < input - n {
+                            add(&mut rows[j], input, -x);
+                        }
+                    }
+                    // d2R/dw dq.
+                    _ if of_q => {
+                        add(&mut rows[input - 2 * n], j, x);
+                        if self.symmetric && j < input - 2 * n {
+                            add(&mut rows[j], input - 2 * n, x);
+                        }
+                    }
+                    // d2R/dw dv and, as w moves with v, -d2R/dv dw.
+                    _ => {
+                        add(&mut rows[input - 2 * n], n + j, x);
+                        add(&mut rows[j], input - n, -x);
+                    }
+                }
+            }
+        }
+        rows.iter_mut().for_each(|row| row.retain(|_, x| !x.is_exact_zero()));
+        Some(rows)
+    }
+}
+
+/// Adds to an element of a row.
+pub(crate) fn add<R: Real>(row: &mut BTreeMap<usize, R>, column: usize, x: R) {
+    row.entry(column).and_modify(|sum| *sum += x).or_insert(x);
+}
