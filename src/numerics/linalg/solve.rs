@@ -107,24 +107,25 @@ impl<'a, S: Scalar> Systems<'a, S> {
         self.solve_pivoted(solutions, workspace);
     }
 
-    /// Solves with pivots what was refused as not definite, a row at a time; all of it if nothing was tried or everything refused.
+    /// Solves with pivots the rows that were refused as not definite; all if nothing was tried.
     fn solve_refused(&self, refused: Option<Vec<usize>>, solutions: &mut [S], workspace: &mut Workspace<S>) {
         let &Self { n, m, .. } = self;
-        match refused {
-            Some(refused) if refused.len() * n * m < solutions.len() => {
-                for row in refused {
-                    let one = Systems {
-                        matrices: &self.matrices[row * n * n..][..n * n],
-                        right: self.right.map(|right| &right[row * n * m..][..n * m]),
-                        ..*self
-                    };
-                    let before = workspace.failures().len();
-                    one.solve_pivoted(&mut solutions[row * n * m..][..n * m], workspace);
-                    workspace.failures_mut()[before..].iter_mut().for_each(|(failed, _)| *failed = row);
-                }
-            }
-            _ => self.solve_pivoted(solutions, workspace),
+        let refused = match refused {
+            Some(refused) if refused.is_empty() => return,
+            Some(refused) if refused.len() * n * m < solutions.len() => refused,
+            _ => return self.solve_pivoted(solutions, workspace),
+        };
+        let gathered = |from: &[S], size: usize| -> Vec<S> {
+            refused.iter().flat_map(|row| &from[row * size..][..size]).copied().collect()
+        };
+        let matrices = gathered(self.matrices, n * n);
+        let right = self.right.map(|right| gathered(right, n * m));
+        let mut found = vec![S::nan(); refused.len() * n * m];
+        Systems { matrices: &matrices, right: right.as_deref(), ..*self }.solve_pivoted(&mut found, workspace);
+        for (&row, found) in refused.iter().zip(found.chunks_exact(n * m)) {
+            solutions[row * n * m..][..n * m].copy_from_slice(found);
         }
+        workspace.failures_mut().iter_mut().for_each(|(failed, _)| *failed = refused[*failed]);
     }
 
     /// The same, failures added to those that are known.
