@@ -14,7 +14,8 @@ const BRANCH: f64 = 1e-3;
 const LOOKED_INTO: (f64, f64) = (0.9, 0.3);
 /// Parts of a step between which rows are compared: adaptive methods take steps in which wheels turn around.
 const PARTS: usize = 8;
-/// Halvings of an interval around the smallest singular value: of one that is to be known to rounding, and of one that others are compared with.
+/// Halvings of an interval around the smallest singular value: of one that is to be known to rounding, and of one that others are compared
+/// with.
 const HALVINGS: (usize, usize) = (52, 12);
 /// Places of a step that are looked at first, and divisions of the interval around the least of them.
 const PLACES: usize = 16;
@@ -118,7 +119,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
     fn halved(&mut self, (above, halvings): (S, usize), q: &[S]) -> S {
         let matrix = self.matrix_at(q);
         let rows = self.starts.windows(2).map(|at| &matrix[at[0]..at[1]]).zip(self.units());
-        // No singular value is below the smallest one, which no row is shorter than.
+        // The smallest singular value is not above the length of any row.
         let shortest = rows.fold(S::infinity(), |least, (row, unit)| {
             let size = Real::sqrt(dot(row, row)) * unit;
             if size < least || size.is_nan() { size } else { least }
