@@ -7,6 +7,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use lnn::lagrangian::{Accelerations, EulerLagrange, Lagrangian, Linearizer, Mechanics, Request, Terms};
+use lnn::rollout::{Options, rollout};
 use lnn::scalar::Real;
 use lnn::tape::{Function, ScalarFunction, hessian};
 use std::hint::black_box;
@@ -171,6 +172,45 @@ fn lagrangians(c: &mut Criterion) {
     group.finish();
 }
 
+/// Points on rods in Cartesian coordinates, a tenth of a radian from the vertical to either side in turn, at rest.
+fn hanging(rods: usize) -> Vec<f64> {
+    let mut at = [0.0, 0.0];
+    let next = |k: usize| {
+        let (sin, cos) = (0.1 * (-1.0_f64).powi(k as i32)).sin_cos();
+        at = [at[0] + sin, at[1] - cos];
+        at
+    };
+    (0..rods).flat_map(next).collect()
+}
+
+/// The chain of so many rods of the catalogue.
+fn rods(n: usize) -> Box<dyn EulerLagrange<f64>> {
+    lnn::lagrangian::build::<f64>(&format!("cartesian-chain-{n}"), &[]).expect("of the catalogue")
+}
+
+/// The end of a short motion of a model under constraints.
+fn moved(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> f64 {
+    let found = rollout(model, black_box(q), v, &Options::new(0.02, 0.02));
+    found.complete().expect("independent rods").q[q.len()]
+}
+
+fn constrained(c: &mut Criterion) {
+    let mut group = c.benchmark_group("Cartesian chain");
+    group.sample_size(10);
+    for n in [20, 100, 500] {
+        let (model, q, v) = (rods(n), hanging(n), vec![0.0; 2 * n]);
+        let start = Instant::now();
+        let (mut handle, mut a) = (Accelerations::new(model.as_ref()), vec![0.0; 2 * n]);
+        handle.at(&q, &v, &mut a).expect("independent rods");
+        println!("Cartesian chain {n}: first call in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+        group.bench_function(BenchmarkId::new("acceleration, one state, by the handle", n), |b| {
+            b.iter(|| handle.at(black_box(&q), &v, &mut a).expect("independent rods"));
+        });
+        group.bench_function(BenchmarkId::new("motion of 0.02 s", n), |b| b.iter(|| moved(model.as_ref(), &q, &v)));
+    }
+    group.finish();
+}
+
 /// One point of a row, `times` times.
 fn count(name: &str, n: usize, times: usize) {
     let x = numbers(2 * n);
@@ -189,6 +229,17 @@ fn count(name: &str, n: usize, times: usize) {
         "handle" => {
             let (mut handle, mut a) = (Accelerations::new(&chain), vec![0.0; n]);
             repeat(&mut || handle.at(black_box(q), v, &mut a).expect(regular));
+        }
+        "rods" => {
+            let (model, q, v) = (rods(n), hanging(n), vec![0.0; 2 * n]);
+            let (mut handle, mut a) = (Accelerations::new(model.as_ref()), vec![0.0; 2 * n]);
+            repeat(&mut || handle.at(black_box(&q), &v, &mut a).expect("independent rods"));
+        }
+        "motion" => {
+            let (model, q, v) = (rods(n), hanging(n), vec![0.0; 2 * n]);
+            repeat(&mut || {
+                black_box(moved(model.as_ref(), &q, &v));
+            });
         }
         "linearization" => {
             let mut linearizer = Linearizer::new(&chain);
@@ -223,7 +274,7 @@ fn count(name: &str, n: usize, times: usize) {
     }
 }
 
-criterion_group!(hessian_benches, functions, lagrangians);
+criterion_group!(hessian_benches, functions, lagrangians, constrained);
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
@@ -233,7 +284,7 @@ fn main() {
             (Some(name), Some(n), Some(times)) => return count(name, n, times),
             _ => {
                 return eprintln!(
-                    "--count chain|lattice|handle|linearization|gradient|batch|pattern|rosenbrock NUMBERS TIMES"
+                    "--count chain|lattice|handle|rods|motion|linearization|gradient|batch|pattern|rosenbrock NUMBERS TIMES"
                 );
             }
         }

@@ -1,24 +1,33 @@
 //! Accelerations of one state after the other: the system `M a = g - c` of a sparse mass matrix is solved within the program that computes it.
 
+use super::elimination::{Balance, eliminate};
 use super::programs::derivatives;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::SMALL_PIVOT;
 use crate::scalar::{Real, Scalar};
-use crate::tape::{Program, ROWS, Replay};
-use std::collections::BTreeMap;
+use crate::tape::{Program, ROWS, Replay, Tracer};
+use std::fmt::Debug;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Products of an elimination that are always worth recording: it takes less time than the call of a solver.
-const SMALL: usize = 60;
+pub(super) const SMALL: usize = 60;
+
+/// What records the equations of motion of a model, at a state and with parameters that are being recorded.
+pub(super) trait RecordMotion<S>: Debug + Send + Sync {
+    /// The equations; `None` if they are too large.
+    fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>>;
+}
 
 /// A program of accelerations, in which the elimination with the pattern of the mass matrix is recorded too.
 ///
-/// Of a positive definite matrix no pivot has to be searched for. Whether it is one is seen at each state: by the pivots, which follow the
-/// accelerations among the outputs.
+/// Of a positive definite matrix no pivot has to be searched for, nor of one that constraints border. Whether it is one is seen at each
+/// state: by the pivots, which follow the accelerations among the outputs.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Solved<'a, S> {
+    /// What it was recorded from, for a model that adds to these equations.
+    motion: Arc<dyn RecordMotion<S>>,
     program: Arc<Program<S>>,
     parameters: Vec<S>,
     /// Number of pairs of a pivot and the element of the diagonal that it was.
@@ -32,82 +41,75 @@ impl<'a, S: Scalar> Solved<'a, S> {
     pub(super) fn until(self, flag: &'a AtomicBool) -> Self {
         Self { flag: Some(flag), ..self }
     }
+
+    /// The same as long as another one may be called.
+    pub(super) fn as_long_as(self, other: Self) -> Self {
+        Self { flag: other.flag, ..self }
+    }
+
+    /// What it was recorded from, and the values of its parameters.
+    pub(super) fn motion(&self) -> (&Arc<dyn RecordMotion<S>>, &[S]) {
+        (&self.motion, &self.parameters)
+    }
 }
 
 impl<S: Scalar> Solved<'static, S> {
-    /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.
-    pub(super) fn record(value: &Program<S>, parameters: &[S]) -> Option<Self> {
-        let n = value.inputs() / 2;
+    /// Records the accelerations of so many coordinates by an elimination of at most so many products; `None` if it takes more.
+    pub(super) fn record(motion: Arc<dyn RecordMotion<S>>, n: usize, parameters: &[S], most: usize) -> Option<Self> {
         let mut pivots = 0;
-        let program = Program::record_within(ROWS, (2 * n, value.parameters()), |x, p| {
-            let found = derivatives(value, x, p, Request::ACCELERATION)?;
-            let force = found.dl_dq.iter().zip(&found.coriolis).map(|(&g, &c)| g - c).collect();
-            let (mut outputs, guards) = eliminate(found.mass_matrix, force, SMALL.max(value.lane_operations()))?;
-            pivots = guards.len();
-            outputs.extend(guards.into_iter().flatten());
+        let program = Program::record_within(ROWS, (2 * n, parameters.len()), |x, p| {
+            let balance = motion.record(x, p)?;
+            let is_diagonal = balance.lower.iter().all(|row| row.len() == 1);
+            let (mut outputs, guards) = eliminate(balance, most)?;
+            outputs.truncate(n);
+            // A diagonal matrix is solved whatever its signs.
+            if !is_diagonal {
+                pivots = guards.len();
+                outputs.extend(guards.into_iter().flatten());
+            }
             Some(outputs)
         });
-        Some(Self::of(program.ok()?, parameters.to_vec(), pivots))
+        let (program, parameters) = (Arc::new(program.ok()?), parameters.to_vec());
+        Some(Self { motion, program, parameters, pivots, flag: None })
     }
 
-    /// A program of accelerations with so many pairs of an element and a pivot behind them, and the values of its parameters.
-    pub(super) fn of(program: Program<S>, parameters: Vec<S>, pivots: usize) -> Self {
-        Self { program: Arc::new(program), parameters, pivots, flag: None }
+    /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.
+    pub(super) fn of_value(value: &Program<S>, parameters: &[S]) -> Option<Self> {
+        let (n, most) = (value.inputs() / 2, SMALL.max(value.lane_operations()));
+        Self::record(Arc::new(Value(value.clone())), n, parameters, most)
     }
 }
 
-/// Solves with the lower triangle of a symmetric matrix in at most so many products: the solution, and every pivot behind the element of the
-/// diagonal that it was.
-pub(super) fn eliminate<R: Real>(
-    lower: Vec<Vec<(usize, R)>>,
-    mut right: Vec<R>,
-    most: usize,
-) -> Option<(Vec<R>, Vec<[R; 2]>)> {
-    let n = lower.len();
-    let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
-    let diagonal: Vec<R> = lower.iter().enumerate().map(own).collect::<Option<_>>()?;
-    let mut pivots = diagonal.clone();
-    let mut rest: Vec<BTreeMap<usize, R>> = vec![BTreeMap::new(); n];
-    for (i, row) in lower.into_iter().enumerate() {
-        for (j, m) in row.into_iter().filter(|(j, _)| *j != i) {
-            rest[i].insert(j, m);
-            rest[j].insert(i, m);
-        }
+/// The equations of a Lagrangian by the program of its value.
+#[derive(Debug)]
+struct Value<S>(Program<S>);
+
+impl<S: Scalar> RecordMotion<S> for Value<S> {
+    fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>> {
+        let found = derivatives(&self.0, state, parameters, Request::ACCELERATION)?;
+        let right = found.dl_dq.iter().zip(&found.coriolis).map(|(&g, &c)| g - c).collect();
+        Some(Balance { coordinates: state.len() / 2, lower: found.mass_matrix, right })
     }
-    let is_diagonal = rest.iter().all(BTreeMap::is_empty);
-    let (mut steps, mut products) = (Vec::with_capacity(n), 0);
-    let mut left: Vec<usize> = (0..n).collect();
-    while !left.is_empty() {
-        // The row that fills in the least.
-        let at = (0..left.len()).min_by_key(|&at| rest[left[at]].len())?;
-        let k = left.remove(at);
-        let row = std::mem::take(&mut rest[k]);
-        products += row.len() * (row.len() + 3) / 2;
-        if products > most {
-            return None;
-        }
-        let factors: Vec<(usize, R)> = row.iter().map(|(&i, &m)| (i, m / pivots[k])).collect();
-        let known = right[k];
-        for &(i, factor) in &factors {
-            rest[i].remove(&k);
-            right[i] -= factor * known;
-            pivots[i] -= factor * row[&i];
-            for (&j, &m) in row.range(..i) {
-                let term = factor * m;
-                let element = rest[i].get(&j).map_or(-term, |&element| element - term);
-                rest[i].insert(j, element);
-                rest[j].insert(i, element);
-            }
-        }
-        steps.push((k, factors));
+}
+
+/// `true` if all numbers are finite.
+pub(crate) fn are_finite<S: Scalar>(numbers: &[S]) -> bool {
+    let zero = <S as Real>::zero();
+    let mut probe = zero;
+    for &x in numbers {
+        probe += x * zero;
     }
-    let mut solution = right;
-    for (k, factors) in steps.into_iter().rev() {
-        solution[k] = factors.iter().fold(solution[k] / pivots[k], |x, &(i, factor)| x - factor * solution[i]);
+    probe == zero
+}
+
+/// `true` if every pivot of an elimination is positive, and not much below the element of the diagonal that it was.
+pub(super) fn are_safe<S: Scalar>(guards: &[S]) -> bool {
+    let (floor, zero) = (S::of_f64(SMALL_PIVOT), <S as Real>::zero());
+    let mut safe = true;
+    for pair in guards.as_chunks::<2>().0 {
+        safe &= pair[1] > floor * pair[0] && pair[1] > zero;
     }
-    // A diagonal matrix is solved whatever its signs.
-    let guards = diagonal.into_iter().zip(pivots).map(|(element, pivot)| [element, pivot]);
-    Some((solution, if is_diagonal { Vec::new() } else { guards.collect() }))
+    safe
 }
 
 /// The accelerations of a model, state after state or in batches, with buffers of its own: what a solver calls.
@@ -183,23 +185,14 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
     }
 
     /// Fills the accelerations by the program; `false` if there is none, or a state needs a second look.
-    fn is_solved(&mut self, q: &[S], v: &[S], a: &mut [S]) -> bool {
+    pub(super) fn is_solved(&mut self, q: &[S], v: &[S], a: &mut [S]) -> bool {
         let Some((solved, replay)) = &mut self.solved else { return false };
         let batch = q.len() / self.model.coordinates().max(1);
         self.pivots.resize(batch * 2 * solved.pivots, S::nan());
         if replay.evaluate(batch, &[q, v], &solved.parameters, &mut [a, &mut self.pivots]).is_err() {
             return false;
         }
-        let (floor, zero) = (S::of_f64(SMALL_PIVOT), <S as Real>::zero());
-        let mut safe = true;
-        for pair in self.pivots.as_chunks::<2>().0 {
-            safe &= pair[1] > floor * pair[0] && pair[1] > zero;
-        }
-        let mut probe = zero;
-        for &a in a.iter() {
-            probe += a * zero;
-        }
-        safe && probe == zero
+        are_safe(&self.pivots) && are_finite(a)
     }
 }
 

@@ -172,7 +172,7 @@ impl<S: Scalar> Evaluator<S> {
     /// The program of the accelerations alone, recorded on first use.
     fn solved(&self, form: &dyn Form<S>) -> Option<Solved<'static, S>> {
         self.require_parameters(form).ok()?;
-        let record = || Solved::record(&self.value(form)?.value, &self.parameters);
+        let record = || Solved::of_value(&self.value(form)?.value, &self.parameters);
         self.solved.get_or_init(record).clone()
     }
 

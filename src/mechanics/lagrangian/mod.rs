@@ -9,6 +9,7 @@ mod constrained_systems;
 mod constraints;
 mod derivatives;
 mod description;
+mod elimination;
 mod equations;
 mod error;
 mod euler_lagrange;
@@ -33,6 +34,8 @@ mod wrappers;
 pub use accelerations::Accelerations;
 #[doc(hidden)]
 pub use accelerations::Solved;
+#[cfg(feature = "rollout")]
+pub(crate) use accelerations::are_finite;
 pub(crate) use configure::{LagrangianVisitor, resolve};
 pub use configure::{SystemError, SystemInstance, build, configure, systems};
 #[doc(hidden)]

@@ -2,9 +2,10 @@
 //! the two the motion takes.
 
 use super::StepFailure;
-use crate::lagrangian::{Manifold, ManifoldRows, dot};
+use crate::lagrangian::{Manifold, ManifoldRows, are_finite, dot};
 use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar};
+use crate::tape::Replay;
 
 /// The smallest singular value of the rows over the largest that it had, below which it counts as 0. Where it passes through 0 the minimum
 /// is met to the rounding of the search, far below; a motion that keeps away from its branches by a thousandth has one way to go.
@@ -13,6 +14,9 @@ const BRANCH: f64 = 1e-3;
 const LOOKED_INTO: (f64, f64) = (0.9, 0.3);
 /// Parts of a step between which rows are compared: adaptive methods take steps in which wheels turn around.
 const PARTS: usize = 8;
+/// Halvings of an interval around the smallest singular value: of one that is to be known to rounding, and of one that others are compared
+/// with.
+const HALVINGS: (usize, usize) = (52, 12);
 /// Places of a step that are looked at first, and divisions of the interval around the least of them.
 const PLACES: usize = 16;
 const DIVISIONS: usize = 40;
@@ -29,46 +33,123 @@ pub(super) struct Regularity<'a, S> {
     q: Vec<S>,
     v: Vec<S>,
     matrix: Vec<S>,
+    /// Where the rows begin in the matrix, and where the last one ends.
+    starts: Vec<usize>,
     rows: ManifoldRows<S>,
+    /// Programs that know the pattern of the rows, whose matrix then holds what is not zero.
+    sparse: Option<Sparse<S>>,
+}
+
+/// Programs of rows, and buffers.
+struct Sparse<S> {
+    elements: Replay<S>,
+    shifted: Replay<S>,
+    pivots: Vec<S>,
 }
 
 impl<'a, S: Scalar> Regularity<'a, S> {
     /// From a start.
     pub fn new(manifold: &'a dyn Manifold<S>, (q, v): (&[S], &[S]), backwards: bool) -> Self {
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+        let m = manifold.names().len();
+        let programs = manifold
+            .programs()
+            .filter(|_| m > 0)
+            .and_then(|programs| Some((programs.elements()?, programs.shifted()?)));
+        let (sparse, starts) = match programs {
+            Some(((elements, starts), shifted)) => {
+                (Some(Sparse { elements, shifted, pivots: vec![zero; m] }), starts.to_vec())
+            }
+            None => (None, (0..=m).map(|row| row * q.len()).collect()),
+        };
         let mut known = Self {
             manifold,
             direction: if backwards { -one } else { one },
-            sizes: vec![zero; manifold.names().len()],
+            sizes: vec![zero; m],
             largest: zero,
             q: q.to_vec(),
             v: v.to_vec(),
             matrix: Vec::new(),
+            starts,
             rows: ManifoldRows::default(),
+            sparse,
         };
         known.matrix = known.matrix_at(q);
         known.grow();
-        known.largest = known.least(&known.matrix).0;
+        known.largest = known.least(q);
         known
     }
 
+    /// The rows: all of their elements, or those that are not zero.
     fn matrix_at(&mut self, q: &[S]) -> Vec<S> {
+        if let Some(sparse) = &mut self.sparse {
+            let mut matrix = vec![S::nan(); self.starts.last().copied().unwrap_or(0)];
+            // Of fields of these sizes it cannot fail.
+            let _ = sparse.elements.evaluate(1, &[q, &self.v], &[], &mut [&mut matrix]);
+            return matrix;
+        }
         self.manifold.rows(q, &self.v, &mut self.rows);
         self.rows.matrix.clone()
     }
 
     fn grow(&mut self) {
-        for (size, row) in self.sizes.iter_mut().zip(self.matrix.chunks_exact(self.q.len())) {
+        for (size, at) in self.sizes.iter_mut().zip(self.starts.windows(2)) {
+            let row = &self.matrix[at[0]..at[1]];
             *size = S::max(*size, Real::sqrt(dot(row, row)));
         }
     }
 
-    /// The smallest singular value of rows over their sizes, and the row that has most part in its direction.
-    fn least(&self, matrix: &[S]) -> (S, usize) {
+    /// One over the sizes.
+    fn units(&self) -> Vec<S> {
+        let zero = <S as Real>::zero();
+        self.sizes.iter().map(|&size| if size > zero { size.recip() } else { zero }).collect()
+    }
+
+    /// `true` if the smallest singular value of the rows over their sizes is above a positive number, by the pattern.
+    fn is_above(&mut self, value: S, q: &[S]) -> bool {
+        let units = self.units();
+        let Some(Sparse { shifted, pivots, .. }) = &mut self.sparse else { return false };
+        let inputs = [q, &self.v, &units, &[value * value]];
+        let done = shifted.evaluate(1, &inputs, &[], &mut [&mut pivots[..]]);
+        done.is_ok() && pivots.iter().all(|&pivot| pivot > <S as Real>::zero())
+    }
+
+    /// The smallest singular value of the rows over their sizes, if it is above a number, by so many halvings; `NaN` of rows that are not
+    /// finite.
+    fn halved(&mut self, (above, halvings): (S, usize), q: &[S]) -> S {
+        let matrix = self.matrix_at(q);
+        let rows = self.starts.windows(2).map(|at| &matrix[at[0]..at[1]]).zip(self.units());
+        // The smallest singular value is not above the length of any row.
+        let shortest = rows.fold(S::infinity(), |least, (row, unit)| {
+            let size = Real::sqrt(dot(row, row)) * unit;
+            if size < least || size.is_nan() { size } else { least }
+        });
+        if !shortest.is_finite() {
+            return S::nan();
+        }
+        let (mut low, mut high) = (above, shortest);
+        for _ in 0..halvings {
+            let middle = (low + high) * S::half();
+            if self.is_above(middle, q) { low = middle } else { high = middle }
+        }
+        low
+    }
+
+    /// The smallest singular value of the rows over their sizes.
+    fn least(&mut self, q: &[S]) -> S {
+        match self.sparse {
+            Some(_) => self.halved((<S as Real>::zero(), HALVINGS.0), q),
+            None => self.least_direction(q).0,
+        }
+    }
+
+    /// The smallest singular value of the rows over their sizes, and the row that has most part in its direction.
+    fn least_direction(&mut self, q: &[S]) -> (S, usize) {
+        self.manifold.rows(q, &self.v, &mut self.rows);
         let (n, m, zero) = (self.q.len(), self.sizes.len(), <S as Real>::zero());
+        let (matrix, units) = (&self.rows.matrix, self.units());
         let row = |i: usize| &matrix[i * n..(i + 1) * n];
-        let unit = |i: usize| if self.sizes[i] > zero { self.sizes[i].recip() } else { zero };
-        let gram: Vec<S> = (0..m * m).map(|at| dot(row(at / m), row(at % m)) * unit(at / m) * unit(at % m)).collect();
+        let gram: Vec<S> = (0..m * m).map(|at| dot(row(at / m), row(at % m)) * units[at / m] * units[at % m]).collect();
         let (mut squares, mut directions) = (vec![zero; m], vec![zero; m * m]);
         if eigh(m, &gram, &mut squares, &mut directions, &mut Workspace::new()).is_err() {
             return (S::nan(), 0);
@@ -82,10 +163,10 @@ impl<'a, S: Scalar> Regularity<'a, S> {
     /// # Errors
     /// [`StepFailure::Branch`] if the rows were not regular on the way.
     pub fn step(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
-        let n = q.len();
         let matrix = self.matrix_at(q);
+        let starts = self.starts.clone();
         let turns = |before: &[S], after: &[S]| {
-            let mut rows = before.chunks_exact(n).zip(after.chunks_exact(n));
+            let mut rows = starts.windows(2).map(|at| (&before[at[0]..at[1]], &after[at[0]..at[1]]));
             rows.any(|(a, b)| dot(a, b) < S::of_f64(LOOKED_INTO.0) * Real::sqrt(dot(a, a) * dot(b, b)))
         };
         let mut last = self.matrix.clone();
@@ -97,8 +178,17 @@ impl<'a, S: Scalar> Regularity<'a, S> {
             last = next;
         }
         turned |= turns(&last, &matrix);
-        let (value, _) = self.least(&matrix);
-        if turned || value < S::of_f64(LOOKED_INTO.1) * self.largest {
+        let floor = S::of_f64(LOOKED_INTO.1) * self.largest;
+        // By the pattern it is enough to know whether the value is above others.
+        let (is_low, value) = if self.sparse.is_none() {
+            let value = self.least(q);
+            (value < floor, value)
+        } else if self.is_above(self.largest, q) {
+            (false, self.halved((self.largest, HALVINGS.1), q))
+        } else {
+            (are_finite(&matrix) && !self.is_above(floor, q), self.largest)
+        };
+        if turned || is_low {
             self.look_into(h, q, v)?;
         }
         self.matrix = matrix;
@@ -122,22 +212,64 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         let signed = h * self.direction;
         let mut at = |x: f64| {
             let place = self.place(x, h, q, v);
-            let matrix = self.matrix_at(&place);
-            self.least(&matrix)
+            self.least(&place)
         };
         let width = 1.0 / PLACES as f64;
-        let values: Vec<S> = (0..=PLACES).map(|k| at(k as f64 * width).0).collect();
+        let values: Vec<S> = (0..=PLACES).map(|k| at(k as f64 * width)).collect();
         let lowest = (0..=PLACES).fold(0, |low, k| if values[k] < values[low] { k } else { low }) as f64 * width;
         let (mut low, mut high) = ((lowest - width).max(0.0), (lowest + width).min(1.0));
         for _ in 0..DIVISIONS {
             let third = (high - low) / 3.0;
-            if at(low + third).0 < at(high - third).0 { high -= third } else { low += third }
+            if at(low + third) < at(high - third) { high -= third } else { low += third }
         }
         let share = 0.5 * (low + high);
-        let (value, constraint) = at(share);
-        if value < S::of_f64(BRANCH) * self.largest {
+        if at(share) < S::of_f64(BRANCH) * self.largest {
+            let place = self.place(share, h, q, v);
+            let (_, constraint) = self.least_direction(&place);
             return Err(StepFailure::Branch { constraint, ahead: share * signed.to_f64() });
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{EulerLagrange, build};
+
+    #[test]
+    fn the_smallest_singular_value_by_the_pattern_is_that_of_all_elements() {
+        for name in ["cartesian-chain-1", "cartesian-chain-9", "rolling-disk", "four-bar-linkage"] {
+            let model: Box<dyn EulerLagrange<f64>> = build(name, &[]).unwrap();
+            let number = |k: usize| (0.37 * k as f64 + 0.3).sin();
+            let q: Vec<f64> = (0..model.coordinates()).map(number).collect();
+            let mut known = Regularity::new(model.manifold().unwrap(), (&q, &q), false);
+            assert!(known.sparse.is_some());
+            let moved: Vec<f64> = q.iter().map(|q| q * q + 0.1).collect();
+            for q in [&q, &moved] {
+                let (exact, _) = known.least_direction(q);
+                assert!((known.least(q) - exact).abs() < 1e-7, "{name}: {exact}");
+                assert!(known.is_above(0.99 * exact, q) && !known.is_above(1.01 * exact, q), "{name}: {exact}");
+                let near = known.halved((0.5 * exact, HALVINGS.1), q);
+                assert!(near <= exact && near > 0.999 * exact, "{name}: {near} {exact}");
+            }
+            assert!(known.least(&vec![f64::NAN; q.len()]).is_nan());
+        }
+    }
+
+    #[test]
+    fn a_short_step_is_regular_and_one_through_a_branch_is_not() {
+        // Four bars in a line have two ways to go.
+        let model: Box<dyn EulerLagrange<f64>> =
+            build("four-bar-linkage", &[("b".to_string(), "3".to_string()), ("c".to_string(), "1".to_string())])
+                .unwrap();
+        let at = |angle: f64| [angle.cos(), angle.sin(), 3.0 + angle.cos(), angle.sin()];
+        let speed = |angle: f64| [-angle.sin(), angle.cos(), -angle.sin(), angle.cos()];
+        let start = (&at(-0.5)[..], &speed(-0.5)[..]);
+        let mut known = Regularity::new(model.manifold().unwrap(), start, false);
+        assert!(known.sparse.is_some() && known.step(0.1, &at(-0.4), &speed(-0.4)).is_ok());
+        let through = known.step(0.42, &at(0.02), &speed(0.02));
+        let Err(StepFailure::Branch { ahead, .. }) = through else { panic!("{through:?}") };
+        assert!((ahead - 0.4).abs() < 1e-3, "{ahead}");
     }
 }

@@ -1,12 +1,14 @@
 //! A model under constraints.
 
+use super::programs::{RecordedRows, RowPrograms, Under, most_products};
 use super::projection::project;
 use super::rows::independent;
 use super::{Constraints, Manifold, ManifoldRows, RowAdjoint};
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::linearization::{ProgramSlopes, Rate, SlopePrograms, Sum};
-use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Slopes, Terms};
+use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
 use crate::scalar::{Dd, Real, Scalar};
+use std::sync::{Arc, OnceLock};
 
 /// A row at unit length whose part beside the rows before it is below this at every state follows from them.
 const REDUNDANT: f64 = 1e-6;
@@ -99,6 +101,9 @@ pub struct Constrained<M, C, S> {
     kept: Vec<usize>,
     names: Vec<String>,
     redundant: Vec<String>,
+    /// Programs of the rows that act, and of the accelerations, recorded on first use.
+    programs: OnceLock<Option<Arc<RowPrograms<S>>>>,
+    solved: OnceLock<Option<Solved<'static, S>>>,
 }
 
 impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
@@ -128,6 +133,8 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
             kept: (0..rows).collect(),
             names,
             redundant: Vec::new(),
+            programs: OnceLock::new(),
+            solved: OnceLock::new(),
         })
     }
 
@@ -174,6 +181,10 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
             let all = std::mem::take(&mut self.names);
             for (row, name) in all.into_iter().enumerate() {
                 if needed.contains(&row) { &mut self.names } else { &mut self.redundant }.push(name);
+            }
+            // Programs of other rows are of no use.
+            if self.kept != needed {
+                (self.programs, self.solved) = (OnceLock::new(), OnceLock::new());
             }
             self.kept = needed;
         }
@@ -234,6 +245,15 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
             rows.rates.push(rate);
             rows.drift.push(drift);
         }
+    }
+
+    fn programs(&self) -> Option<&RowPrograms<S>> {
+        let record = || {
+            let rows = RecordedRows::record(&self.constraints, (self.rows, &self.kept), &self.parameters)?;
+            let holonomic = self.kept.iter().map(|&row| self.constraints.is_holonomic(row)).collect();
+            Some(Arc::new(RowPrograms::new(rows, holonomic)))
+        };
+        self.programs.get_or_init(record).as_deref()
     }
 
     fn rate_gradients(&self, q: &[S], v: &[S], gradients: &mut Vec<S>) {
@@ -336,6 +356,17 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
 
     fn manifold(&self) -> Option<&dyn Manifold<S>> {
         Some(self)
+    }
+
+    fn solved(&self) -> Option<Solved<'_, S>> {
+        let alone = self.model.solved()?;
+        let record = || {
+            let (n, rows) = (self.model.coordinates(), Arc::clone(self.programs()?.rows()));
+            let (beneath, parameters) = alone.motion();
+            let under = Under { beneath: Arc::clone(beneath), rows };
+            Solved::record(Arc::new(under), n, parameters, most_products(n + self.kept.len()))
+        };
+        Some(self.solved.get_or_init(record).clone()?.as_long_as(alone))
     }
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {

@@ -1,5 +1,6 @@
 //! The states that constraints allow.
 
+use super::programs::RowPrograms;
 use crate::scalar::Scalar;
 
 /// Constraints at one state, `m` rows of `n` coordinates.
@@ -31,6 +32,12 @@ pub trait Manifold<S: Scalar>: Send + Sync {
 
     /// Evaluates the rows at one state; the buffers are reused.
     fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>);
+
+    /// Programs of the rows with their pattern, recorded on first use; `None` of constraints that have none.
+    #[doc(hidden)]
+    fn programs(&self) -> Option<&RowPrograms<S>> {
+        None
+    }
 
     /// Writes the derivatives of the rates by the coordinates, `d(A v - b)/dq`, `(m, n)`.
     fn rate_gradients(&self, q: &[S], v: &[S], gradients: &mut Vec<S>);

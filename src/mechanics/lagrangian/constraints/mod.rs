@@ -17,6 +17,7 @@ mod formulas;
 mod kkt;
 mod least_norm;
 mod manifold;
+mod programs;
 mod projection;
 mod reduced;
 mod rows;

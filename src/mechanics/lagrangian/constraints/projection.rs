@@ -2,8 +2,10 @@
 
 use super::rows::{dot, largest, length};
 use super::{Manifold, ManifoldRows};
+use crate::lagrangian::accelerations::{are_finite, are_safe};
 use crate::linalg::{Workspace, minimum_norm};
 use crate::scalar::{Real, Scalar};
+use crate::tape::Replay;
 
 /// Steps of Newton's method.
 const MAX_STEPS: usize = 60;
@@ -25,20 +27,16 @@ pub struct OffManifold {
 /// # Errors
 /// [`OffManifold`] where no state was found; `q` and `v` are the nearest then.
 pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) -> Result<[f64; 2], OffManifold> {
-    let mut rows = ManifoldRows::default();
-    let m = manifold.names().len();
-    let holonomic: Vec<usize> = (0..m).filter(|&row| manifold.is_holonomic(row)).collect();
-    let all: Vec<usize> = (0..m).collect();
+    let mut values = Defects::new(manifold, false);
     let before = [q.to_vec(), v.to_vec()];
     let mut last = S::infinity();
     for step in 0..MAX_STEPS {
-        if holonomic.is_empty() {
+        if values.of.is_empty() {
             break;
         }
-        manifold.rows(q, v, &mut rows);
-        let change = least_change(q.len(), &rows, &holonomic, &rows.values);
-        let size = largest(&change);
-        q.iter_mut().zip(&change).for_each(|(q, &change)| *q -= change);
+        let change = values.least_change(q, v);
+        let size = largest(change);
+        q.iter_mut().zip(change).for_each(|(q, &change)| *q -= change);
         let rounding = S::epsilon() * largest(q);
         // As good as the numbers are, or no longer better.
         if size <= rounding || (step > 3 && size > last * S::half() && size < rounding.ldexp(10)) {
@@ -46,19 +44,104 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
         }
         last = size;
     }
-    manifold.rows(q, v, &mut rows);
-    check(&rows, &holonomic, &rows.values, largest(q))?;
+    values.check(q, v, largest(q))?;
+    let mut rates = Defects::new(manifold, true);
     for _ in 0..2 {
-        let change = least_change(q.len(), &rows, &all, &rows.rates);
-        v.iter_mut().zip(&change).for_each(|(v, &change)| *v -= change);
-        manifold.rows(q, v, &mut rows);
+        let change = rates.least_change(q, v);
+        v.iter_mut().zip(change).for_each(|(v, &change)| *v -= change);
     }
-    check(&rows, &all, &rows.rates, Real::max(largest(&before[1]), largest(v)))?;
+    rates.check(q, v, Real::max(largest(&before[1]), largest(v)))?;
     let moved = |from: &[S], to: &[S]| {
         let change: Vec<S> = from.iter().zip(to).map(|(&a, &b)| a - b).collect();
         length(&change).to_f64()
     };
     Ok([moved(&before[0], q), moved(&before[1], v)])
+}
+
+/// What a state misses of some rows: the values of functions of the coordinates, or the rates of all rows.
+struct Defects<'a, S: Scalar> {
+    manifold: &'a dyn Manifold<S>,
+    of_rates: bool,
+    /// The rows.
+    of: Vec<usize>,
+    /// The program of the correction, where there is one, and what it gave: the change, pairs of an element of the diagonal of `A A^T` and
+    /// its pivot, the defects, and this diagonal.
+    program: Option<Replay<S>>,
+    change: Vec<S>,
+    guards: Vec<S>,
+    defects: Vec<S>,
+    squares: Vec<S>,
+    rows: ManifoldRows<S>,
+}
+
+impl<'a, S: Scalar> Defects<'a, S> {
+    fn new(manifold: &'a dyn Manifold<S>, of_rates: bool) -> Self {
+        let of: Vec<usize> =
+            (0..manifold.names().len()).filter(|&row| of_rates || manifold.is_holonomic(row)).collect();
+        let (n, m) = (manifold.coordinates(), of.len());
+        let program = manifold.programs().filter(|_| m > 0).and_then(|programs| programs.correction(of_rates));
+        let field = |size: usize| vec![<S as Real>::zero(); size];
+        let (change, guards, defects, squares) = (field(n), field(2 * m), field(m), field(m));
+        Self { manifold, of_rates, of, program, change, guards, defects, squares, rows: ManifoldRows::default() }
+    }
+
+    /// Evaluates the program; whether there is one.
+    fn replay(&mut self, q: &[S], v: &[S]) -> bool {
+        let outputs = &mut [&mut self.change[..], &mut self.guards, &mut self.defects, &mut self.squares];
+        self.program.as_mut().is_some_and(|program| program.evaluate(1, &[q, v], &[], outputs).is_ok())
+    }
+
+    /// Evaluates the rows one by one.
+    fn evaluate(&mut self, q: &[S], v: &[S]) {
+        self.manifold.rows(q, v, &mut self.rows);
+        let all = if self.of_rates { &self.rows.rates } else { &self.rows.values };
+        self.defects.clear();
+        self.defects.extend(self.of.iter().map(|&row| all[row]));
+    }
+
+    /// The shortest change of the coordinates or velocities, to be subtracted, that mends the defects to first order. Rows that may depend
+    /// on each other are left to a solver that knows of it.
+    fn least_change(&mut self, q: &[S], v: &[S]) -> &[S] {
+        if !(self.replay(q, v) && are_safe(&self.guards) && are_finite(&self.change)) {
+            self.evaluate(q, v);
+            self.change = least_change(q.len(), &self.rows, &self.of, &self.defects);
+        }
+        &self.change
+    }
+
+    /// Refuses defects at a state of this size that are more than rounding.
+    fn check(&mut self, q: &[S], v: &[S], size: S) -> Result<(), OffManifold> {
+        if self.of.is_empty() {
+            return Ok(());
+        }
+        let zero = <S as Real>::zero();
+        let of_program = self.replay(q, v)
+            && are_finite(&self.defects)
+            && are_finite(&self.squares)
+            && self.squares.iter().all(|&square| square > zero);
+        if !of_program {
+            self.evaluate(q, v);
+        }
+        let n = q.len();
+        let mut worst: Option<(usize, S)> = None;
+        for (k, (&row, &missed)) in self.of.iter().zip(&self.defects).enumerate() {
+            let gradient = match of_program {
+                true => Real::sqrt(self.squares[k]),
+                false => length(&self.rows.matrix[row * n..(row + 1) * n]),
+            };
+            let defect = if gradient > zero { missed.abs() / gradient } else { missed.abs() };
+            if worst.is_none_or(|(_, most)| defect.is_nan() || defect > most) {
+                worst = Some((row, defect));
+            }
+        }
+        let allowed = S::of_f64(ROUNDINGS) * S::epsilon() * Real::max(size, S::min_positive());
+        match worst {
+            Some((row, defect)) if defect.is_nan() || defect > allowed => {
+                Err(OffManifold { row, defect: defect.to_f64() })
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Brings an acceleration at a state on the constraints to `A a = -gamma` by the least change.
@@ -75,8 +158,7 @@ pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &
 /// The shortest `x` with `A x = defects` for some of the rows, as near to it as can be where they depend on each other.
 fn least_change<S: Scalar>(n: usize, rows: &ManifoldRows<S>, of: &[usize], defects: &[S]) -> Vec<S> {
     let picked: Vec<S> = of.iter().flat_map(|&row| rows.matrix[row * n..(row + 1) * n].iter().copied()).collect();
-    let right: Vec<S> = of.iter().map(|&row| defects[row]).collect();
-    along_rows(n, &picked, &right).0
+    along_rows(n, &picked, defects).0
 }
 
 /// The shortest `x = A^T w` with `A x = right`, and the shortest `w`, of rows `A`, `(m, n)`; as near to it as can be where the rows depend
@@ -96,22 +178,4 @@ pub fn along_rows<S: Scalar>(n: usize, rows: &[S], right: &[S]) -> (Vec<S>, Vec<
         x.iter_mut().zip(row).for_each(|(x, &a)| *x += weight * a);
     }
     (x, found.solution.iter().zip(&sizes).map(|(&weight, &size)| over(weight, size)).collect())
-}
-
-/// Refuses defects that are more than rounding.
-fn check<S: Scalar>(rows: &ManifoldRows<S>, of: &[usize], defects: &[S], size: S) -> Result<(), OffManifold> {
-    let n = rows.matrix.len() / rows.values.len().max(1);
-    let mut worst: Option<(usize, S)> = None;
-    for &row in of {
-        let gradient = length(&rows.matrix[row * n..(row + 1) * n]);
-        let defect = if gradient > <S as Real>::zero() { defects[row].abs() / gradient } else { defects[row].abs() };
-        if worst.is_none_or(|(_, most)| defect.is_nan() || defect > most) {
-            worst = Some((row, defect));
-        }
-    }
-    let allowed = S::of_f64(ROUNDINGS) * S::epsilon() * Real::max(size, S::min_positive());
-    match worst {
-        Some((row, defect)) if defect.is_nan() || defect > allowed => Err(OffManifold { row, defect: defect.to_f64() }),
-        _ => Ok(()),
-    }
 }

@@ -1,10 +1,11 @@
 //! A chain of links as a model: terms by its Lagrangian, accelerations and forces of single states by recursion.
 
 use super::{Chain, Shape};
-use crate::lagrangian::accelerations::eliminate;
+use crate::lagrangian::accelerations::RecordMotion;
+use crate::lagrangian::elimination::Balance;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Solved, Terms};
 use crate::scalar::{Real, Scalar};
-use crate::tape::{Program, ROWS, Tracer};
+use crate::tape::Tracer;
 use std::sync::{Arc, OnceLock};
 
 /// The model of a chain of links with its recursions.
@@ -30,22 +31,30 @@ impl<S: Scalar> Recursive<S> {
 
     /// Records the accelerations: the mass matrix is eliminated in the program. What the constants leave out is not computed.
     fn solve(&self) -> Option<Solved<'static, S>> {
-        let (n, mut pivots) = (self.shape.rows.len(), 0);
-        let program = Program::record_within(ROWS, (2 * n, 0), |x, _| {
-            let constants: Vec<_> = self.parameters.iter().map(|&value| Tracer::constant(value)).collect();
-            let (chain, (q, v)) = (Chain::new(&self.shape, &constants), x.split_at(n));
-            let (still, mut force) = (vec![Tracer::zero(); n], vec![Tracer::zero(); n]);
-            chain.inverse_dynamics([q, v, &still], &mut Vec::new(), &mut force);
-            for (k, force) in force.iter_mut().enumerate() {
-                *force = chain.friction(k, v[k]) - *force;
-            }
-            let rows = chain.mass_matrix(q).into_iter().enumerate().map(sparse).collect();
-            let (mut outputs, guards) = eliminate(rows, force, usize::MAX)?;
-            pivots = guards.len();
-            outputs.extend(guards.into_iter().flatten());
-            Some(outputs)
-        });
-        Some(Solved::of(program.ok()?, Vec::new(), pivots))
+        let recursion = Recursion { shape: Arc::clone(&self.shape), parameters: self.parameters.clone() };
+        Solved::record(Arc::new(recursion), self.shape.rows.len(), &[], usize::MAX)
+    }
+}
+
+/// The equations of motion by recursion.
+#[derive(Debug)]
+struct Recursion<S> {
+    shape: Arc<Shape>,
+    parameters: Vec<S>,
+}
+
+impl<S: Scalar> RecordMotion<S> for Recursion<S> {
+    fn record<'t>(&self, state: &[Tracer<'t, S>], _: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>> {
+        let n = self.shape.rows.len();
+        let constants: Vec<_> = self.parameters.iter().map(|&value| Tracer::constant(value)).collect();
+        let (chain, (q, v)) = (Chain::new(&self.shape, &constants), state.split_at(n));
+        let (still, mut right) = (vec![Tracer::zero(); n], vec![Tracer::zero(); n]);
+        chain.inverse_dynamics([q, v, &still], &mut Vec::new(), &mut right);
+        for (k, force) in right.iter_mut().enumerate() {
+            *force = chain.friction(k, v[k]) - *force;
+        }
+        let lower = chain.mass_matrix(q).into_iter().enumerate().map(sparse).collect();
+        Some(Balance { coordinates: n, lower, right })
     }
 }
 

@@ -1,0 +1,256 @@
+//! Programs of constraints: their rows by the pattern, the least changes that bring a state to them, whether they are independent.
+
+use super::Constraints;
+use crate::forward::{Dual, HyperDual};
+use crate::lagrangian::accelerations::RecordMotion;
+use crate::lagrangian::elimination::{Balance, eliminate};
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Directions, Program, ROWS, Replay, TANGENTS, Tracer};
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+/// An elimination is recorded up to so many products for each element of the full matrix; with more a dense solver is the faster one.
+const PRODUCTS: usize = 8;
+
+/// Products of an elimination of so many rows at most.
+pub(super) fn most_products(rows: usize) -> usize {
+    PRODUCTS * rows * rows
+}
+
+/// Constraints as recorded functions.
+#[derive(Debug)]
+pub(super) struct RecordedRows<S> {
+    /// Numbers of coordinates and of rows.
+    size: (usize, usize),
+    /// `lambda.(A w)` of `q`, `v`, `w`, `lambda`.
+    rate: Program<S>,
+    /// Values, rates and drifts of `q`, `v`.
+    along: Program<S>,
+}
+
+/// Constraints at a state that is being recorded.
+struct Rows<R> {
+    /// The columns of each row that are not zero.
+    matrix: Vec<Vec<(usize, R)>>,
+    values: Vec<R>,
+    rates: Vec<R>,
+    drift: Vec<R>,
+}
+
+impl<S: Scalar> RecordedRows<S> {
+    /// Those rows of constraints with these numbers; `None` if they are too large, or branch on their data.
+    pub fn record(
+        constraints: &impl Constraints,
+        (all, kept): (usize, &[usize]),
+        parameters: &[S],
+    ) -> Option<Arc<Self>> {
+        let (n, m) = (constraints.coordinates(), kept.len());
+        let rate = Program::record_within(ROWS, (3 * n + m, 0), |x, _| {
+            let (zero, at) = (Tracer::zero(), |field: usize, i: usize| x[field * n + i]);
+            let p: Vec<_> = parameters.iter().map(|&p| Dual::lift(Tracer::constant(p))).collect();
+            let mut sum = zero;
+            // Of a function the row is the gradient by the coordinates, of a row that is linear in the velocities by those.
+            for holonomic in [true, false] {
+                let mut of = kept.iter().enumerate().filter(|(_, row)| constraints.is_holonomic(**row) == holonomic);
+                let mut next = of.next();
+                if next.is_none() {
+                    continue;
+                }
+                let along = |field: usize, moves: bool| -> Vec<_> {
+                    let tangent = |i: usize| if moves { at(2, i) } else { zero };
+                    (0..n).map(|i| Dual { value: at(field, i), tangent: tangent(i) }).collect()
+                };
+                let (q, v) = (along(0, holonomic), along(1, !holonomic));
+                let mut values = vec![Dual::lift(zero); all];
+                constraints.values(&p, &q, &v, &mut values);
+                while let Some((c, &row)) = next {
+                    sum += x[3 * n + c] * values[row].tangent;
+                    next = of.next();
+                }
+            }
+            Some(vec![sum])
+        });
+        // Along the motion: value, rate and second derivative of a function; value and rate of a row.
+        let along = Program::record_within(ROWS, (2 * n, 0), |x, _| {
+            let zero = Tracer::zero();
+            let p: Vec<_> = parameters.iter().map(|&p| HyperDual::lift(Tracer::constant(p))).collect();
+            let q: Vec<_> = (0..n).map(|i| HyperDual::new(x[i], x[n + i], x[n + i], zero)).collect();
+            let v: Vec<_> = (0..n).map(|i| HyperDual::lift(x[n + i])).collect();
+            let mut values = vec![HyperDual::lift(zero); all];
+            constraints.values(&p, &q, &v, &mut values);
+            let of = |row: usize| match (values[row], constraints.is_holonomic(row)) {
+                (found, true) => [found.value, found.s, found.st],
+                (found, false) => [zero, found.value, found.s],
+            };
+            let found: Vec<_> = kept.iter().map(|&row| of(row)).collect();
+            Some((0..3).flat_map(|k| found.iter().map(move |of| of[k])).collect())
+        });
+        Some(Arc::new(Self { size: (n, m), rate: rate.ok()?, along: along.ok()? }))
+    }
+
+    fn at<'t>(&self, state: &[Tracer<'t, S>]) -> Option<Rows<Tracer<'t, S>>> {
+        let ((n, m), zero) = (self.size, Tracer::zero());
+        // The rate is linear in `w` and in `lambda`: it does not matter where they are.
+        let inputs = [state, &vec![zero; n + m]].concat();
+        let is_speed = |input: &usize| (2 * n..3 * n).contains(input);
+        let seed = |input: usize| match Some(input).filter(is_speed) {
+            Some(input) => vec![((input - 2 * n) as u32, Tracer::one())],
+            None => Vec::new(),
+        };
+        let directions = Directions {
+            seeds: (0..inputs.len()).map(seed).collect(),
+            rows: (0..inputs.len()).map(|input| (input >= 3 * n).then_some(0)).collect(),
+            shared: 0,
+            budget: TANGENTS,
+        };
+        let mut second = self.rate.derivatives(&inputs, &[], Some(&directions))?.second;
+        let columns = |row: Vec<(u32, _)>| row.into_iter().map(|(i, a)| (i as usize, a)).collect();
+        let matrix = second.split_off(3 * n).into_iter().map(columns).collect();
+        let mut values = self.along.interpret(state, &[]).ok()?;
+        let drift = values.split_off(2 * m);
+        let rates = values.split_off(m);
+        Some(Rows { matrix, values, rates, drift })
+    }
+}
+
+/// The equations of motion of a model under constraints.
+#[derive(Debug)]
+pub(super) struct Under<S> {
+    /// Those of the model alone.
+    pub beneath: Arc<dyn RecordMotion<S>>,
+    pub rows: Arc<RecordedRows<S>>,
+}
+
+impl<S: Scalar> RecordMotion<S> for Under<S> {
+    fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>> {
+        let mut balance = self.beneath.record(state, parameters)?;
+        let n = balance.coordinates;
+        // Constraints are known of one model only.
+        if balance.lower.len() > n {
+            return None;
+        }
+        let rows = self.rows.at(state)?;
+        for (c, mut row) in rows.matrix.into_iter().enumerate() {
+            row.push((n + c, Tracer::zero()));
+            balance.lower.push(row);
+        }
+        balance.right.extend(rows.drift.into_iter().map(|drift| -drift));
+        Some(balance)
+    }
+}
+
+/// The lower triangle of `A A^T`; `None` of more products than are allowed.
+fn gram<R: Real>(matrix: &[Vec<(usize, R)>], most: usize) -> Option<Vec<Vec<(usize, R)>>> {
+    let mut columns: BTreeMap<usize, Vec<(usize, R)>> = BTreeMap::new();
+    for (c, row) in matrix.iter().enumerate() {
+        row.iter().for_each(|&(i, a)| columns.entry(i).or_default().push((c, a)));
+    }
+    let products: usize = columns.values().map(|column| column.len() * (column.len() + 1) / 2).sum();
+    if products > most {
+        return None;
+    }
+    let mut lower: Vec<BTreeMap<usize, R>> = vec![BTreeMap::new(); matrix.len()];
+    for column in columns.into_values() {
+        for (at, &(c, a)) in column.iter().enumerate() {
+            for &(d, b) in &column[..=at] {
+                let term = if c == d { a.sqr() } else { a * b };
+                lower[c].entry(d).and_modify(|sum| *sum += term).or_insert(term);
+            }
+        }
+    }
+    Some(lower.into_iter().map(|row| row.into_iter().collect()).collect())
+}
+
+/// Programs that are recorded on first use.
+#[derive(Debug)]
+pub struct RowPrograms<S> {
+    rows: Arc<RecordedRows<S>>,
+    holonomic: Vec<bool>,
+    corrections: [OnceLock<Option<Arc<Program<S>>>>; 2],
+    elements: OnceLock<Option<Elements<S>>>,
+    shifted: OnceLock<Option<Arc<Program<S>>>>,
+}
+
+/// A program of the elements of `A` that are not zero, row by row, and where the rows begin and the last one ends.
+type Elements<S> = (Arc<Program<S>>, Vec<usize>);
+
+impl<S: Scalar> RowPrograms<S> {
+    pub(super) fn new(rows: Arc<RecordedRows<S>>, holonomic: Vec<bool>) -> Self {
+        let corrections = [const { OnceLock::new() }; 2];
+        Self { rows, holonomic, corrections, elements: OnceLock::new(), shifted: OnceLock::new() }
+    }
+
+    pub(super) fn rows(&self) -> &Arc<RecordedRows<S>> {
+        &self.rows
+    }
+
+    /// The shortest `x` with `A x = d`, of the defects `d` of the functions of coordinates alone, or of the rates of all rows: a program of `x`,
+    /// pairs of an element of the diagonal of `A A^T` and its pivot, `d`, and this diagonal.
+    pub(super) fn correction(&self, of_rates: bool) -> Option<Replay<S>> {
+        let (n, _) = self.rows.size;
+        let record = || {
+            let program = Program::record_within(ROWS, (2 * n, 0), |x, _| {
+                let rows = self.rows.at(x)?;
+                let found = rows.matrix.into_iter().zip(if of_rates { rows.rates } else { rows.values });
+                let acts = found.zip(&self.holonomic).filter(|(_, holonomic)| of_rates || **holonomic);
+                let (matrix, right): (Vec<_>, Vec<_>) = acts.map(|(found, _)| found).unzip();
+                let (m, most) = (matrix.len(), most_products(matrix.len()));
+                let lower = gram(&matrix, most)?;
+                let diagonal = lower.iter().map(|row| row.last().map(|(_, a)| *a)).collect::<Option<Vec<_>>>()?;
+                let (weights, guards) = eliminate(Balance { coordinates: m, lower, right: right.clone() }, most)?;
+                let mut outputs = vec![Tracer::zero(); n];
+                for (row, weight) in matrix.into_iter().zip(weights) {
+                    row.into_iter().for_each(|(i, a)| outputs[i] += weight * a);
+                }
+                outputs.extend(guards.into_iter().flatten());
+                outputs.extend(right);
+                outputs.extend(diagonal);
+                Some(outputs)
+            });
+            program.ok().map(Arc::new)
+        };
+        self.corrections[usize::from(of_rates)].get_or_init(record).clone().map(Replay::new)
+    }
+
+    /// The elements of the rows that are not zero, and where each row begins among them.
+    pub(crate) fn elements(&self) -> Option<(Replay<S>, &[usize])> {
+        let (n, _) = self.rows.size;
+        let record = || {
+            let mut starts = vec![0];
+            let program = Program::record_within(ROWS, (2 * n, 0), |x, _| {
+                let mut outputs = Vec::new();
+                for row in self.rows.at(x)?.matrix {
+                    outputs.extend(row.into_iter().map(|(_, a)| a));
+                    starts.push(outputs.len());
+                }
+                Some(outputs)
+            });
+            Some((Arc::new(program.ok()?), starts))
+        };
+        let (program, starts) = self.elements.get_or_init(record).as_ref()?;
+        Some((Replay::new(Arc::clone(program)), starts))
+    }
+
+    /// The pivots of `U A A^T U - x`, of a diagonal matrix `U` and a number `x` behind the state: all are positive where no eigenvalue of
+    /// `U A A^T U` is below `x`.
+    pub(crate) fn shifted(&self) -> Option<Replay<S>> {
+        let (n, m) = self.rows.size;
+        let record = || {
+            let program = Program::record_within(ROWS, (2 * n + m + 1, 0), |x, _| {
+                let (mut matrix, most) = (self.rows.at(&x[..2 * n])?.matrix, most_products(m));
+                for (row, &unit) in matrix.iter_mut().zip(&x[2 * n..]) {
+                    row.iter_mut().for_each(|(_, a)| *a *= unit);
+                }
+                let mut lower = gram(&matrix, most)?;
+                for row in &mut lower {
+                    row.last_mut()?.1 -= x[2 * n + m];
+                }
+                let right = vec![Tracer::zero(); m];
+                let (_, guards) = eliminate(Balance { coordinates: m, lower, right }, most)?;
+                Some(guards.into_iter().map(|[_, pivot]| pivot).collect())
+            });
+            program.ok().map(Arc::new)
+        };
+        self.shifted.get_or_init(record).clone().map(Replay::new)
+    }
+}
