@@ -1,11 +1,12 @@
 //! Programs of constraints: their rows by the pattern, the least changes that bring a state to them, whether they are independent.
 
 use super::Constraints;
-use crate::forward::{Dual, HyperDual};
+use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::{Balance, eliminate};
+use crate::lagrangian::linearization::Rate;
 use crate::scalar::{Real, Scalar};
-use crate::tape::{Directions, Program, ROWS, Replay, TANGENTS, Tracer};
+use crate::tape::{Program, ROWS, Replay, Tracer};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
@@ -20,11 +21,8 @@ pub(super) fn most_products(rows: usize) -> usize {
 /// Constraints as recorded functions.
 #[derive(Debug)]
 pub(super) struct RecordedRows<S> {
-    /// Numbers of coordinates and of rows.
-    size: (usize, usize),
-    /// `lambda.(A w)` of `q`, `v`, `w`, `lambda`.
-    rate: Program<S>,
-    /// Values, rates and drifts of `q`, `v`.
+    rate: Rate<S>,
+    /// Values and rates of `q`, `v`.
     along: Program<S>,
 }
 
@@ -34,7 +32,6 @@ struct Rows<R> {
     matrix: Vec<Vec<(usize, R)>>,
     values: Vec<R>,
     rates: Vec<R>,
-    drift: Vec<R>,
 }
 
 impl<S: Scalar> RecordedRows<S> {
@@ -44,72 +41,31 @@ impl<S: Scalar> RecordedRows<S> {
         (all, kept): (usize, &[usize]),
         parameters: &[S],
     ) -> Option<Arc<Self>> {
-        let (n, m) = (constraints.coordinates(), kept.len());
-        let rate = Program::record_within(ROWS, (3 * n + m, 0), |x, _| {
-            let (zero, at) = (Tracer::zero(), |field: usize, i: usize| x[field * n + i]);
-            let p: Vec<_> = parameters.iter().map(|&p| Dual::lift(Tracer::constant(p))).collect();
-            let mut sum = zero;
-            // Of a function the row is the gradient by the coordinates, of a row that is linear in the velocities by those.
-            for holonomic in [true, false] {
-                let mut of = kept.iter().enumerate().filter(|(_, row)| constraints.is_holonomic(**row) == holonomic);
-                let mut next = of.next();
-                if next.is_none() {
-                    continue;
-                }
-                let along = |field: usize, moves: bool| -> Vec<_> {
-                    let tangent = |i: usize| if moves { at(2, i) } else { zero };
-                    (0..n).map(|i| Dual { value: at(field, i), tangent: tangent(i) }).collect()
-                };
-                let (q, v) = (along(0, holonomic), along(1, !holonomic));
-                let mut values = vec![Dual::lift(zero); all];
-                constraints.values(&p, &q, &v, &mut values);
-                while let Some((c, &row)) = next {
-                    sum += x[3 * n + c] * values[row].tangent;
-                    next = of.next();
-                }
-            }
-            Some(vec![sum])
-        });
-        // Along the motion: value, rate and second derivative of a function; value and rate of a row.
+        let n = constraints.coordinates();
+        // Along the motion: value and rate of a function; the value of a row is its rate.
         let along = Program::record_within(ROWS, (2 * n, 0), |x, _| {
             let zero = Tracer::zero();
-            let p: Vec<_> = parameters.iter().map(|&p| HyperDual::lift(Tracer::constant(p))).collect();
-            let q: Vec<_> = (0..n).map(|i| HyperDual::new(x[i], x[n + i], x[n + i], zero)).collect();
-            let v: Vec<_> = (0..n).map(|i| HyperDual::lift(x[n + i])).collect();
-            let mut values = vec![HyperDual::lift(zero); all];
+            let p: Vec<_> = parameters.iter().map(|&p| Dual::lift(Tracer::constant(p))).collect();
+            let q: Vec<_> = (0..n).map(|i| Dual { value: x[i], tangent: x[n + i] }).collect();
+            let v: Vec<_> = (0..n).map(|i| Dual::lift(x[n + i])).collect();
+            let mut values = vec![Dual::lift(zero); all];
             constraints.values(&p, &q, &v, &mut values);
-            let of = |row: usize| match (values[row], constraints.is_holonomic(row)) {
-                (found, true) => [found.value, found.s, found.st],
-                (found, false) => [zero, found.value, found.s],
+            let of = |row: usize| match constraints.is_holonomic(row) {
+                true => [values[row].value, values[row].tangent],
+                false => [zero, values[row].value],
             };
             let found: Vec<_> = kept.iter().map(|&row| of(row)).collect();
-            Some((0..3).flat_map(|k| found.iter().map(move |of| of[k])).collect())
+            Some((0..2).flat_map(|k| found.iter().map(move |of| of[k])).collect())
         });
-        Some(Arc::new(Self { size: (n, m), rate: rate.ok()?, along: along.ok()? }))
+        let rate = Rate::of_constraints(constraints, (all, kept), parameters, false);
+        Some(Arc::new(Self { rate: rate.ok()?, along: along.ok()? }))
     }
 
     fn at<'t>(&self, state: &[Tracer<'t, S>]) -> Option<Rows<Tracer<'t, S>>> {
-        let ((n, m), zero) = (self.size, Tracer::zero());
-        // The rate is linear in `w` and in `lambda`: it does not matter where they are.
-        let inputs = [state, &vec![zero; n + m]].concat();
-        let is_speed = |input: &usize| (2 * n..3 * n).contains(input);
-        let seed = |input: usize| match Some(input).filter(is_speed) {
-            Some(input) => vec![((input - 2 * n) as u32, Tracer::one())],
-            None => Vec::new(),
-        };
-        let directions = Directions {
-            seeds: (0..inputs.len()).map(seed).collect(),
-            rows: (0..inputs.len()).map(|input| (input >= 3 * n).then_some(0)).collect(),
-            shared: 0,
-            budget: TANGENTS,
-        };
-        let mut second = self.rate.derivatives(&inputs, &[], Some(&directions))?.second;
-        let columns = |row: Vec<(u32, _)>| row.into_iter().map(|(i, a)| (i as usize, a)).collect();
-        let matrix = second.split_off(3 * n).into_iter().map(columns).collect();
+        let (matrix, _) = self.rate.rows(state)?;
         let mut values = self.along.interpret(state, &[]).ok()?;
-        let drift = values.split_off(2 * m);
-        let rates = values.split_off(m);
-        Some(Rows { matrix, values, rates, drift })
+        let rates = values.split_off(self.rate.size.1);
+        Some(Rows { matrix, values, rates })
     }
 }
 
@@ -129,12 +85,12 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
         if balance.lower.len() > n {
             return None;
         }
-        let rows = self.rows.at(state)?;
-        for (c, mut row) in rows.matrix.into_iter().enumerate() {
+        let (matrix, drift) = self.rows.rate.rows(state)?;
+        for (c, mut row) in matrix.into_iter().enumerate() {
             row.push((n + c, Tracer::zero()));
             balance.lower.push(row);
         }
-        balance.right.extend(rows.drift.into_iter().map(|drift| -drift));
+        balance.right.extend(drift.into_iter().map(|drift| -drift));
         Some(balance)
     }
 }
@@ -187,7 +143,7 @@ impl<S: Scalar> RowPrograms<S> {
     /// The shortest `x` with `A x = d`, of the defects `d` of the functions of coordinates alone, or of the rates of all rows: a program of `x`,
     /// pairs of an element of the diagonal of `A A^T` and its pivot, `d`, and this diagonal.
     pub(super) fn correction(&self, of_rates: bool) -> Option<Replay<S>> {
-        let (n, _) = self.rows.size;
+        let (n, _) = self.rows.rate.size;
         let record = || {
             let program = Program::record_within(ROWS, (2 * n, 0), |x, _| {
                 let rows = self.rows.at(x)?;
@@ -214,12 +170,12 @@ impl<S: Scalar> RowPrograms<S> {
 
     /// The elements of the rows that are not zero, and where each row begins among them.
     pub(crate) fn elements(&self) -> Option<(Replay<S>, &[usize])> {
-        let (n, _) = self.rows.size;
+        let (n, _) = self.rows.rate.size;
         let record = || {
             let mut starts = vec![0];
             let program = Program::record_within(ROWS, (2 * n, 0), |x, _| {
                 let mut outputs = Vec::new();
-                for row in self.rows.at(x)?.matrix {
+                for row in self.rows.rate.rows(x)?.0 {
                     outputs.extend(row.into_iter().map(|(_, a)| a));
                     starts.push(outputs.len());
                 }
@@ -234,10 +190,10 @@ impl<S: Scalar> RowPrograms<S> {
     /// The pivots of `U A A^T U - x`, of a diagonal matrix `U` and a number `x` behind the state: all are positive where no eigenvalue of
     /// `U A A^T U` is below `x`.
     pub(crate) fn shifted(&self) -> Option<Replay<S>> {
-        let (n, m) = self.rows.size;
+        let (n, m) = self.rows.rate.size;
         let record = || {
             let program = Program::record_within(ROWS, (2 * n + m + 1, 0), |x, _| {
-                let (mut matrix, most) = (self.rows.at(&x[..2 * n])?.matrix, most_products(m));
+                let (mut matrix, most) = (self.rows.rate.rows(&x[..2 * n])?.0, most_products(m));
                 for (row, &unit) in matrix.iter_mut().zip(&x[2 * n..]) {
                     row.iter_mut().for_each(|(_, a)| *a *= unit);
                 }

@@ -125,6 +125,26 @@ impl<S: Scalar> Rate<S> {
         Some(of_motion.chain(by[4 * n + m..4 * n + 2 * m].iter().copied()).collect())
     }
 
+    /// What is not zero of the rows `A` of constraints, by rising columns, and their drift `gamma`, at a state `q`, `v`; of constraints whose
+    /// parameters are constants.
+    pub fn rows<R: Real>(&self, state: &[R]) -> Option<(Vec<Vec<(usize, R)>>, Vec<R>)> {
+        let (n, m) = self.size;
+        // Only `A` is left where nothing but `w` and `lambda` moves: it does not matter where they are.
+        let inputs = [state, &vec![R::zero(); 2 * n + 2 * m]].concat();
+        let is_speed = |input: usize| (2 * n..3 * n).contains(&input);
+        let seed = |input: usize| is_speed(input).then(|| ((input - 2 * n) as u32, R::one()));
+        let directions = Directions {
+            seeds: (0..inputs.len()).map(|input| seed(input).into_iter().collect()).collect(),
+            rows: (0..inputs.len()).map(|input| (4 * n..4 * n + m).contains(&input).then_some(0)).collect(),
+            shared: 0,
+            budget: TANGENTS,
+        };
+        let found = self.program.derivatives(&inputs, &[], Some(&directions))?;
+        let columns = |row: Vec<(u32, R)>| row.into_iter().map(|(i, a)| (i as usize, a)).collect();
+        let matrix = found.second.into_iter().skip(4 * n).take(m).map(columns).collect();
+        Some((matrix, found.first[4 * n + m..].iter().map(|&by| -by).collect()))
+    }
+
     /// The elements of `df/d(q, v)` that are not zero, `n + m` rows and `2 n` columns, and behind those the derivatives by chosen parameters.
     pub fn slopes<R: Real>(&self, x: &[R], parameters: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         let ((n, m), count) = (self.size, self.program.inputs());
