@@ -183,7 +183,7 @@ mod tests {
     use crate::scalar::Dd;
 
     /// A matrix of blocks of these sizes, its coordinates in an order of no pattern.
-    fn blocks(sizes: &[usize]) -> Vec<f64> {
+    fn blocks(sizes: &[usize], seed: usize) -> Vec<f64> {
         let n = sizes.iter().sum::<usize>();
         let mut order: Vec<usize> = (0..n).collect();
         (1..n).for_each(|i| order.swap(i, (i * i * 31 + 17 * i + 5) % (i + 1)));
@@ -192,7 +192,7 @@ mod tests {
         for &m in sizes {
             for i in first..first + m {
                 for j in first..=i {
-                    let x = ((i * j * 7 + (i + j) * 13 + 5 * m) % 101) as f64 / 101.0 - 0.505;
+                    let x = ((i * j * 7 + (i + j) * 13 + 5 * m + 29 * seed) % 101) as f64 / 101.0 - 0.505;
                     (matrix[order[i] * n + order[j]], matrix[order[j] * n + order[i]]) = (x, x);
                 }
             }
@@ -216,30 +216,39 @@ mod tests {
 
     #[test]
     fn blocks_are_decomposed_as_accurately_as_the_whole() {
+        const SEEDS: usize = 16;
         for sizes in [&[3, 5, 1, 3, 7][..], &[1; 20], &[40, 40, 2, 2, 7], &[12, 33], &[27, 30, 9], &[2; 32], &[16, 1]] {
             let n = sizes.iter().sum::<usize>();
-            let matrix = blocks(sizes);
-            let (mut workspace, mut w, mut u) = (Workspace::new(), vec![0.0; n], vec![0.0; n * n]);
-            eigh(n, &matrix, &mut w, &mut u, &mut workspace).unwrap();
-            let (mut plain, mut full) = (w.clone(), u.clone());
-            whole(n, LARGE, &matrix, &mut plain, &mut full, &mut Buffer::default());
-            let (ours, theirs) = (errors(n, &matrix, &w, &u), errors(n, &matrix, &plain, &full));
-            assert!(ours.0 <= theirs.0.max(8.0) && ours.1 <= theirs.1.max(8.0), "{sizes:?}: {ours:?} {theirs:?}");
-            assert!(w.is_sorted());
-            let size = w[0].abs().max(w[n - 1].abs());
-            w.iter().zip(&plain).for_each(|(a, b)| assert!((a - b).abs() < 16.0 * n as f64 * f64::EPSILON * size));
-            let largest = sizes.iter().max().unwrap();
-            u.chunks_exact(n).for_each(|u| assert!(u.iter().filter(|u| **u != 0.0).count() <= *largest));
-            eigenvalues(n, &matrix, &mut plain, &mut workspace).unwrap();
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() < 16.0 * n as f64 * f64::EPSILON * size;
-            assert!(plain.iter().zip(&w).all(close));
+            let largest = *sizes.iter().max().unwrap();
+            let (mut ours, mut theirs) = ((0.0, 0.0), (0.0, 0.0));
+            for seed in 0..SEEDS {
+                let matrix = blocks(sizes, seed);
+                let (mut workspace, mut w, mut u) = (Workspace::new(), vec![0.0; n], vec![0.0; n * n]);
+                eigh(n, &matrix, &mut w, &mut u, &mut workspace).unwrap();
+                let (mut plain, mut full) = (w.clone(), u.clone());
+                whole(n, LARGE, &matrix, &mut plain, &mut full, &mut Buffer::default());
+                let add = |sum: &mut (f64, f64), more: (f64, f64)| *sum = (sum.0 + more.0, sum.1 + more.1);
+                add(&mut ours, errors(n, &matrix, &w, &u));
+                add(&mut theirs, errors(n, &matrix, &plain, &full));
+                assert!(w.is_sorted());
+                u.chunks_exact(n).for_each(|u| assert!(u.iter().filter(|u| **u != 0.0).count() <= largest));
+                let bound = 16.0 * n as f64 * f64::EPSILON * w[0].abs().max(w[n - 1].abs());
+                let close = |(a, b): (&f64, &f64)| (a - b).abs() < bound;
+                assert!(plain.iter().zip(&w).all(close));
+                eigenvalues(n, &matrix, &mut plain, &mut workspace).unwrap();
+                assert!(plain.iter().zip(&w).all(close));
+            }
+            let mean = |sum: (f64, f64)| (sum.0 / SEEDS as f64, sum.1 / SEEDS as f64);
+            let (ours, theirs) = (mean(ours), mean(theirs));
+            println!("{sizes:?}: residual and skew {ours:.2?}, of the whole {theirs:.2?}");
+            assert!(ours.0 <= 1.5 * theirs.0 && ours.1 <= 1.5 * theirs.1, "{sizes:?}: {ours:?} {theirs:?}");
         }
     }
 
     #[test]
     fn a_full_matrix_is_decomposed_as_a_whole() {
         for n in [16, 20, 40] {
-            let matrix = blocks(&[n]);
+            let matrix = blocks(&[n], 0);
             let (mut w, mut u) = (vec![0.0; n], vec![0.0; n * n]);
             eigh(n, &matrix, &mut w, &mut u, &mut Workspace::new()).unwrap();
             let (mut plain, mut full) = (w.clone(), u.clone());
@@ -275,7 +284,7 @@ mod tests {
     #[test]
     fn matrices_give_the_same_bits_and_failures_wherever_they_stand() {
         let n = 18;
-        let kinds = [&[18][..], &[8, 10], &[9, 9], &[1; 18], &[3, 5, 3, 7]].map(blocks);
+        let kinds = [&[18][..], &[8, 10], &[9, 9], &[1; 18], &[3, 5, 3, 7]].map(|sizes| blocks(sizes, 0));
         let mut batch = Vec::new();
         (0..70).for_each(|k| batch.extend_from_slice(&kinds[if k % 7 < 4 { 1 } else { k % kinds.len() }]));
         // Outside of the blocks below the diagonal, and inside of one.
