@@ -6,6 +6,7 @@
 //! element, so that no sweep is spent on denormals.
 
 use super::batch::{Aligned, Buffer, LANES, Lane, Workspace, across, rows, select, with_size};
+use super::blocks::by_blocks;
 use super::{Failure, LinalgError, expect_length, large_systems};
 use crate::scalar::{Real, Scalar, in_lanes};
 
@@ -57,18 +58,7 @@ fn run<S: Scalar>(
     if batch == 0 {
         return Ok(());
     }
-    let one_by_one = matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate().all(|(row, (m, w))| {
-        let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
-        large_systems::eigh(n, m, w, u)
-    });
-    let finite = if one_by_one {
-        false
-    } else if const { size_of::<S>() < size_of::<f64>() } {
-        split::<S, { 2 * LANES }>(n, matrices, values, vectors, &mut workspace.block)
-    } else {
-        split::<S, LANES>(n, matrices, values, vectors, &mut workspace.block)
-    };
-    if finite {
+    if by_blocks(n, matrices, values, vectors, workspace) {
         return Ok(());
     }
     for (row, m) in matrices.chunks_exact(size).enumerate() {
@@ -82,6 +72,29 @@ fn run<S: Scalar>(
         }
     }
     workspace.outcome()
+}
+
+/// Every matrix as a whole, by lanes or, above the size `least`, by the routine of its scalar; whether all is known to be finite.
+pub(super) fn whole<S: Scalar>(
+    n: usize,
+    least: usize,
+    matrices: &[S],
+    values: &mut [S],
+    vectors: &mut [S],
+    buffer: &mut Buffer<S>,
+) -> bool {
+    let size = n * n;
+    let one_by_one = matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate().all(|(row, (m, w))| {
+        let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
+        large_systems::eigh(n, least, m, w, u)
+    });
+    if one_by_one {
+        false
+    } else if const { size_of::<S>() < size_of::<f64>() } {
+        split::<S, { 2 * LANES }>(n, matrices, values, vectors, buffer)
+    } else {
+        split::<S, LANES>(n, matrices, values, vectors, buffer)
+    }
 }
 
 /// In blocks of `W`, a single matrix at the end alone; whether all is finite.

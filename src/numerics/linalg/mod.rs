@@ -19,6 +19,7 @@
 //! ```
 
 mod batch;
+mod blocks;
 #[cfg(feature = "faer")]
 mod by_faer;
 mod compiled;

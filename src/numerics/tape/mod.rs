@@ -42,6 +42,8 @@
 //! # Ok::<(), TapeError>(())
 //! ```
 
+#[cfg(test)]
+mod accuracy;
 mod eager;
 mod engine;
 mod function;
