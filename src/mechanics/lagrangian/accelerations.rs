@@ -42,8 +42,8 @@ impl<'a, S: Scalar> Solved<'a, S> {
         Self { flag: Some(flag), ..self }
     }
 
-    /// The same as long as another one may be called.
-    pub(super) fn as_long_as(self, other: Self) -> Self {
+    /// The same until the flag of another one is raised.
+    pub(super) fn with_flag_of(self, other: Self) -> Self {
         Self { flag: other.flag, ..self }
     }
 

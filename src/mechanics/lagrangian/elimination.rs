@@ -3,12 +3,15 @@
 use crate::scalar::Real;
 use std::collections::BTreeMap;
 
+/// Rows of a matrix: the columns of what is not zero, rising.
+pub(super) type Lists<R> = Vec<Vec<(usize, R)>>;
+
 /// A linear system of equations of motion, `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, without constraints `M a = f`.
 pub(super) struct Balance<R> {
     /// Number of coordinates; the equations behind them are those of constraints.
     pub coordinates: usize,
-    /// Rows of the lower triangle with the columns of what is not zero, the diagonal among them.
-    pub lower: Vec<Vec<(usize, R)>>,
+    /// The lower triangle, the diagonal with it.
+    pub lower: Lists<R>,
     /// The right-hand side.
     pub right: Vec<R>,
 }

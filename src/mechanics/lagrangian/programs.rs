@@ -1,6 +1,7 @@
 //! Programs of the derivatives that the equations of motion are made of, recorded from the program of a Lagrangian's value.
 
 use super::Request;
+use super::elimination::Lists;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, Directions, Program, ROWS, TANGENTS, Tracer};
 
@@ -9,8 +10,8 @@ pub(super) struct Recorded<'t, S> {
     pub value: Tracer<'t, S>,
     pub momentum: Vec<Tracer<'t, S>>,
     pub dl_dq: Vec<Tracer<'t, S>>,
-    /// Rows of the lower triangle of `M` with the columns of what is not zero.
-    pub mass_matrix: Vec<Vec<(usize, Tracer<'t, S>)>>,
+    /// The lower triangle of `M`.
+    pub mass_matrix: Lists<Tracer<'t, S>>,
     pub coriolis: Vec<Tracer<'t, S>>,
 }
 

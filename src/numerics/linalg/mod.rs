@@ -3,7 +3,8 @@
 //! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of
 //! `LANES` matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
 //! bits wherever it stands in a batch. A [`Workspace`] is reused; nothing else allocates for matrices up to the size
-//! from which faer, with the feature of this name, takes over: 47 for systems of one right-hand side, 40 for inverses, 33 for eigenvalues.
+//! from which faer, with the feature of this name, takes over: 47 for systems of one right-hand side and 40 for inverses, unless they are positive
+//! definite, and 33 for eigenvalues.
 //!
 //! ```
 //! use lnn::linalg::{LinalgError, Workspace, eigenvalues, solve};

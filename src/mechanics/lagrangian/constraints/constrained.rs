@@ -366,7 +366,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
             let under = Under { beneath: Arc::clone(beneath), rows };
             Solved::record(Arc::new(under), n, parameters, most_products(n + self.kept.len()))
         };
-        Some(self.solved.get_or_init(record).clone()?.as_long_as(alone))
+        Some(self.solved.get_or_init(record).clone()?.with_flag_of(alone))
     }
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {

@@ -3,7 +3,7 @@
 use super::Constraints;
 use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
-use crate::lagrangian::elimination::{Balance, eliminate};
+use crate::lagrangian::elimination::{Balance, Lists, eliminate};
 use crate::lagrangian::linearization::Rate;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Program, ROWS, Replay, Tracer};
@@ -28,8 +28,7 @@ pub(super) struct RecordedRows<S> {
 
 /// Constraints at a state that is being recorded.
 struct Rows<R> {
-    /// The columns of each row that are not zero.
-    matrix: Vec<Vec<(usize, R)>>,
+    matrix: Lists<R>,
     values: Vec<R>,
     rates: Vec<R>,
 }
@@ -96,7 +95,7 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
 }
 
 /// The lower triangle of `A A^T`; `None` of more products than are allowed.
-fn gram<R: Real>(matrix: &[Vec<(usize, R)>], most: usize) -> Option<Vec<Vec<(usize, R)>>> {
+fn gram<R: Real>(matrix: &[Vec<(usize, R)>], most: usize) -> Option<Lists<R>> {
     let mut columns: BTreeMap<usize, Vec<(usize, R)>> = BTreeMap::new();
     for (c, row) in matrix.iter().enumerate() {
         row.iter().for_each(|&(i, a)| columns.entry(i).or_default().push((c, a)));

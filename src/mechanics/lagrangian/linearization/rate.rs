@@ -18,6 +18,7 @@
 
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::Constraints;
+use crate::lagrangian::elimination::Lists;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Directions, Program, ROWS, TANGENTS, TapeError, Tracer};
 use std::collections::BTreeMap;
@@ -127,7 +128,7 @@ impl<S: Scalar> Rate<S> {
 
     /// What is not zero of the rows `A` of constraints, by rising columns, and their drift `gamma`, at a state `q`, `v`; of constraints whose
     /// parameters are constants.
-    pub fn rows<R: Real>(&self, state: &[R]) -> Option<(Vec<Vec<(usize, R)>>, Vec<R>)> {
+    pub fn rows<R: Real>(&self, state: &[R]) -> Option<(Lists<R>, Vec<R>)> {
         let (n, m) = self.size;
         // Only `A` is left where nothing but `w` and `lambda` moves: it does not matter where they are.
         let inputs = [state, &vec![R::zero(); 2 * n + 2 * m]].concat();

@@ -6,6 +6,7 @@ use crate::scalar::{Real, Scalar};
 use crate::tape::TapeError;
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// One operation; operands are rows.
 #[derive(Clone, Debug)]
@@ -74,6 +75,29 @@ enum Key {
     Select(u32, u32, u32),
 }
 
+/// Mixes the words of a [`Key`] by products: keys are small numbers that nobody chooses to collide.
+#[derive(Debug, Default)]
+struct Mixer(u64);
+
+impl Hasher for Mixer {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u64(u64::from(byte)));
+    }
+    fn write_u32(&mut self, word: u32) {
+        self.write_u64(u64::from(word));
+    }
+    fn write_u64(&mut self, word: u64) {
+        // An odd number without a pattern, from the golden ratio.
+        self.0 = (self.0.rotate_left(23) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+    fn write_isize(&mut self, word: isize) {
+        self.write_u64(word as u64);
+    }
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+}
+
 /// The recorded expressions.
 #[derive(Debug)]
 pub(in crate::numerics::tape) struct Graph<S> {
@@ -83,7 +107,7 @@ pub(in crate::numerics::tape) struct Graph<S> {
     pub(in crate::numerics::tape) first: Vec<u32>,
     /// Operation of each row.
     pub(in crate::numerics::tape) node_of_row: Vec<u32>,
-    known: HashMap<Key, u32>,
+    known: HashMap<Key, u32, BuildHasherDefault<Mixer>>,
 }
 
 /// Bit of a row that names a parameter which is not recorded yet: most weights of a network are read by blocks alone.
@@ -106,7 +130,7 @@ impl<S: Scalar> Recorder<S> {
     }
     /// Of so many rows at most.
     pub(in crate::numerics::tape) fn within(limit: u32, blocks: bool) -> Self {
-        let graph = Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: HashMap::new() };
+        let graph = Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: HashMap::default() };
         Self { graph: RefCell::new(graph), error: Cell::new(None), blocks, limit }
     }
     /// The numbers of lane inputs `first..first + count`.
