@@ -32,13 +32,16 @@ struct Buffers<'a, S: Scalar> {
     accelerations: Accelerations<'a, S>,
     /// Made on first use.
     linearizer: Option<Linearizer<'a, S>>,
+    /// Where it linearized last: solvers ask for one product after the other.
+    place: Vec<S>,
     error: Option<MechanicsError>,
 }
 
 impl<'a, S: Scalar> RightHandSide<'a, S> {
     /// Of a model; [`EulerLagrange::rhs`] is the same.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
-        let buffers = Buffers { accelerations: Accelerations::new(model), linearizer: None, error: None };
+        let buffers =
+            Buffers { accelerations: Accelerations::new(model), linearizer: None, place: Vec::new(), error: None };
         Self { model, buffers: Mutex::new(buffers) }
     }
 
@@ -106,8 +109,15 @@ impl<'a, S: Scalar> RightHandSide<'a, S> {
             return;
         }
         let found = if y.len() == 2 * n {
-            let linearizer = buffers.linearizer.get_or_insert_with(|| Linearizer::new(self.model));
-            linearizer.at(&y[..n], &y[n..]).and_then(|found| take(n, &found.by_q, &found.by_v))
+            let Buffers { linearizer, place, .. } = &mut *buffers;
+            let linearizer = linearizer.get_or_insert_with(|| Linearizer::new(self.model));
+            let known = if place == y {
+                Ok(())
+            } else {
+                place.clear();
+                linearizer.at(&y[..n], &y[n..]).map(|_| place.extend_from_slice(y))
+            };
+            known.and_then(|()| take(n, &linearizer.last().by_q, &linearizer.last().by_v))
         } else {
             Err(MechanicsError::Shape { what: "state", expected: 2 * n, found: y.len() })
         };
@@ -137,6 +147,7 @@ mod tests {
         f.evaluate(&y, &mut dy);
         let a = model.acceleration(&y[..2], &y[2..]).unwrap();
         assert_eq!(dy, [0.2, 0.9, a[0], a[1]]);
+        f.jacobian(&[0.9, 0.5, 0.2, 0.9], &mut jacobian);
         f.jacobian(&y, &mut jacobian);
         let x = [0.3, -0.1, 0.7, 1.1];
         f.jacobian_product(&y, &x, &mut product);

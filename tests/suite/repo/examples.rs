@@ -8,6 +8,8 @@ mod formula;
 #[allow(dead_code, reason = "its functions are called")]
 #[path = "../../../examples/gps.rs"]
 mod gps;
+#[path = "../../../examples/implicit_solver.rs"]
+mod implicit_solver;
 #[path = "../../../examples/kalman.rs"]
 mod kalman;
 #[allow(dead_code, reason = "its functions are called")]
@@ -44,6 +46,11 @@ use std::f64::consts::TAU;
 #[test]
 fn an_integrator_of_ode_solvers_moves_a_cart_and_a_pendulum() {
     own_solver::main().unwrap();
+}
+
+#[test]
+fn an_implicit_integrator_moves_carts_on_a_stiff_damper() {
+    implicit_solver::main().unwrap();
 }
 
 #[test]

@@ -178,6 +178,11 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         self.under(q, v, None)
     }
 
+    /// What the last call gave.
+    pub(super) fn last(&self) -> &Linearization<S> {
+        &self.linearization
+    }
+
     /// The same under generalized forces from outside, `(batch, n)`, if there are any.
     ///
     /// # Errors
