@@ -4,7 +4,7 @@ use super::elimination::{Balance, eliminate};
 use super::programs::derivatives;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::SMALL_PIVOT;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::{Program, ROWS, Replay, Tracer};
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -90,16 +90,6 @@ impl<S: Scalar> RecordMotion<S> for Value<S> {
         let right = found.dl_dq.iter().zip(&found.coriolis).map(|(&g, &c)| g - c).collect();
         Some(Balance { coordinates: state.len() / 2, lower: found.mass_matrix, right })
     }
-}
-
-/// `true` if all numbers are finite.
-pub(crate) fn are_finite<S: Scalar>(numbers: &[S]) -> bool {
-    let zero = <S as Real>::zero();
-    let mut probe = zero;
-    for &x in numbers {
-        probe += x * zero;
-    }
-    probe == zero
 }
 
 /// `true` if every pivot of an elimination is positive, and not much below the element of the diagonal that it was.

@@ -34,8 +34,6 @@ mod wrappers;
 pub use accelerations::Accelerations;
 #[doc(hidden)]
 pub use accelerations::Solved;
-#[cfg(feature = "rollout")]
-pub(crate) use accelerations::are_finite;
 pub(crate) use configure::{LagrangianVisitor, resolve};
 pub use configure::{SystemError, SystemInstance, build, configure, systems};
 #[doc(hidden)]

@@ -2,7 +2,7 @@
 
 use super::recursion::Passes;
 use super::{EulerLagrange, InverseDynamics, MechanicsError, inverse_dynamics};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Scalar, are_finite};
 
 /// The forces of states `(batch, n)` with accelerations by the recursion of a model; `None` of a model without one, and where a force is not
 /// finite or there are not as many numbers as there should be: what is wrong is found by the terms.
@@ -33,17 +33,14 @@ fn write_torques<S: Scalar>(
     if [v.len(), a.len(), torques.len()] != [q.len(); 3] || !q.len().is_multiple_of(n) {
         return false;
     }
-    let zero = <S as Real>::zero();
-    let mut probe = zero;
     for (row, torques) in torques.chunks_exact_mut(n).enumerate() {
         let [q, v, a] = [q, v, a].map(|x| &x[row * n..][..n]);
         chain.inverse_dynamics([q, v, a], buffer, torques);
         for (k, torque) in torques.iter_mut().enumerate() {
             *torque -= chain.friction(k, v[k]);
-            probe += *torque * zero;
         }
     }
-    probe == zero
+    are_finite(torques)
 }
 
 /// The external forces that make a motion, the torques of an arm's motors for instance, state after state, with buffers of its own: what a

@@ -2,9 +2,9 @@
 //! the two the motion takes.
 
 use super::StepFailure;
-use crate::lagrangian::{Manifold, ManifoldRows, are_finite, dot};
+use crate::lagrangian::{Manifold, ManifoldRows, dot};
 use crate::linalg::{Workspace, eigh};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 
 /// The smallest singular value of the rows over the largest that it had, below which it counts as 0. Where it passes through 0 the minimum

@@ -18,8 +18,6 @@ pub struct Workspace<S> {
     pub(super) second: Retry<S>,
     /// Scratch of determinants.
     pub(super) minors: Minors<S>,
-    /// Scratch of matrices that fall into blocks.
-    pub(super) apart: Apart<S>,
     /// Lent to callers.
     vector: Vec<S>,
     failures: Vec<(usize, Failure)>,
@@ -62,25 +60,6 @@ pub(super) struct Retry<S> {
 pub(super) struct Minors<S> {
     pub block: Vec<S>,
     pub values: Vec<S>,
-    pub vectors: Vec<S>,
-}
-
-/// Scratch of matrices whose coordinates fall into groups.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Apart<S> {
-    /// The group of every coordinate, of this matrix and of the next.
-    pub labels: [Vec<usize>; 2],
-    /// Size and first member of every group, the smallest groups first.
-    pub groups: Vec<(usize, usize)>,
-    /// The members of the groups, one group after the other.
-    pub members: Vec<usize>,
-    /// The order of the eigenvalues.
-    pub order: Vec<usize>,
-    /// Blocks of one size.
-    pub matrices: Vec<S>,
-    /// The eigenvalues of all blocks.
-    pub values: Vec<S>,
-    /// The eigenvectors of all blocks.
     pub vectors: Vec<S>,
 }
 

@@ -1,15 +1,12 @@
 //! Eigenvalues of matrices whose coordinates fall into groups that no element joins: those of the groups' blocks.
 
-use super::batch::{Apart, Buffer, Workspace};
+use super::batch::Buffer;
+use super::components;
 use super::eigen::whole;
-use super::large_systems::{LARGE, LARGE_BLOCK};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, are_finite};
 
-/// Size from which the search for blocks takes less than a fiftieth of what a full matrix takes.
+/// Size from which the search for blocks takes little beside what a full matrix takes.
 const SIZE: usize = 16;
-
-/// Matrices that are divided at once at most: their blocks stay in the cache.
-const TOGETHER: usize = 64;
 
 /// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of a batch, of every matrix by its blocks; whether all is known to
 /// be finite. Eigenvectors are zero outside of their block.
@@ -21,157 +18,97 @@ pub(super) fn by_blocks<S: Scalar>(
     matrices: &[S],
     values: &mut [S],
     vectors: &mut [S],
-    workspace: &mut Workspace<S>,
+    buffer: &mut Buffer<S>,
 ) -> bool {
-    let Workspace { block: buffer, apart, .. } = workspace;
     if n < SIZE {
-        return whole(n, LARGE, matrices, values, vectors, buffer);
+        return whole(n, matrices, values, vectors, buffer);
     }
+    let groups_of = |row: usize| groups(n, &matrices[row * n * n..][..n * n]);
     let batch = values.len() / n;
-    let [mut label, mut next] = std::mem::take(&mut apart.labels);
-    let mut finite = true;
-    let mut start = 0;
+    let (mut finite, mut start) = (true, 0);
+    let mut next = groups_of(0);
     while start < batch {
-        let matrix = |row: usize| &matrices[row * n * n..][..n * n];
-        let reached = &mut apart.members;
-        let groups = find(n, matrix(start), &mut label, reached);
-        let mut end = start + 1;
-        while end < batch.min(start + TOGETHER) && find(n, matrix(end), &mut next, reached) == groups && next == label {
+        let (groups, mut end) = (next, start + 1);
+        loop {
+            next = if end < batch { groups_of(end) } else { Vec::new() };
+            if next != groups {
+                break;
+            }
             end += 1;
         }
         let matrices = &matrices[start * n * n..end * n * n];
         let values = &mut values[start * n..end * n];
         let vectors = if vectors.is_empty() { &mut [][..] } else { &mut vectors[start * n * n..end * n * n] };
-        finite &= if groups == 1 {
-            whole(n, LARGE, matrices, values, vectors, buffer)
-        } else {
-            divide(n, &label, apart);
-            apart.decompose(n, matrices, values, vectors, buffer)
+        finite &= match groups.len() {
+            1 => whole(n, matrices, values, vectors, buffer),
+            _ => apart(n, &groups, matrices, values, vectors, buffer),
         };
         start = end;
     }
-    apart.labels = [label, next];
     finite
 }
 
-/// Labels the coordinates of a matrix by the first members of their groups, from its upper triangle, and counts the groups.
-///
-/// The first row of a full matrix says all.
-fn find<S: Scalar>(n: usize, matrix: &[S], label: &mut Vec<usize>, reached: &mut Vec<usize>) -> usize {
-    let zero = <S as Real>::zero();
-    label.clear();
-    label.resize(n, n);
-    reached.clear();
-    let mut groups = 0;
-    for first in 0..n {
-        if label[first] < n {
-            continue;
-        }
-        label[first] = first;
-        groups += 1;
-        let mut next = reached.len();
-        reached.push(first);
-        while next < reached.len() && reached.len() < n {
-            let i = reached[next];
-            for (j, label) in label.iter_mut().enumerate() {
-                if *label == n && matrix[i.min(j) * n + i.max(j)] != zero {
-                    *label = first;
-                    reached.push(j);
-                }
-            }
-            next += 1;
-        }
+/// The coordinates of a matrix in groups, by its upper triangle.
+fn groups<S: Scalar>(n: usize, matrix: &[S]) -> Vec<Vec<usize>> {
+    let is_element = |i: usize, j: usize| matrix[i * n + j] != <S as Real>::zero();
+    // The first row of a full matrix says all.
+    if (1..n).all(|j| is_element(0, j)) {
+        return vec![(0..n).collect()];
     }
-    groups
+    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
+    components(n, pairs.filter(|&(i, j)| is_element(i, j)))
 }
 
-/// Lists the groups by size, and their members.
-fn divide<S: Scalar>(n: usize, label: &[usize], apart: &mut Apart<S>) {
-    let Apart { groups, members, .. } = apart;
-    groups.clear();
-    groups.extend((0..n).filter(|&i| label[i] == i).map(|i| (label.iter().filter(|&&root| root == i).count(), i)));
-    groups.sort_unstable();
-    members.clear();
-    for &(_, root) in groups.iter() {
-        members.extend((0..n).filter(|&i| label[i] == root));
+/// Decomposes matrices of the same groups, block by block.
+fn apart<S: Scalar>(
+    n: usize,
+    groups: &[Vec<usize>],
+    matrices: &[S],
+    values: &mut [S],
+    vectors: &mut [S],
+    buffer: &mut Buffer<S>,
+) -> bool {
+    // Below the diagonal an element outside of the blocks may be anything.
+    let mut finite = are_finite(matrices);
+    vectors.fill(<S as Real>::zero());
+    let mut first = 0;
+    for group in groups {
+        let m = group.len();
+        let of = |matrix: &[S]| {
+            group.iter().flat_map(|i| group.iter().map(move |j| i * n + j)).map(|at| matrix[at]).collect::<Vec<S>>()
+        };
+        let blocks: Vec<S> = matrices.chunks_exact(n * n).flat_map(of).collect();
+        let mut found = vec![S::nan(); blocks.len() / m];
+        let mut directions = vec![S::nan(); if vectors.is_empty() { 0 } else { blocks.len() }];
+        finite &= whole(m, &blocks, &mut found, &mut directions, buffer);
+        for (values, found) in values.chunks_exact_mut(n).zip(found.chunks_exact(m)) {
+            values[first..first + m].copy_from_slice(found);
+        }
+        for (vectors, directions) in vectors.chunks_exact_mut(n * n).zip(directions.chunks_exact(m * m)) {
+            for (k, direction) in directions.chunks_exact(m).enumerate() {
+                group.iter().zip(direction).for_each(|(i, &u)| vectors[(first + k) * n + i] = u);
+            }
+        }
+        first += m;
     }
+    for (row, values) in values.chunks_exact_mut(n).enumerate() {
+        sort(values, if vectors.is_empty() { &mut [] } else { &mut vectors[row * n * n..][..n * n] });
+    }
+    finite
 }
 
-impl<S: Scalar> Apart<S> {
-    /// Decomposes matrices of the same groups, blocks of one size as one batch.
-    fn decompose(
-        &mut self,
-        n: usize,
-        matrices: &[S],
-        values: &mut [S],
-        vectors: &mut [S],
-        buffer: &mut Buffer<S>,
-    ) -> bool {
-        let zero = <S as Real>::zero();
-        vectors.fill(zero);
-        let least = if n > LARGE { LARGE_BLOCK } else { LARGE };
-        // Below the diagonal an element outside of the blocks may be anything.
-        let mut finite = matrices.iter().all(|m| m.is_finite());
-        let mut first = 0;
-        for groups in self.groups.chunk_by(|a, b| a.0 == b.0) {
-            let (m, width) = (groups[0].0, groups[0].0 * groups.len());
-            let members = &self.members[first..first + width];
-            if m == 1 {
-                for (row, matrix) in matrices.chunks_exact(n * n).enumerate() {
-                    for (k, &i) in members.iter().enumerate() {
-                        values[row * n + first + k] = matrix[i * n + i];
-                        if !vectors.is_empty() {
-                            vectors[(row * n + first + k) * n + i] = <S as Real>::one();
-                        }
-                    }
-                }
-                first += width;
-                continue;
-            }
-            self.matrices.clear();
-            for matrix in matrices.chunks_exact(n * n) {
-                for group in members.chunks_exact(m) {
-                    self.matrices.extend(group.iter().flat_map(|i| group.iter().map(move |j| matrix[i * n + j])));
-                }
-            }
-            self.values.resize(self.matrices.len() / m, zero);
-            self.vectors.resize(if vectors.is_empty() { 0 } else { self.matrices.len() }, zero);
-            finite &= whole(m, least, &self.matrices, &mut self.values, &mut self.vectors, buffer);
-            for (values, found) in values.chunks_exact_mut(n).zip(self.values.chunks_exact(width)) {
-                values[first..first + width].copy_from_slice(found);
-            }
-            for (vectors, found) in vectors.chunks_exact_mut(n * n).zip(self.vectors.chunks_exact(width * m)) {
-                for (k, found) in found.chunks_exact(m).enumerate() {
-                    let group = &members[k / m * m..][..m];
-                    group.iter().zip(found).for_each(|(i, &u)| vectors[(first + k) * n + i] = u);
-                }
-            }
-            first += width;
-        }
-        for (row, values) in values.chunks_exact_mut(n).enumerate() {
-            let vectors = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * n * n..][..n * n] };
-            self.sort(values, vectors);
-        }
-        finite
-    }
-
-    /// Brings eigenvalues into ascending order, those that are equal in the order of their blocks, and their eigenvectors with them.
-    fn sort(&mut self, values: &mut [S], vectors: &mut [S]) {
-        let n = values.len();
-        let found = &mut self.values;
-        found.clear();
-        found.extend_from_slice(values);
-        let compare = |a: S, b: S| a.partial_cmp(&b).unwrap_or_else(|| a.is_nan().cmp(&b.is_nan()));
-        self.order.clear();
-        self.order.extend(0..n);
-        self.order.sort_unstable_by(|&a, &b| compare(found[a], found[b]).then(a.cmp(&b)));
-        self.vectors.clear();
-        self.vectors.extend_from_slice(vectors);
-        for (k, &from) in self.order.iter().enumerate() {
-            values[k] = found[from];
-            if !vectors.is_empty() {
-                vectors[k * n..][..n].copy_from_slice(&self.vectors[from * n..][..n]);
-            }
+/// Brings eigenvalues into ascending order, those that are equal in the order of their blocks, and their eigenvectors with them.
+fn sort<S: Scalar>(values: &mut [S], vectors: &mut [S]) {
+    let (n, found, directions) = (values.len(), values.to_vec(), vectors.to_vec());
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| {
+        let (a, b) = (found[a], found[b]);
+        a.partial_cmp(&b).unwrap_or_else(|| a.is_nan().cmp(&b.is_nan()))
+    });
+    for (k, from) in order.into_iter().enumerate() {
+        values[k] = found[from];
+        if !vectors.is_empty() {
+            vectors[k * n..][..n].copy_from_slice(&directions[from * n..][..n]);
         }
     }
 }
@@ -179,7 +116,7 @@ impl<S: Scalar> Apart<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::{Failure, dot, eigenvalues, eigh};
+    use crate::linalg::{Failure, Workspace, dot, eigenvalues, eigh};
     use crate::scalar::Dd;
 
     /// A matrix of blocks of these sizes, its coordinates in an order of no pattern.
@@ -226,7 +163,7 @@ mod tests {
                 let (mut workspace, mut w, mut u) = (Workspace::new(), vec![0.0; n], vec![0.0; n * n]);
                 eigh(n, &matrix, &mut w, &mut u, &mut workspace).unwrap();
                 let (mut plain, mut full) = (w.clone(), u.clone());
-                whole(n, LARGE, &matrix, &mut plain, &mut full, &mut Buffer::default());
+                whole(n, &matrix, &mut plain, &mut full, &mut Buffer::default());
                 let add = |sum: &mut (f64, f64), more: (f64, f64)| *sum = (sum.0 + more.0, sum.1 + more.1);
                 add(&mut ours, errors(n, &matrix, &w, &u));
                 add(&mut theirs, errors(n, &matrix, &plain, &full));
@@ -252,7 +189,7 @@ mod tests {
             let (mut w, mut u) = (vec![0.0; n], vec![0.0; n * n]);
             eigh(n, &matrix, &mut w, &mut u, &mut Workspace::new()).unwrap();
             let (mut plain, mut full) = (w.clone(), u.clone());
-            whole(n, LARGE, &matrix, &mut plain, &mut full, &mut Buffer::default());
+            whole(n, &matrix, &mut plain, &mut full, &mut Buffer::default());
             assert_eq!((w, u), (plain, full));
         }
     }

@@ -8,7 +8,10 @@ pub fn components(n: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> 
     let mut label: Vec<usize> = (0..n).collect();
     for (a, b) in pairs {
         let (low, high) = (label[a].min(label[b]), label[a].max(label[b]));
-        label.iter_mut().filter(|label| **label == high).for_each(|label| *label = low);
+        // Most pairs of a full matrix join what is one group already.
+        if low < high {
+            label.iter_mut().filter(|label| **label == high).for_each(|label| *label = low);
+        }
     }
     let group = |root: usize| (0..n).filter(|&i| label[i] == root).collect::<Vec<_>>();
     (0..n).map(group).filter(|group| !group.is_empty()).collect()

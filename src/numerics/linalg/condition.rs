@@ -135,7 +135,7 @@ impl<S: Scalar> Dense<S> {
     /// Smallest and largest absolute eigenvalue of the loaded matrix.
     fn extreme_eigenvalues(&mut self, n: usize) -> (S, S) {
         let mut values = vec![S::nan(); n];
-        if !large_systems::eigh(n, large_systems::LARGE, &self.matrix, &mut values, &mut []) {
+        if !large_systems::eigh(n, &self.matrix, &mut values, &mut []) {
             eigen::decompose::<S, 1>(n, &self.matrix, &mut values, &mut [], (0, 1), &mut self.lanes);
         }
         values.iter().fold((S::infinity(), <S as Real>::zero()), |(least, most), w| {

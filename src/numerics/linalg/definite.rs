@@ -7,7 +7,7 @@ use super::Workspace;
 use super::batch::{LANES, Lane};
 use super::elimination::{self, Pivots};
 use super::solve::{Systems, finish, is_harmless};
-use crate::scalar::{Real, Scalar, in_lanes, vectorized};
+use crate::scalar::{Real, Scalar, are_finite, in_lanes, vectorized};
 
 /// Smaller matrices are eliminated with pivots in no more time.
 const SIZE: usize = 5;
@@ -253,27 +253,6 @@ fn eliminate<S: Scalar>(
         }
     }
     (smallest, growth)
-}
-
-/// `true` if all numbers are finite.
-#[inline(always)]
-fn are_finite<S: Scalar>(x: &[S]) -> bool {
-    let zero = <S as Real>::zero();
-    let mut probe = [zero; CHUNK];
-    let (parts, rest) = x.as_chunks::<CHUNK>();
-    for part in parts {
-        for l in 0..CHUNK {
-            probe[l] += part[l] * zero;
-        }
-    }
-    let mut sum = zero;
-    for &x in rest {
-        sum += x * zero;
-    }
-    for x in probe {
-        sum += x;
-    }
-    sum == zero
 }
 
 /// Solves one system; `false` if it is not safely positive definite.

@@ -58,7 +58,7 @@ fn run<S: Scalar>(
     if batch == 0 {
         return Ok(());
     }
-    if by_blocks(n, matrices, values, vectors, workspace) {
+    if by_blocks(n, matrices, values, vectors, &mut workspace.block) {
         return Ok(());
     }
     for (row, m) in matrices.chunks_exact(size).enumerate() {
@@ -74,10 +74,9 @@ fn run<S: Scalar>(
     workspace.outcome()
 }
 
-/// Every matrix as a whole, by lanes or, above the size `least`, by the routine of its scalar; whether all is known to be finite.
+/// Every matrix as a whole, by lanes or, where it is large, by the routine of its scalar; whether all is known to be finite.
 pub(super) fn whole<S: Scalar>(
     n: usize,
-    least: usize,
     matrices: &[S],
     values: &mut [S],
     vectors: &mut [S],
@@ -86,7 +85,7 @@ pub(super) fn whole<S: Scalar>(
     let size = n * n;
     let one_by_one = matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate().all(|(row, (m, w))| {
         let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
-        large_systems::eigh(n, least, m, w, u)
+        large_systems::eigh(n, m, w, u)
     });
     if one_by_one {
         false

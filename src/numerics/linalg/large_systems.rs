@@ -33,12 +33,10 @@ impl<S: Scalar> Systems<'_, S> {
 }
 
 /// Size above which faer's tridiagonal method beats Jacobi on lanes.
-pub(super) const LARGE: usize = 32;
-/// The same of the blocks of a matrix above that size, which are often too few to fill the lanes.
-pub(super) const LARGE_BLOCK: usize = 24;
+const EIGEN: usize = 32;
 
-/// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix, `NaN` if faer gives up; `false` up to the size
-/// `least`, or if this scalar has no routine.
-pub(super) fn eigh<S: Scalar>(n: usize, least: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) -> bool {
-    n > least && S::eigh(n, matrix, values, vectors)
+/// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix, `NaN` if faer gives up; `false` if the lanes
+/// are faster, or this scalar has no routine.
+pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) -> bool {
+    n > EIGEN && S::eigh(n, matrix, values, vectors)
 }

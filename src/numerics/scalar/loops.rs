@@ -3,6 +3,7 @@
 //! They are inlined wherever they stand. Of the standard library's adaptors parts are functions of their own, which without
 //! optimisation across codegen units are called once a number.
 
+use super::{Real, Scalar};
 pub(crate) use pulp::{Simd, WithSimd};
 
 /// Runs `kernel` compiled for the widest vector instructions this CPU has (AVX-512, AVX2 + FMA, NEON, or baseline).
@@ -50,6 +51,28 @@ pub(crate) fn in_lanes<const W: usize, R>(kernel: impl FnOnce() -> R) -> Option<
     {
         Some(vectorized(kernel))
     }
+}
+
+/// `true` if all numbers are finite.
+#[inline(always)]
+pub(crate) fn are_finite<S: Scalar>(numbers: &[S]) -> bool {
+    const WIDTH: usize = 8;
+    let zero = <S as Real>::zero();
+    let mut probe = [zero; WIDTH];
+    let (parts, rest) = numbers.as_chunks::<WIDTH>();
+    for part in parts {
+        for l in 0..WIDTH {
+            probe[l] += part[l] * zero;
+        }
+    }
+    let mut sum = zero;
+    for &x in rest {
+        sum += x * zero;
+    }
+    for x in probe {
+        sum += x;
+    }
+    sum == zero
 }
 
 /// `f(out, x)` number by number.

@@ -34,7 +34,7 @@ pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lane
 #[doc(hidden)]
 pub use loops::vectorized;
 pub(crate) use loops::{
-    Column, Simd, WithSimd, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
+    Column, Simd, WithSimd, are_finite, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
 };
 #[doc(hidden)]
 pub(crate) use matrix::product_by_loops;

@@ -2,9 +2,9 @@
 
 use super::rows::{dot, largest, length};
 use super::{Manifold, ManifoldRows};
-use crate::lagrangian::accelerations::{are_finite, are_safe};
+use crate::lagrangian::accelerations::are_safe;
 use crate::linalg::{Workspace, minimum_norm};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 
 /// Steps of Newton's method.

@@ -13,7 +13,7 @@ pub(super) use rate::{Rate, add};
 use super::constraints::Bordered;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{self, Workspace};
-use crate::scalar::{Real, Scalar, update, vectorized};
+use crate::scalar::{MatMut, MatRef, Real, Scalar, product_by_loops, update, vectorized};
 use differences::Differences;
 
 /// A batch of states with their accelerations and multipliers, which are held.
@@ -208,9 +208,10 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         let states =
             self.solution.chunks_exact((size * size).max(1)).zip(self.right.chunks_exact((size * 2 * n).max(1)));
         for (inverse, slopes) in states {
+            let (c, a) = (MatMut::new(&mut rows, n, 2 * n), MatRef::new(&inverse[..n * size], n, size));
             vectorized(
                 #[inline(always)]
-                || multiply((size, 2 * n), inverse, slopes, &mut rows),
+                || product_by_loops(c, false, <S as Real>::one(), a, MatRef::new(slopes, size, 2 * n)),
             );
             for (row, inverse) in rows.chunks_exact(2 * n).zip(inverse.chunks_exact(size)) {
                 by_q.extend_from_slice(&row[..n]);
@@ -276,29 +277,6 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         match self.workspace.failures().first() {
             Some(&(row, failure)) if !solved => Err(MechanicsError::unsolved(row, failure)),
             _ => Ok(()),
-        }
-    }
-}
-
-/// Rows of a product `A B`, `A` of so many columns, `B` of so many: four rows of `B` at a time.
-#[inline(always)]
-fn multiply<S: Scalar>((inner, width): (usize, usize), a: &[S], b: &[S], out: &mut [S]) {
-    for i in 0..out.len() / width {
-        let (a, out) = (&a[i * inner..][..inner], &mut out[i * width..][..width]);
-        out.fill(<S as Real>::zero());
-        let (fours, rest) = a.as_chunks::<4>();
-        for k in 0..fours.len() {
-            let (factors, b) = (fours[k], &b[4 * k * width..][..4 * width]);
-            let (b0, b1, b2, b3) =
-                (&b[..width], &b[width..][..width], &b[2 * width..][..width], &b[3 * width..][..width]);
-            for j in 0..width {
-                let first = factors[0].lane_fused(b0[j], out[j]);
-                let second = factors[1].lane_fused(b1[j], first);
-                out[j] = factors[3].lane_fused(b3[j], factors[2].lane_fused(b2[j], second));
-            }
-        }
-        for k in 0..rest.len() {
-            update(out, &b[(4 * fours.len() + k) * width..], |sum, x| *sum = rest[k].lane_fused(x, *sum));
         }
     }
 }

@@ -33,6 +33,19 @@ pub(crate) struct Rate<S> {
     symmetric: bool,
 }
 
+/// What an input of a rate is.
+enum Input {
+    Position(usize),
+    Velocity(usize),
+    /// Of `w`.
+    Speed(usize),
+    Acceleration,
+    Multiplier,
+    /// Of `y`.
+    Weight(usize),
+    Parameter(usize),
+}
+
 /// Rows by their columns; what is not there is zero.
 pub(crate) type SparseRows<R> = Vec<BTreeMap<usize, R>>;
 
@@ -106,6 +119,20 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, m), symmetric })
     }
 
+    /// What input this is.
+    fn input(&self, k: usize) -> Input {
+        let (n, m) = self.size;
+        match k.checked_sub(4 * n) {
+            None if k < n => Input::Position(k),
+            None if k < 2 * n => Input::Velocity(k - n),
+            None if k < 3 * n => Input::Speed(k - 2 * n),
+            None => Input::Acceleration,
+            Some(k) if k < m => Input::Multiplier,
+            Some(k) if k < 2 * m => Input::Weight(k - m),
+            Some(k) => Input::Parameter(k - 2 * m),
+        }
+    }
+
     /// Number of parameters.
     pub fn parameters(&self) -> usize {
         let (n, m) = self.size;
@@ -132,11 +159,13 @@ impl<S: Scalar> Rate<S> {
         let (n, m) = self.size;
         // Only `A` is left where nothing but `w` and `lambda` moves: it does not matter where they are.
         let inputs = [state, &vec![R::zero(); 2 * n + 2 * m]].concat();
-        let is_speed = |input: usize| (2 * n..3 * n).contains(&input);
-        let seed = |input: usize| is_speed(input).then(|| ((input - 2 * n) as u32, R::one()));
+        let seed = |k: usize| match self.input(k) {
+            Input::Speed(i) => vec![(i as u32, R::one())],
+            _ => Vec::new(),
+        };
         let directions = Directions {
-            seeds: (0..inputs.len()).map(|input| seed(input).into_iter().collect()).collect(),
-            rows: (0..inputs.len()).map(|input| (4 * n..4 * n + m).contains(&input).then_some(0)).collect(),
+            seeds: (0..inputs.len()).map(seed).collect(),
+            rows: (0..inputs.len()).map(|k| matches!(self.input(k), Input::Multiplier).then_some(0)).collect(),
             shared: 0,
             budget: TANGENTS,
         };
@@ -150,60 +179,57 @@ impl<S: Scalar> Rate<S> {
     pub fn slopes<R: Real>(&self, x: &[R], parameters: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         let ((n, m), count) = (self.size, self.program.inputs());
         // Velocities move along the first directions, coordinates along the next, parameters along the others.
-        let direction = |input: usize| match input.checked_sub(4 * n + 2 * m) {
-            Some(parameter) => chosen.iter().position(|&of| of == parameter).map(|place| 2 * n + place),
-            None if input < n => Some(n + input),
-            None => (input < 2 * n).then(|| input - n),
+        let direction = |k: usize| match self.input(k) {
+            Input::Velocity(i) => Some(i),
+            Input::Position(i) => Some(n + i),
+            Input::Parameter(k) => chosen.iter().position(|&of| of == k).map(|place| 2 * n + place),
+            _ => None,
         };
         // The last direction of an input: of symmetric blocks the lower triangle is enough.
-        let last = |input: usize| match (input / n, input.checked_sub(4 * n + m)) {
-            (_, Some(y)) => (y < m).then_some(2 * n - 1),
-            (0, _) => Some(n - 1),
-            (1, _) => Some(input - n),
-            (2, _) => Some(if self.symmetric { input - n } else { 2 * n - 1 }),
+        let last = |k: usize| match self.input(k) {
+            Input::Velocity(i) => Some(i),
+            Input::Position(_) => Some(n - 1),
+            Input::Speed(i) if self.symmetric => Some(n + i),
+            Input::Speed(_) | Input::Weight(_) => Some(2 * n - 1),
             _ => None,
         };
         let directions = Directions {
             seeds: (0..count).map(|k| direction(k).map(|at| (at as u32, R::one())).into_iter().collect()).collect(),
-            rows: (0..count).map(|input| last(input).map(|last| last as u32)).collect(),
+            rows: (0..count).map(|k| last(k).map(|last| last as u32)).collect(),
             shared: 2 * n as u32,
             budget: TANGENTS,
         };
         let second = self.program.derivatives(&self.at_motion(x, parameters), &[], Some(&directions))?.second;
         let mut rows: SparseRows<R> = vec![BTreeMap::new(); n + m];
-        for (input, elements) in second.into_iter().enumerate() {
+        let mut put = |i: usize, column: usize, x: R| add(&mut rows[i], column, x);
+        for (k, elements) in second.into_iter().enumerate() {
             for (direction, x) in elements {
-                let direction = direction as usize;
-                let (of_q, j) = (direction / n.max(1) == 1, direction % n);
-                match (input / n, input.checked_sub(4 * n + m)) {
-                    _ if direction >= 2 * n => match (input / n, input.checked_sub(4 * n + m)) {
-                        (_, Some(y)) => add(&mut rows[n + y], direction, x),
-                        (1, _) => add(&mut rows[input - n], direction, -x),
-                        (2, _) => add(&mut rows[input - 2 * n], direction, x),
-                        _ => {}
-                    },
-                    (_, Some(y)) => add(&mut rows[n + y], if of_q { j } else { n + j }, x),
-                    // -d2R/dv dq.
-                    (0, _) => add(&mut rows[j], input, -x),
-                    // -d2R/dv dv.
-                    (1, _) => {
-                        add(&mut rows[input - n], n + j, -x);
-                        if j < input - n {
-                            add(&mut rows[j], input, -x);
+                let (direction, j) = (direction as usize, direction as usize % n);
+                let by_velocity = direction < n;
+                // The equations are dR/dw - dR/dv and dR/dy, and w moves with v.
+                match self.input(k) {
+                    Input::Velocity(i) if direction >= 2 * n => put(i, direction, -x),
+                    Input::Speed(i) if direction >= 2 * n => put(i, direction, x),
+                    Input::Weight(c) if direction >= 2 * n => put(n + c, direction, x),
+                    Input::Weight(c) => put(n + c, if by_velocity { n + j } else { j }, x),
+                    Input::Position(i) if by_velocity => put(j, i, -x),
+                    Input::Velocity(i) => {
+                        put(i, n + j, -x);
+                        if j < i {
+                            put(j, n + i, -x);
                         }
                     }
-                    // d2R/dw dq.
-                    _ if of_q => {
-                        add(&mut rows[input - 2 * n], j, x);
-                        if self.symmetric && j < input - 2 * n {
-                            add(&mut rows[j], input - 2 * n, x);
+                    Input::Speed(i) if by_velocity => {
+                        put(i, n + j, x);
+                        put(j, n + i, -x);
+                    }
+                    Input::Speed(i) => {
+                        put(i, j, x);
+                        if self.symmetric && j < i {
+                            put(j, i, x);
                         }
                     }
-                    // d2R/dw dv and, as w moves with v, -d2R/dv dw.
-                    _ => {
-                        add(&mut rows[input - 2 * n], n + j, x);
-                        add(&mut rows[j], input - n, -x);
-                    }
+                    _ => {}
                 }
             }
         }
