@@ -177,7 +177,8 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
     /// Fills the accelerations by the program; `false` if there is none, or a state needs a second look.
     pub(super) fn is_solved(&mut self, q: &[S], v: &[S], a: &mut [S]) -> bool {
         let Some((solved, replay)) = &mut self.solved else { return false };
-        let batch = q.len() / self.model.coordinates().max(1);
+        let n = self.model.coordinates();
+        let batch = if q.len() == n { 1 } else { q.len() / n.max(1) };
         self.pivots.resize(batch * 2 * solved.pivots, S::nan());
         if replay.evaluate(batch, &[q, v], &solved.parameters, &mut [a, &mut self.pivots]).is_err() {
             return false;

@@ -129,6 +129,12 @@ fn any_large<S: Scalar>(x: &[S]) -> bool {
     any
 }
 
+/// Sine and cosine of one angle in radians of any size, with the bits of [`sin_cos_lanes`].
+#[inline(always)]
+pub(crate) fn sin_cos_lane<S: Scalar>(x: S) -> (S, S) {
+    if is_fast(x) { x.lane_sin_cos() } else { Real::sin_cos(x) }
+}
+
 /// `sin = sin(x)`, `cos = cos(x)`, elementwise, angles in radians of any size.
 pub fn sin_cos_lanes<S: Scalar>(x: &[S], sin: &mut [S], cos: &mut [S]) {
     let large = vectorized(

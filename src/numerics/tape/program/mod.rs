@@ -10,6 +10,7 @@ mod recorder;
 mod replay;
 mod run;
 mod second;
+mod single;
 mod tracer;
 
 pub(super) use recorder::{Graph, Node, Recorder};
@@ -19,6 +20,7 @@ pub use tracer::Tracer;
 
 use recorder::PARAMETER;
 use run::{Compiler, Run};
+use single::Single;
 
 use super::TapeError;
 use crate::scalar::Scalar;
@@ -47,6 +49,8 @@ pub struct Program<S> {
     outputs: Vec<u32>,
     inputs: usize,
     parameters: usize,
+    /// Of a small program: its operations for a single state.
+    single: Option<Single<S>>,
 }
 
 impl<S: Scalar> Program<S> {
@@ -109,7 +113,7 @@ impl<S: Scalar> Program<S> {
         let uniform_runs = compiler.section(&section(true));
         let uniform_rows = compiler.rows as usize;
         let lanes = compiler.section(&section(false));
-        Self {
+        let mut program = Self {
             uniform_rows,
             lane_rows: compiler.rows as usize - uniform_rows,
             uniform: uniform_runs,
@@ -119,7 +123,10 @@ impl<S: Scalar> Program<S> {
             constants: compiler.constants,
             inputs,
             parameters,
-        }
+            single: None,
+        };
+        program.single = Single::new(&program);
+        program
     }
 
     /// Number of lane inputs.

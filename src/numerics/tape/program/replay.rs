@@ -1,6 +1,7 @@
 //! Replay of a program: over a batch, each operation on all lanes of a chunk, or for numbers of any kind, one at a time.
 
 use super::run::{Kind, Run};
+use super::single::Rows;
 use super::{FEW_LANES, LANES, Program, Row};
 use crate::linalg::Buffer;
 use crate::ops::{Binary, Unary};
@@ -28,6 +29,8 @@ pub struct Replay<S> {
     rows: Buffer<S>,
     /// Lanes and parameters for which the uniform rows were computed last.
     uniform: (usize, Vec<S>),
+    /// Rows of a single state, of a small program.
+    single: Option<Rows<S>>,
 }
 
 impl<S: Scalar> Clone for Replay<S> {
@@ -39,7 +42,7 @@ impl<S: Scalar> Clone for Replay<S> {
 impl<S: Scalar> Replay<S> {
     /// Buffers for a program.
     pub fn new(program: Arc<Program<S>>) -> Self {
-        Self { rows: Buffer::default(), uniform: (0, Vec::new()), program }
+        Self { rows: Buffer::default(), uniform: (0, Vec::new()), single: None, program }
     }
 
     /// Computes the outputs of all lanes from their inputs and the parameters.
@@ -57,6 +60,15 @@ impl<S: Scalar> Replay<S> {
         outputs: &mut [&mut [S]],
     ) -> Result<(), TapeError> {
         let program = &*self.program;
+        check_length("parameters", program.parameters, parameters.len())?;
+        if lanes == 1
+            && let Some(single) = &program.single
+        {
+            check_length("inputs of a state", program.inputs, inputs.iter().map(|field| field.len()).sum())?;
+            check_length("outputs of a state", program.outputs.len(), outputs.iter().map(|field| field.len()).sum())?;
+            self.single.get_or_insert_default().evaluate(single, inputs, parameters, outputs);
+            return Ok(());
+        }
         let columns = |length: usize| length / lanes.max(1);
         let width = inputs.iter().map(|field| columns(field.len())).sum();
         check_length("inputs of a state", program.inputs, width)?;
@@ -64,7 +76,6 @@ impl<S: Scalar> Replay<S> {
         let width = outputs.iter().map(|field| columns(field.len())).sum();
         check_length("outputs of a state", program.outputs.len(), width)?;
         check_length("outputs", lanes * width, outputs.iter().map(|field| field.len()).sum())?;
-        check_length("parameters", program.parameters, parameters.len())?;
         let batch = Batch { inputs, lanes, parameters };
         let rows = program.uniform_rows + program.lane_rows;
         let many = if rows * LANES * size_of::<S>() <= CHUNK { lanes - lanes % LANES } else { 0 };
@@ -347,7 +358,7 @@ fn gathered<S: Scalar, const W: usize>(operands: &[u32], rows: &[Row<S, W>]) -> 
 }
 
 /// `out = f(x)`.
-fn value<S: Scalar>(f: Unary, x: &[S], out: &mut [S]) {
+pub(super) fn value<S: Scalar>(f: Unary, x: &[S], out: &mut [S]) {
     match f {
         Unary::Exp => exp_lanes(x, out),
         Unary::Ln => ln_lanes(x, out),

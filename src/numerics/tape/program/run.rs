@@ -49,6 +49,10 @@ impl Kind {
             _ => 1,
         }
     }
+    /// `true` if its operands are rows.
+    pub fn reads_rows(self) -> bool {
+        !matches!(self, Self::Input | Self::Parameter | Self::Constant)
+    }
     /// Rows that an operation fills.
     pub fn rows(self) -> usize {
         if self == Self::SinCos { 2 } else { 1 }
@@ -110,8 +114,7 @@ impl<S: Scalar> Compiler<'_, S> {
             self.place[index] = self.rows;
             self.push_operands(index);
             let place = self.place[index];
-            let reads_rows = !matches!(kind, Kind::Input | Kind::Parameter | Kind::Constant);
-            let reads_run = |run: &Run| reads_rows && self.operands[own..].iter().any(|&row| row >= run.out);
+            let reads_run = |run: &Run| kind.reads_rows() && self.operands[own..].iter().any(|&row| row >= run.out);
             match runs.last_mut() {
                 Some(run) if run.kind == kind && !begins && (kind.may_chain() || !reads_run(run)) => {
                     run.chained |= reads_run(run);

@@ -1,0 +1,332 @@
+//! Single states of small programs: one operation after the other.
+//!
+//! A run is decided on once for its operations and lanes. Of a single state with few operations that decision takes more time than the
+//! operations; here each is decided on by itself, and no index needs a check, because the number of rows is a power of two known to the
+//! compiler. The results are the same to the bit.
+
+use super::Program;
+use super::replay::value;
+use super::run::{Kind, Run};
+use crate::ops::{Binary, Unary};
+use crate::scalar::{Real, Scalar, in_lanes, sin_cos_lane};
+
+/// Rows of a program at most: those of more would leave the first cache.
+const MANY: usize = 2048;
+/// Of fewer rows a byte is the index.
+const FEW: usize = 256;
+/// Instructions of an operation here, of one in a run, and of a run (`valgrind --tool=callgrind` on `cargo bench --bench hessians -- --count
+/// handle 2 60` and `rosenbrock 32 60`).
+const DECISION: usize = 22;
+const OPERATION: usize = 13;
+const RUN: usize = 50;
+/// The last row of either takes the inputs that no operation reads.
+const UNREAD: u16 = (MANY - 1) as u16;
+
+/// What an operation does.
+#[derive(Clone, Copy, Debug)]
+enum Code {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    /// `a b + c`, as two roundings; `a b - c`; `c - a b`.
+    MulAdd,
+    MulSub,
+    SubMul,
+    Neg,
+    Square,
+    SinCos,
+    Select,
+    /// A function that is a call: the third operand says which.
+    Function,
+}
+
+/// An operation: what it does, the row that it fills, the rows that it reads.
+#[derive(Clone, Copy, Debug)]
+struct Operation {
+    code: Code,
+    out: u16,
+    operands: [u16; 3],
+}
+
+/// The operations of a small program.
+#[derive(Clone, Debug)]
+pub(super) struct Single<S> {
+    few: bool,
+    /// Row of each input and of each parameter.
+    inputs: Vec<u16>,
+    parameters: Vec<u16>,
+    constants: Vec<(u16, S)>,
+    /// Those that depend on parameters alone, then those of the state.
+    uniform: Vec<Operation>,
+    lanes: Vec<Operation>,
+    functions: Vec<Kind>,
+    outputs: Vec<u16>,
+}
+
+impl<S: Scalar> Single<S> {
+    /// The operations of a program; `None` of one with too many rows, or with runs so long that they are the faster ones.
+    pub fn new(program: &Program<S>) -> Option<Self> {
+        let count = program.uniform_rows + program.lane_rows;
+        if count >= MANY {
+            return None;
+        }
+        let mut single = Self {
+            few: count < FEW,
+            inputs: vec![UNREAD; program.inputs],
+            parameters: vec![UNREAD; program.parameters],
+            constants: Vec::new(),
+            uniform: Vec::new(),
+            lanes: Vec::new(),
+            functions: Vec::new(),
+            outputs: program.outputs.iter().map(|&row| row as u16).collect(),
+        };
+        let (mut readers, mut products, mut is_joined) = (vec![0; count], vec![None; count], vec![false; count]);
+        let rows = program.steps().filter(|step| step.kind.reads_rows()).flat_map(|step| step.operands);
+        rows.chain(&program.outputs).for_each(|&row| readers[row as usize] += 1);
+        for step in program.steps() {
+            let (out, named) = (step.out as u16, step.operands[0] as usize);
+            let code = match step.kind {
+                Kind::Input => {
+                    single.inputs[named] = out;
+                    continue;
+                }
+                Kind::Parameter => {
+                    single.parameters[named] = out;
+                    continue;
+                }
+                Kind::Constant => {
+                    single.constants.push((out, program.constants[named]));
+                    continue;
+                }
+                Kind::Binary(Binary::Add) => Code::Add,
+                Kind::Binary(Binary::Sub) => Code::Sub,
+                Kind::Binary(Binary::Mul) => Code::Mul,
+                Kind::Binary(Binary::Div) => Code::Div,
+                Kind::Unary(Unary::Neg) => Code::Neg,
+                Kind::Unary(Unary::Powi(2)) => Code::Square,
+                Kind::SinCos => Code::SinCos,
+                Kind::Select => Code::Select,
+                Kind::Unary(_) | Kind::Binary(_) => Code::Function,
+            };
+            let mut operands = [0, 1, 2].map(|k| step.operands.get(k).map_or(0, |&row| row as u16));
+            if matches!(code, Code::Function) {
+                operands[2] = single.functions.len() as u16;
+                single.functions.push(step.kind);
+            }
+            let is_uniform = |row: u16| (row as usize) < program.uniform_rows;
+            let mut operation = Operation { code, out, operands };
+            // A product that one sum or difference alone reads is computed within it.
+            let [first, second, _] = operands;
+            let product = |row: u16| products[row as usize].filter(|_| is_uniform(row) == is_uniform(out));
+            let joined = match code {
+                Code::Mul if readers[step.out] == 1 => {
+                    products[step.out] = Some([first, second]);
+                    None
+                }
+                Code::Add | Code::Sub => {
+                    let of_first = product(first).map(|factors| (first, factors, second));
+                    of_first.or_else(|| product(second).map(|factors| (second, factors, first)))
+                }
+                _ => None,
+            };
+            if let Some((row, [a, b], other)) = joined {
+                is_joined[row as usize] = true;
+                operation.operands = [a, b, other];
+                operation.code = match code {
+                    Code::Add => Code::MulAdd,
+                    _ if row == first => Code::MulSub,
+                    _ => Code::SubMul,
+                };
+            }
+            let section = if is_uniform(out) { &mut single.uniform } else { &mut single.lanes };
+            section.push(operation);
+        }
+        for section in [&mut single.uniform, &mut single.lanes] {
+            section.retain(|operation| !is_joined[operation.out as usize]);
+        }
+        let operations: usize = program.lanes.iter().filter(|run| run.kind.reads_rows()).map(Run::count).sum();
+        let by_runs = operations * OPERATION + program.lanes.len() * RUN;
+        (single.lanes.len() * DECISION < by_runs).then_some(single)
+    }
+}
+
+/// The rows of a single state.
+#[derive(Debug)]
+pub(super) struct Rows<S> {
+    few: Box<[S; FEW]>,
+    /// Those of larger programs.
+    many: Option<Box<[S; MANY]>>,
+    /// Parameters for which the uniform rows were computed last.
+    parameters: Option<Vec<S>>,
+}
+
+impl<S: Scalar> Default for Rows<S> {
+    fn default() -> Self {
+        Self { few: boxed(), many: None, parameters: None }
+    }
+}
+
+fn boxed<S: Scalar, const N: usize>() -> Box<[S; N]> {
+    Box::new([<S as Real>::zero(); N])
+}
+
+impl<S: Scalar> Rows<S> {
+    /// Computes the outputs of one state; the lengths of all fields are those of the program.
+    pub fn evaluate(&mut self, program: &Single<S>, inputs: &[&[S]], parameters: &[S], outputs: &mut [&mut [S]]) {
+        let are_known = self.parameters.as_deref() == Some(parameters);
+        let uniform = if are_known { None } else { Some(parameters) };
+        if program.few {
+            program.evaluate(&mut self.few, inputs, uniform, outputs);
+        } else {
+            program.evaluate(self.many.get_or_insert_with(boxed), inputs, uniform, outputs);
+        }
+        if !are_known {
+            self.parameters = Some(parameters.to_vec());
+        }
+    }
+}
+
+/// The place of a row.
+#[inline(always)]
+fn at<const N: usize>(row: u16) -> usize {
+    row as usize & const { N - 1 }
+}
+
+impl<S: Scalar> Single<S> {
+    /// The outputs of one state, after the uniform rows of other parameters.
+    fn evaluate<const N: usize>(
+        &self,
+        rows: &mut [S; N],
+        inputs: &[&[S]],
+        parameters: Option<&[S]>,
+        outputs: &mut [&mut [S]],
+    ) {
+        if let Some(parameters) = parameters {
+            self.parameters.iter().zip(parameters).for_each(|(&row, &p)| rows[at::<N>(row)] = p);
+            self.constants.iter().for_each(|&(row, c)| rows[at::<N>(row)] = c);
+            self.perform(&self.uniform, rows);
+        }
+        let mut next = 0;
+        for field in inputs {
+            let places = &self.inputs[next..][..field.len()];
+            next += field.len();
+            for k in 0..field.len() {
+                rows[at::<N>(places[k])] = field[k];
+            }
+        }
+        self.perform(&self.lanes, rows);
+        next = 0;
+        for field in outputs {
+            let places = &self.outputs[next..][..field.len()];
+            next += field.len();
+            for k in 0..field.len() {
+                field[k] = rows[at::<N>(places[k])];
+            }
+        }
+    }
+
+    /// Computes operations in order.
+    fn perform<const N: usize>(&self, operations: &[Operation], rows: &mut [S; N]) {
+        in_lanes::<1, _>(
+            #[inline(always)]
+            || {
+                for operation in operations {
+                    let [first, second, third] = operation.operands;
+                    let (a, b) = (rows[at::<N>(first)], rows[at::<N>(second)]);
+                    rows[at::<N>(operation.out)] = match operation.code {
+                        Code::Add => a + b,
+                        Code::Sub => a - b,
+                        Code::Mul => a * b,
+                        Code::Div => a / b,
+                        Code::MulAdd => a * b + rows[at::<N>(third)],
+                        Code::MulSub => a * b - rows[at::<N>(third)],
+                        Code::SubMul => rows[at::<N>(third)] - a * b,
+                        Code::Neg => -a,
+                        Code::Square => a * a,
+                        Code::SinCos => {
+                            let (sin, cos) = sin_cos_lane(a);
+                            rows[at::<N>(operation.out + 1)] = cos;
+                            sin
+                        }
+                        Code::Select => a.select(b, rows[at::<N>(third)]),
+                        Code::Function => function(self.functions[third as usize], a, b),
+                    };
+                }
+            },
+        );
+    }
+}
+
+#[inline(never)]
+fn function<S: Scalar>(kind: Kind, a: S, b: S) -> S {
+    match kind {
+        Kind::Unary(f) => {
+            let mut y = [a];
+            value(f, &[a], &mut y);
+            y[0]
+        }
+        Kind::Binary(f) => f.value(a, b),
+        _ => unreachable!("a function of one or two numbers"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Replay, Tracer};
+    use super::*;
+    use std::sync::Arc;
+
+    /// Every kind of operation, products that are joined and products that are not, an input that nothing reads.
+    fn every_operation<'t>(x: &[Tracer<'t, f64>], p: &[Tracer<'t, f64>], rounds: usize) -> Vec<Tracer<'t, f64>> {
+        let (mut a, mut b) = (x[0], x[1]);
+        let mut outputs = vec![p[0] * p[1] + p[0], x[2] * Tracer::of(3.0)];
+        for _ in 0..rounds {
+            let (sin, cos) = (a * b).sin_cos();
+            let shared = sin * p[1];
+            (a, b) = (a * cos + shared, shared * b - a);
+            a = a - b * cos + a.sqr() * sin - (-b);
+            b = a.max(b) / (a.sqr() + Tracer::of(1.5)) + a.tanh() - b.abs().sqrt() + (p[0] * a).exp().recip();
+            a = (a - b).select(a * b - p[0], b) + a.powi(3) * b;
+            outputs.extend([a, b]);
+        }
+        outputs
+    }
+
+    #[test]
+    fn a_single_state_has_the_bits_of_a_batch() {
+        for (rounds, few) in [(1, true), (30, false)] {
+            let program = Program::record(4, 2, |x, p| every_operation(x, p, rounds)).unwrap();
+            let single = program.single.as_ref().expect("a small program");
+            assert_eq!(single.few, few);
+            let joined = |o: &Operation| matches!(o.code, Code::MulAdd | Code::MulSub | Code::SubMul);
+            assert!(single.lanes.iter().filter(|o| joined(o)).count() >= 3 * rounds);
+            let outputs = program.outputs();
+            let mut replay = Replay::new(Arc::new(program));
+            for p in [[0.3, -1.1], [0.7, 0.2], [0.3, -1.1]] {
+                let x = [[0.4, 1.7, -0.6, 9.0], [1e9, 0.3, 2.0, 9.0], [-2.0, f64::NAN, 0.1, 9.0]];
+                let mut batch = vec![0.0; 3 * outputs];
+                replay.evaluate(3, &[x.as_flattened()], &p, &mut [&mut batch]).unwrap();
+                for (x, batch) in x.iter().zip(batch.chunks_exact(outputs)) {
+                    let (mut first, mut others) = ([0.0], vec![0.0; outputs - 1]);
+                    replay.evaluate(1, &[&x[..1], &x[1..]], &p, &mut [&mut first, &mut others]).unwrap();
+                    let bits = |y: &f64| if y.is_nan() { u64::MAX } else { y.to_bits() };
+                    assert!(
+                        first.iter().chain(&others).map(bits).eq(batch.iter().map(bits)),
+                        "{x:?} {others:?} {batch:?}"
+                    );
+                }
+            }
+            assert!(replay.evaluate(1, &[&[0.0; 3]], &[0.0; 2], &mut [&mut vec![0.0; outputs]]).is_err());
+            assert!(replay.evaluate(1, &[&[0.0; 4]], &[0.0; 3], &mut [&mut vec![0.0; outputs]]).is_err());
+            assert!(replay.evaluate(1, &[&[0.0; 4]], &[0.0; 2], &mut [&mut vec![0.0; outputs - 1]]).is_err());
+        }
+    }
+
+    #[test]
+    fn long_runs_are_left_alone() {
+        // Sums of neighbours, all of one kind.
+        let program = Program::<f64>::record(300, 0, |x, _| x.windows(2).map(|x| x[0] + x[1]).collect()).unwrap();
+        assert!(program.single.is_none());
+    }
+}
