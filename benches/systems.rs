@@ -6,7 +6,7 @@ mod ratio;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::cli::parse_system;
 use lnn::geometry::geometries;
-use lnn::lagrangian::{self, Accelerations, Request, Terms, Torques};
+use lnn::lagrangian::{self, Accelerations, Linearizer, Request, Terms, Torques};
 use lnn::scalar::Scalar;
 use nalgebra_of_num_dual::SVector;
 use num_dual::{Dual2SVec32, Dual2SVec64, DualNum, hessian};
@@ -86,7 +86,13 @@ fn seven_joints(c: &mut Criterion) {
         let [q, v, a] =
             [0.3, 1.1, 2.7].map(|shift| (0..7).map(|i| (shift + 1.3 * f64::from(i)).sin()).collect::<Vec<_>>());
         let (mut torques, mut accelerations) = (Torques::new(&*arm), Accelerations::new(&*arm));
-        let (mut out, mut terms) = (vec![0.0; 7], Terms::default());
+        let (mut out, mut terms, mut linearizer) = (vec![0.0; 7], Terms::default(), Linearizer::new(&*arm));
+        // `benches/peers/arm.sh` compares them with another program's.
+        torques.at(&q, &v, &a, &mut out).expect("finite");
+        println!("torques, friction {friction}: {out:?}");
+        accelerations.at(&q, &v, &mut out).expect("regular");
+        println!("accelerations, friction {friction}: {out:?}");
+        println!("da/dq, friction {friction}: {:?}", linearizer.at(&q, &v).expect("regular").by_q);
         group.bench_function(BenchmarkId::new("inverse dynamics, friction", friction), |b| {
             b.iter(|| torques.at(black_box(&q), &v, &a, &mut out).expect("finite"));
         });
@@ -95,6 +101,9 @@ fn seven_joints(c: &mut Criterion) {
         });
         group.bench_function(BenchmarkId::new("accelerations by the Lagrangian, friction", friction), |b| {
             b.iter(|| arm.terms(black_box(&q), &v, Request::ACCELERATION, &mut terms).expect("regular"));
+        });
+        group.bench_function(BenchmarkId::new("linearization, friction", friction), |b| {
+            b.iter(|| linearizer.at(black_box(&q), &v).expect("regular").by_q[0]);
         });
     }
     group.finish();
