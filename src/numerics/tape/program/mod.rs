@@ -22,6 +22,8 @@ use run::{Compiler, Run};
 
 use super::TapeError;
 use crate::scalar::Scalar;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 /// Lanes of a chunk, of programs whose rows then stay in the nearest caches.
 pub const LANES: usize = 64;
