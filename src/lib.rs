@@ -149,8 +149,12 @@
 //! argmin, nalgebra matrices, batches without allocation, a filmed pendulum.
 // What only higher floors use is dead without them; the default features tell what is dead for everybody.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+#![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
+
+#[macro_use]
+extern crate alloc;
 
 pub mod prelude;
 
@@ -188,17 +192,21 @@ pub use mechanics::{lagrangian, network};
 #[doc(hidden)]
 pub use numerics::{forward, ops, random};
 pub use numerics::{linalg, scalar, tape};
+#[cfg(feature = "std")]
+pub use physics::certificate;
 #[cfg(feature = "data")]
 pub use physics::constraints;
+pub use physics::geometry;
 #[cfg(feature = "training")]
 pub use physics::{analysis, formula, identification};
-pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
+#[cfg(feature = "std")]
 pub use support::cancellation;
-pub(crate) use support::names;
+#[cfg(feature = "std")]
 #[doc(hidden)]
 pub use support::storage;
+pub(crate) use support::{names, platform};
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]
 #[cfg(any(doc, doctest))]

@@ -13,6 +13,7 @@
 
 #[cfg(feature = "training")]
 pub mod analysis;
+#[cfg(feature = "std")]
 pub mod certificate;
 #[cfg(feature = "data")]
 pub mod constraints;

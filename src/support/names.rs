@@ -1,6 +1,9 @@
 //! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits,
 //! columns of results beside those of coordinates.
 
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+
 /// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
 /// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -47,7 +50,7 @@ fn edits(a: &[char], b: &[char]) -> usize {
             }
             row.push(least);
         }
-        before = std::mem::replace(&mut above, row);
+        before = core::mem::replace(&mut above, row);
     }
     above[b.len()]
 }

@@ -6,9 +6,10 @@ use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::SMALL_PIVOT;
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::{Program, ROWS, Replay, Tracer};
-use std::fmt::Debug;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt::Debug;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 /// Products of an elimination that are always worth recording: it takes less time than the call of a solver.
 pub(super) const SMALL: usize = 60;

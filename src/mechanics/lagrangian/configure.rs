@@ -15,9 +15,14 @@ use crate::names::unknown;
 use crate::random::RngStream;
 use crate::scalar::{Real, Scalar};
 use crate::tape;
+use alloc::borrow::Cow;
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
 use rand::Rng;
-use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 /// Why a system could not be built.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,8 +78,8 @@ pub enum SystemError {
     },
 }
 
-impl std::fmt::Display for SystemError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for SystemError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::UnknownSystem { name, known } => {
                 f.write_str(&unknown("system", name, known.iter().map(String::as_str)))
@@ -94,7 +99,7 @@ impl std::fmt::Display for SystemError {
     }
 }
 
-impl std::error::Error for SystemError {}
+impl core::error::Error for SystemError {}
 
 /// Parameters as given: symbol and decimal text.
 pub type Given = [(String, String)];

@@ -4,8 +4,10 @@
 use super::description::Description;
 use super::system::Range;
 use super::system::System;
-use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
 
 /// Bobs of the longest chain that is listed, and of the longest one there is.
 const LISTED_BOBS: usize = 20;

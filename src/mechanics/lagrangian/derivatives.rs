@@ -7,6 +7,7 @@ use super::{Lagrangian, Request};
 use crate::forward::{Dual, HyperDual, Jet, array};
 use crate::scalar::{Real, Scalar};
 use crate::tape::Depth;
+use alloc::vec::Vec;
 
 /// Where the numbers of one state go; slices that are not needed may be empty.
 pub(super) struct StateTerms<'a, R> {

@@ -1,7 +1,8 @@
 //! Elimination along the pattern of a symmetric matrix, without a search for pivots, on numbers of any kind.
 
 use crate::scalar::Real;
-use std::collections::BTreeMap;
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 /// Rows of a matrix: the columns of what is not zero, rising.
 pub(super) type Lists<R> = Vec<Vec<(usize, R)>>;
@@ -43,7 +44,7 @@ pub(super) fn eliminate<R: Real>(balance: Balance<R>, most: usize) -> Option<(Ve
         // The row that fills in the least.
         let at = (0..left.len()).min_by_key(|&at| (left[at] >= coordinates, rest[left[at]].len()))?;
         let k = left.remove(at);
-        let row = std::mem::take(&mut rest[k]);
+        let row = core::mem::take(&mut rest[k]);
         products += row.len() * (row.len() + 3) / 2;
         if products > most {
             return None;

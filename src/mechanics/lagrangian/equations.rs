@@ -8,8 +8,10 @@ use super::programs::derivatives;
 use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Rayleigh, Request, Slopes, SystemInstance};
 use crate::scalar::Real;
 use crate::tape::{Program, ROWS, TapeError, Tracer};
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// Equations of motion of `n` coordinates and `m` parameters.
 #[derive(Clone, Debug)]

@@ -3,6 +3,7 @@
 use super::{Request, Terms};
 use crate::linalg::{Failure, Workspace};
 use crate::scalar::{Scalar, vectorized};
+use alloc::vec::Vec;
 
 /// Why terms could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,8 +62,8 @@ pub enum MechanicsError {
     },
 }
 
-impl std::fmt::Display for MechanicsError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for MechanicsError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
             Self::Singular { row, condition } => {
@@ -83,7 +84,7 @@ impl std::fmt::Display for MechanicsError {
     }
 }
 
-impl std::error::Error for MechanicsError {}
+impl core::error::Error for MechanicsError {}
 
 impl MechanicsError {
     /// Row of the state that failed; `None` of an error that is not about one state.
@@ -161,7 +162,7 @@ impl<S: Scalar> Terms<S> {
         outcome: Result<(), MechanicsError>,
     ) -> Result<Vec<MechanicsError>, MechanicsError> {
         if self.record_failures(&outcome) {
-            Ok(std::mem::take(&mut self.failures))
+            Ok(core::mem::take(&mut self.failures))
         } else {
             outcome.map(|()| Vec::new())
         }

@@ -6,6 +6,7 @@ use super::torques::recursive_forces;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar, update};
+use alloc::vec::Vec;
 
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.

@@ -8,10 +8,13 @@ use super::{
     EulerLagrange, Lagrangian, MechanicsError, MetricJet, Pattern, Request, Slopes, Solved, Terms, metric_jets,
 };
 use crate::linalg::Workspace;
+use crate::platform::{Mutex, OnceLock, lock};
 use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError};
-use std::any::Any;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::any::Any;
 
 /// Up to so many coordinates few states are evaluated by forward numbers on the stack; a call of the interpreter is not worth it.
 const STACK_COORDINATES: usize = 2;
@@ -307,7 +310,7 @@ impl<S: Scalar> Evaluator<S> {
         request: Request,
         terms: &mut Terms<S>,
     ) -> Result<(), MechanicsError> {
-        let pooled = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let pooled = || lock(&self.pool);
         let mut scratch = pooled().pop().unwrap_or_default();
         let outcome = self.compute(form, q, v, request, terms, &mut scratch);
         pooled().push(scratch);

@@ -3,9 +3,11 @@
 use crate::linalg::components;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Directions, Program, ROWS, TANGENTS, Tracer};
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
 #[cfg(feature = "serde")]
 use serde::Serialize;
-use std::fmt;
 
 /// What is known of an element before any state is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,6 +4,7 @@ use super::Request;
 use super::elimination::Lists;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, Directions, Program, ROWS, TANGENTS, Tracer};
+use alloc::vec::Vec;
 
 /// The derivatives of a Lagrangian at a state that is being recorded.
 pub(super) struct Recorded<'t, S> {

@@ -1,8 +1,9 @@
 //! The motion of a model as a system of first order, for solvers of other crates.
 
 use super::{Accelerations, EulerLagrange, Linearizer, MechanicsError};
+use crate::platform::{Mutex, MutexGuard, lock};
 use crate::scalar::{Real, Scalar};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use alloc::vec::Vec;
 
 /// The right-hand side of `dy/dt = f(y)`, `y = (q, v)`, `f = (v, a)`, `2 n` numbers: what solvers of differential equations call.
 ///
@@ -46,7 +47,7 @@ impl<'a, S: Scalar> RightHandSide<'a, S> {
     }
 
     fn lock(&self) -> MutexGuard<'_, Buffers<'a, S>> {
-        self.buffers.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.buffers)
     }
 
     /// Writes `f(y)`.

@@ -3,10 +3,12 @@
 use super::Lagrangian;
 use super::description::{Described, Description};
 use crate::scalar::Real;
+use alloc::borrow::Cow;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
-use std::sync::Arc;
 
 /// A coordinate of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,7 +6,9 @@ use super::error::MechanicsError;
 use super::{Chain, Pattern, RightHandSide, Slopes, Solved};
 use crate::scalar::{Dd, Scalar};
 use crate::tape::Depth;
-use std::ops::BitOr;
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::ops::BitOr;
 
 /// Which terms a caller needs; nothing else is computed.
 ///
@@ -113,7 +115,7 @@ pub struct Terms<S> {
 impl<S: Scalar> Terms<S> {
     /// Takes over what `request` asks for of the rows `rows` of a batch of `n` coordinates; the rest is emptied.
     #[cfg(feature = "rollout")]
-    pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: std::ops::Range<usize>, request: Request) {
+    pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: core::ops::Range<usize>, request: Request) {
         let copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
             to.clear();
             // A model without friction has no forces to copy.

@@ -3,6 +3,7 @@
 use super::recursion::Passes;
 use super::{EulerLagrange, InverseDynamics, MechanicsError, inverse_dynamics};
 use crate::scalar::{Scalar, are_finite};
+use alloc::vec::Vec;
 
 /// The forces of states `(batch, n)` with accelerations by the recursion of a model; `None` of a model without one, and where a force is not
 /// finite or there are not as many numbers as there should be: what is wrong is found by the terms.

@@ -6,7 +6,9 @@ use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Slopes,
 use crate::forward::Dual;
 use crate::scalar::{Dd, Real, Scalar};
 use crate::tape::Program;
-use std::sync::atomic::{AtomicBool, Ordering};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 /// Generalized forces that do not follow from a Lagrangian; closures `Fn(&[S], &[S], &mut [S])` of coordinates, velocities and
 /// forces are such.

@@ -2,6 +2,9 @@
 
 use super::Form;
 use crate::network::Activation;
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -124,8 +127,8 @@ impl ActivationChoice {
     }
 }
 
-impl std::fmt::Display for ActivationChoice {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for ActivationChoice {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.pad(self.name())
     }
 }
@@ -134,16 +137,16 @@ impl std::fmt::Display for ActivationChoice {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownActivation(pub String);
 
-impl std::fmt::Display for UnknownActivation {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for UnknownActivation {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self(name) = self;
         write!(f, "unknown activation `{name}`; known are {known}", known = ActivationChoice::NAMES)
     }
 }
 
-impl std::error::Error for UnknownActivation {}
+impl core::error::Error for UnknownActivation {}
 
-impl std::str::FromStr for ActivationChoice {
+impl core::str::FromStr for ActivationChoice {
     type Err = UnknownActivation;
 
     fn from_str(text: &str) -> Result<Self, UnknownActivation> {

@@ -4,7 +4,8 @@ use crate::lagrangian::Lagrangian;
 use crate::network::{Architecture, Layout};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, Evaluation, MixedDirections, Recorded};
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// A model of motion, recorded: a Lagrangian, perhaps a Rayleigh dissipation beside it, with one list of parameters.
 #[derive(Clone, Debug)]

@@ -10,6 +10,7 @@
 //! stands above these near the speed `u = exp(fall)` and falls off beyond. All three forces are against the velocity.
 
 use crate::scalar::Real;
+use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 

@@ -3,9 +3,10 @@
 use crate::lagrangian::Description;
 use crate::network::{Activation, Architecture, Initialization, InputLayer};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
+use core::ops::Range;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use std::ops::Range;
 
 /// Action of a layer's weights `W` on its inputs `x`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,12 @@ use crate::lagrangian::{
 };
 use crate::linalg;
 use crate::network::{Architecture, Dynamics, Form, Layout, Model};
+use crate::platform::{Mutex, lock};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, Program, STATES};
-use std::sync::{Mutex, PoisonError};
+use alloc::boxed::Box;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 /// A network with its weights: `L(q, v)`, perhaps a dissipation `D(q, v)`, and everything that follows from them.
 ///
@@ -62,8 +65,8 @@ pub enum NetworkError {
     },
 }
 
-impl std::fmt::Display for NetworkError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for NetworkError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Architecture(problem) => write!(f, "architecture: {problem}"),
             Self::Weights { expected, found } => write!(f, "weights: expected {expected} numbers, found {found}"),
@@ -71,7 +74,7 @@ impl std::fmt::Display for NetworkError {
     }
 }
 
-impl std::error::Error for NetworkError {}
+impl core::error::Error for NetworkError {}
 
 impl Architecture {
     /// Checks that the lists fit each other and that nothing is empty or not finite.
@@ -223,18 +226,13 @@ impl<S: Scalar> NetworkLagrangian<S> {
             return shape("velocities", q.len(), v.len());
         }
         terms.clear();
-        let mut workspace = self
-            .idle
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .pop()
-            .unwrap_or_else(|| Workspace::new(&self.model));
+        let mut workspace = lock(&self.idle).pop().unwrap_or_else(|| Workspace::new(&self.model));
         let depth = request.depth();
         for states in q.chunks(STATES * n).zip(v.chunks(STATES * n)) {
             workspace.append(self, states, (request, depth), terms);
         }
         let outcome = terms.complete(n, v, request, &mut workspace.linalg);
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        lock(&self.idle).push(workspace);
         outcome
     }
 

@@ -12,7 +12,9 @@ use crate::lagrangian::{Description, Lagrangian};
 use crate::network::structure::LagrangianInputs;
 use crate::network::{Architecture, Layer, Layout, LinearMap, Radial};
 use crate::scalar::{Real, Scalar};
-use std::collections::BTreeMap;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 impl Lagrangian for Architecture {
     fn coordinates(&self) -> usize {

@@ -4,6 +4,7 @@ use super::{Dynamics, NetworkLagrangian};
 use crate::lagrangian::{Held, MechanicsError, Products, Slopes};
 use crate::scalar::{Real, Scalar, update};
 use crate::tape::{Depth, MixedDirections, STATES};
+use alloc::vec::Vec;
 
 /// Buffers for the derivatives of a network; up to [`STATES`] equations are differentiated at once.
 pub(super) struct NetworkSlopes<'a, S> {

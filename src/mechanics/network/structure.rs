@@ -14,6 +14,9 @@
 use super::joint_friction::JointFriction;
 use crate::lagrangian::Description;
 use crate::scalar::Real;
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 use super::{assign_operators, forward_real, forward_unary};
 use crate::ops::Binary;
 use crate::scalar::{Elementary, Real};
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number with its gradient in `N + F` variables and its Hessian in the first `N`.
 ///

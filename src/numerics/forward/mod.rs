@@ -85,7 +85,7 @@ macro_rules! assign_operators {
         assign_operators!(@ [$($generics)*] $type, DivAssign div_assign /);
     };
     (@ [$($generics:tt)*] $type:ty, $op:ident $method:ident $sign:tt) => {
-        impl<$($generics)*> std::ops::$op for $type {
+        impl<$($generics)*> core::ops::$op for $type {
             #[inline(always)]
             fn $method(&mut self, other: Self) {
                 *self = *self $sign other;

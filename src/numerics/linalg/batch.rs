@@ -2,6 +2,7 @@
 
 use super::{Failure, LinalgError};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Matrices per block.
 pub const LANES: usize = 8;
@@ -85,7 +86,7 @@ impl<S: Scalar> Workspace<S> {
     }
     /// Lends a vector, to be given back after use.
     pub(crate) fn take_vector(&mut self) -> Vec<S> {
-        std::mem::take(&mut self.vector)
+        core::mem::take(&mut self.vector)
     }
     /// Takes the vector back.
     pub(crate) fn give_vector(&mut self, vector: Vec<S>) {
@@ -132,7 +133,7 @@ pub(super) fn across<S: Copy, const W: usize>(rows: &[&[S]; W], e: usize) -> Lan
 /// A choice that is never compiled to a branch: lanes that branch do not become vector instructions.
 #[inline(always)]
 pub(super) fn select<S>(condition: bool, chosen: S, otherwise: S) -> S {
-    std::hint::select_unpredictable(condition, chosen, otherwise)
+    core::hint::select_unpredictable(condition, chosen, otherwise)
 }
 
 /// Lanes on the boundary of a cache line.

@@ -4,6 +4,7 @@ use super::batch::Buffer;
 use super::components;
 use super::eigen::whole;
 use crate::scalar::{Real, Scalar, are_finite};
+use alloc::vec::Vec;
 
 /// Size from which the search for blocks takes little beside what a full matrix takes.
 const SIZE: usize = 16;

@@ -4,6 +4,7 @@
 use super::by_faer;
 use super::matmul;
 use crate::scalar::{MatMut, MatRef, Matrices};
+use alloc::vec::Vec;
 
 macro_rules! compiled {
     ($($float:ty)*) => {$(

@@ -1,5 +1,7 @@
 //! Connected components of what acts on each other.
 
+use alloc::vec::Vec;
+
 /// Indices below `n` in groups that no pair joins, `(first, second)` being joined; ascending, by their first member.
 ///
 /// Coordinates of a Lagrangian that is a sum over such groups do not act on each other, and every group has a common factor of its own that

@@ -3,6 +3,7 @@
 use super::batch::{Dense, LANES};
 use super::{LinalgError, Workspace, eigen, elimination, expect_length, large_systems};
 use crate::scalar::{Real, Scalar, vectorized};
+use alloc::vec::Vec;
 
 /// 2-norm condition number `max |w| / min |w|` of one symmetric `(n, n)` matrix; infinite if exactly singular.
 ///

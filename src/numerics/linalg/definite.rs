@@ -8,6 +8,7 @@ use super::batch::{LANES, Lane};
 use super::elimination::{self, Pivots};
 use super::solve::{Systems, finish, is_harmless};
 use crate::scalar::{Real, Scalar, are_finite, in_lanes, vectorized};
+use alloc::vec::Vec;
 
 /// Smaller matrices are eliminated with pivots in no more time.
 const SIZE: usize = 5;

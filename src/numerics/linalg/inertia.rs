@@ -2,6 +2,7 @@
 
 use super::{LinalgError, Workspace, eigh, expect_length};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Numbers of positive, zero and negative eigenvalues (Sylvester's law: invariant under congruence).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -334,7 +335,7 @@ pub fn adjugate<S: Scalar>(
     expect_length("matrix", n * n, matrix.len())?;
     expect_length("gradient", n * n, gradient.len())?;
     let zero = <S as Real>::zero();
-    let mut scratch = std::mem::take(&mut workspace.minors);
+    let mut scratch = core::mem::take(&mut workspace.minors);
     scratch.values.resize(n, zero);
     scratch.vectors.resize(n * n, zero);
     let (values, vectors) = (&mut scratch.values[..n], &mut scratch.vectors[..n * n]);

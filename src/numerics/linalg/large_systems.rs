@@ -4,6 +4,7 @@ use super::Failure;
 use super::batch::{Retry, Workspace};
 use super::solve::{Systems, examine};
 use crate::scalar::Scalar;
+use alloc::vec::Vec;
 
 /// Sizes from which faer's blocked elimination beats ours on lanes, whose blocks of matrices then leave the nearest cache: for
 /// one right-hand side, and for as many as there are rows.

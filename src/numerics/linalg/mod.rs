@@ -111,8 +111,8 @@ pub enum LinalgError {
     },
 }
 
-impl std::fmt::Display for LinalgError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for LinalgError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
             Self::Singular { row, condition } => {
@@ -123,7 +123,7 @@ impl std::fmt::Display for LinalgError {
     }
 }
 
-impl std::error::Error for LinalgError {}
+impl core::error::Error for LinalgError {}
 
 impl LinalgError {
     /// The error of one row.

@@ -5,6 +5,7 @@
 
 use crate::linalg::{LinalgError, Scaled, Workspace, adjugate, eigh, inertia, is_positive_definite, leading_minors};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Keeps the paper's denominators away from zero.
 const EPSILON: f64 = 1e-8;

@@ -5,7 +5,9 @@ use super::batch::Workspace;
 use super::dot;
 use super::eigen::eigh;
 use super::{LinalgError, expect_length};
+use crate::platform::float;
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Solution of a symmetric system that may be singular, and the numerical rank used.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,7 +133,7 @@ fn by_rotations(n: usize, m: usize, all: &[f64]) -> Option<Singular> {
                 if xy.abs() > rounding * (xx * yy).sqrt() && xy.abs() > rounding * rounding * longest {
                     orthogonal = false;
                     let ratio = (yy - xx) / (2.0 * xy);
-                    let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
+                    let tangent = ratio.signum() / (ratio.abs() + float!(f64, hypot(ratio, 1.0)));
                     turn(&mut columns, (i, j), tangent);
                     turn(&mut vectors, (i, j), tangent);
                 }
@@ -150,7 +152,7 @@ fn by_rotations(n: usize, m: usize, all: &[f64]) -> Option<Singular> {
 /// `(c x - s y, s x + c y)` for two of the vectors, by the tangent of the angle.
 #[cfg(any(test, not(feature = "faer")))]
 fn turn(vectors: &mut [Vec<f64>], (i, j): (usize, usize), tangent: f64) {
-    let cosine = tangent.hypot(1.0).recip();
+    let cosine = float!(f64, hypot(tangent, 1.0)).recip();
     let (head, tail) = vectors.split_at_mut(j);
     for (x, y) in head[i].iter_mut().zip(&mut tail[0]) {
         (*x, *y) = (cosine * (*x - tangent * *y), cosine * (*y + tangent * *x));

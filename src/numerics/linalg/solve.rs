@@ -3,6 +3,7 @@
 use super::batch::{Aligned, LANES, Lane, Retry, with_size};
 use super::{Failure, LinalgError, Workspace, condition, elimination, expect_length};
 use crate::scalar::{Real, Scalar, in_lanes};
+use alloc::vec::Vec;
 
 /// Solves `M_b x_b = r_b` for a batch of square matrices.
 ///

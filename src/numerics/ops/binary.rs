@@ -10,7 +10,7 @@ macro_rules! table {
     ($($(#[$doc:meta])* $name:ident $method:ident ($a:ident, $b:ident, $y:ident, $da:ident, $db:ident)
         = $first:expr, $second:expr;)*) => {
         /// A function of two numbers.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Binary {
             $($(#[$doc])* $name,)*
         }

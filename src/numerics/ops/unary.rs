@@ -49,7 +49,7 @@ macro_rules! table {
         $($(#[$made_doc:meta])* $made:ident ($mx:ident, $my:ident, $md:ident) = $value:expr, $made_first:expr, $made_second:expr;)*
     ) => {
         /// A function of one number.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Unary {
             $($(#[$doc])* $name,)*
             $($(#[$made_doc])* $made,)*
@@ -188,7 +188,7 @@ table! {
 impl Unary {
     /// The row of the table that an elementary function is, if it is made of others and therefore no method of a number.
     pub(crate) fn made<F: Elementary>(f: F) -> Option<Self> {
-        let row: Option<&Self> = (&f as &dyn std::any::Any).downcast_ref();
+        let row: Option<&Self> = (&f as &dyn core::any::Any).downcast_ref();
         row.copied().filter(|f| Self::MADE.contains(f))
     }
     /// `f(x)`, compiled once for a kind of number: for interpreters, which choose `f` at run time.

@@ -1,10 +1,11 @@
 //! Any number type of the `num-traits` world as [`Real`] and [`Scalar`].
 
 use super::{Dd, Exponential, Lanes, Real, Scalar};
+use alloc::string::{String, ToString};
+use core::cmp::Ordering;
+use core::fmt::{Debug, Display, Formatter};
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use num_traits::{Float, FloatConst};
-use std::cmp::Ordering;
-use std::fmt::{Debug, Display, Formatter};
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// A number of any type `F` that implements `num_traits::Float`; the one number of the engine that is not ours.
 ///
@@ -19,12 +20,12 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 pub struct AnyFloat<F>(pub F);
 
 impl<F: Debug> Debug for AnyFloat<F> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+    fn fmt(&self, f: &mut Formatter<'_>) -> core::fmt::Result {
         self.0.fmt(f)
     }
 }
 impl<F: Display> Display for AnyFloat<F> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+    fn fmt(&self, f: &mut Formatter<'_>) -> core::fmt::Result {
         self.0.fmt(f)
     }
 }

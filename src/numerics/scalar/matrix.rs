@@ -2,6 +2,7 @@
 
 use super::float::{AnyFloat, Foreign};
 use super::{Dd, Real, Scalar, update};
+use alloc::vec::Vec;
 
 /// A matrix view over row-major storage, possibly transposed.
 #[derive(Clone, Copy, Debug)]

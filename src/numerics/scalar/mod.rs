@@ -43,9 +43,11 @@ pub use matrix::{MatMut, MatRef, Matrices};
 #[doc(hidden)]
 pub use sum::{Dots, Sum};
 
-use std::any::Any;
-use std::fmt::{Debug, Display};
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::any::Any;
+use core::fmt::{Debug, Display};
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// An elementary function of one number with its derivatives.
 #[doc(hidden)]

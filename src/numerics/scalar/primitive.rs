@@ -1,6 +1,8 @@
 //! `f32` and `f64` as [`Real`] and [`Scalar`].
 
 use super::{Real, Scalar};
+use crate::platform::float;
+use alloc::string::String;
 
 /// Beyond it angles are reduced by the portable library: system libraries lose digits next to multiples of `pi/2`.
 const LARGE_ANGLE: f64 = 1048576.0;
@@ -46,15 +48,15 @@ macro_rules! impl_primitive {
             }
             #[inline]
             fn powi(self, exponent: i32) -> Self {
-                <$float>::powi(self, exponent)
+                float!($float, powi(self, exponent))
             }
             #[inline]
             fn powf(self, exponent: Self) -> Self {
-                <$float>::powf(self, exponent)
+                float!($float, powf(self, exponent))
             }
             #[inline]
             fn atan2(self, x: Self) -> Self {
-                <$float>::atan2(self, x)
+                float!($float, atan2(self, x))
             }
             #[inline(always)]
             fn max(self, other: Self) -> Self {
@@ -76,19 +78,19 @@ macro_rules! impl_primitive {
             }
             #[inline]
             fn sin(self) -> Self {
-                if self.abs() <= LARGE_ANGLE as $float { <$float>::sin(self) } else { $sin(self) }
+                if self.abs() <= LARGE_ANGLE as $float { float!($float, sin(self)) } else { $sin(self) }
             }
             #[inline]
             fn cos(self) -> Self {
-                if self.abs() <= LARGE_ANGLE as $float { <$float>::cos(self) } else { $cos(self) }
+                if self.abs() <= LARGE_ANGLE as $float { float!($float, cos(self)) } else { $cos(self) }
             }
             #[inline]
             fn tan(self) -> Self {
-                if self.abs() <= LARGE_ANGLE as $float { <$float>::tan(self) } else { $tan(self) }
+                if self.abs() <= LARGE_ANGLE as $float { float!($float, tan(self)) } else { $tan(self) }
             }
             #[inline]
             fn sin_cos(self) -> (Self, Self) {
-                if self.abs() <= LARGE_ANGLE as $float { <$float>::sin_cos(self) } else { $sin_cos(self) }
+                if self.abs() <= LARGE_ANGLE as $float { float!($float, sin_cos(self)) } else { $sin_cos(self) }
             }
         }
 
@@ -116,7 +118,7 @@ macro_rules! impl_primitive {
             }
             #[inline(always)]
             fn pi() -> Self {
-                std::$float::consts::PI
+                core::$float::consts::PI
             }
 
             #[inline(always)]
@@ -158,7 +160,7 @@ macro_rules! impl_primitive {
             }
             #[inline(always)]
             fn floor(self) -> Self {
-                <$float>::floor(self)
+                float!($float, floor(self))
             }
             fn ldexp(self, exponent: i32) -> Self {
                 $ldexp(self, exponent)
@@ -185,7 +187,7 @@ macro_rules! impl_primitive {
         $(
             #[inline]
             fn $name(self) -> Self {
-                <$float>::$name(self)
+                float!($float, $name(self))
             }
         )*
     };

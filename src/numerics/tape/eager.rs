@@ -3,7 +3,8 @@
 use super::TapeError;
 use super::var::Var;
 use crate::scalar::{Real, Scalar};
-use std::cell::{Cell, RefCell};
+use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
 
 /// One recorded operation: two arguments and the partial derivatives by them (24 bytes for `f64`).
 ///
@@ -198,7 +199,7 @@ impl<T: Real> Tape<T> {
         values.clear();
         values.resize(self.count.get() as usize, T::zero());
         let Some(tape) = output.tape() else { return Ok(()) };
-        if !std::ptr::eq(tape, self) {
+        if !core::ptr::eq(tape, self) {
             return Err(TapeError::Foreign);
         }
         let last = output.id() as usize;

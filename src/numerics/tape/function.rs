@@ -3,7 +3,8 @@
 use super::program::{Directions, Program, Replay, Tracer};
 use super::{TapeError, check_length};
 use crate::scalar::{Real, Scalar};
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// Rows of a program at most: about 150 bytes each while it is recorded, some tens afterwards.
 pub(crate) const ROWS: u32 = 1 << 20;
@@ -169,7 +170,7 @@ impl<S: Scalar> Function<S> {
         let (n, batch) = (self.value.inputs(), values.len());
         check_length("Hessians", batch * n * n, hessians.len())?;
         let width = self.pattern()?.len();
-        let mut entries = std::mem::take(&mut self.buffer);
+        let mut entries = core::mem::take(&mut self.buffer);
         entries.resize(batch * width, S::nan());
         let outcome = self.sparse_hessians(x, values, gradients, &mut entries);
         hessians.fill(<S as Real>::zero());

@@ -66,6 +66,7 @@ pub use var::Var;
 
 use crate::forward::Dual;
 use crate::scalar::Real;
+use alloc::vec::Vec;
 
 /// Why a recording or a sweep gave no result.
 ///
@@ -96,8 +97,8 @@ pub enum TapeError {
     },
 }
 
-impl std::fmt::Display for TapeError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for TapeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::MixedTapes => f.write_str("an operation mixes variables of two tapes"),
             Self::DataDependentBranch => f.write_str(
@@ -110,7 +111,7 @@ impl std::fmt::Display for TapeError {
     }
 }
 
-impl std::error::Error for TapeError {}
+impl core::error::Error for TapeError {}
 
 /// `Ok` if a slice has the expected length.
 fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(), TapeError> {

@@ -5,8 +5,8 @@ use super::eager::Tape;
 use crate::forward::assign_operators;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Elementary, Real, Scalar};
-use std::fmt;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::fmt;
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number on a [`Tape`], or a constant.
 ///
@@ -74,7 +74,7 @@ impl<'t, T: Real> Var<'t, T> {
             (Some(_), None) => self.unary(value, partials().0),
             (None, Some(_)) => other.unary(value, partials().1),
             (Some(tape), Some(second)) => {
-                if !std::ptr::eq(tape, second) {
+                if !core::ptr::eq(tape, second) {
                     mixed(tape, second);
                     return Self::not_a_number();
                 }
@@ -250,7 +250,7 @@ impl<T: Real> Real for Var<'_, T> {
     #[inline]
     fn select(self, a: Self, b: Self) -> Self {
         if let (Some(tape), Some(other)) = (self.tape, a.tape.or(b.tape))
-            && !std::ptr::eq(tape, other)
+            && !core::ptr::eq(tape, other)
         {
             mixed(tape, other);
             return Self::not_a_number();

@@ -42,6 +42,7 @@ pub use tensors::{Connection, Curvature, Metric};
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};
 use crate::scalar::Scalar;
+use alloc::vec::Vec;
 
 /// Coordinates of a metric whose curvature is computed, at most: a tensor has `n^4` numbers, a point takes 190 MB.
 pub(crate) const MOST_COORDINATES: usize = 32;
@@ -162,8 +163,8 @@ pub enum GeometryError {
     Mechanics(MechanicsError),
 }
 
-impl std::fmt::Display for GeometryError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for GeometryError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Degenerate { condition } => write!(f, "the metric is degenerate (condition number {condition:.3e})"),
             Self::NotFinite { what } => write!(f, "{what} is not finite"),
@@ -176,7 +177,7 @@ impl std::fmt::Display for GeometryError {
     }
 }
 
-impl std::error::Error for GeometryError {}
+impl core::error::Error for GeometryError {}
 
 impl From<MechanicsError> for GeometryError {
     fn from(error: MechanicsError) -> Self {

@@ -13,6 +13,7 @@
 use super::{GeometryError, expect_length};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Coordinate, or plane of two, in which a metric turns about its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

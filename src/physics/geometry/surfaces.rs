@@ -5,6 +5,7 @@ use super::tensors::determinant;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Character of a metric at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,6 +5,7 @@ use crate::lagrangian::MetricJet;
 use crate::linalg::{Inertia, LinalgError, Workspace, inertia, inverse, leading_minors};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{VectorFunction, jacobian};
+use alloc::vec::Vec;
 
 /// Metric at a point, not degenerate.
 #[derive(Clone, Debug, PartialEq)]

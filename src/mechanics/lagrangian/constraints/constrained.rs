@@ -7,8 +7,12 @@ use super::{Constraints, Manifold, ManifoldRows, RowAdjoint};
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::linearization::{ProgramSlopes, Rate, SlopePrograms, Sum};
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
+use crate::platform::OnceLock;
 use crate::scalar::{Dd, Real, Scalar};
-use std::sync::{Arc, OnceLock};
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// A row at unit length whose part beside the rows before it is below this at every state follows from them.
 const REDUNDANT: f64 = 1e-6;
@@ -42,8 +46,8 @@ pub enum ConstraintError {
     },
 }
 
-impl std::fmt::Display for ConstraintError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for ConstraintError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Contradiction { name, defect } if defect.is_finite() => {
                 write!(f, "constraint `{name}` contradicts the others: the nearest states miss it by {defect:.3e}")
@@ -60,7 +64,7 @@ impl std::fmt::Display for ConstraintError {
     }
 }
 
-impl std::error::Error for ConstraintError {}
+impl core::error::Error for ConstraintError {}
 
 /// A model under constraints: `M a = g - c + Q + A^T lambda`, `A a = -gamma`, of any Lagrangian, written or learned.
 ///
@@ -178,7 +182,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
             return Err(ConstraintError::TooMany { independent: needed.len(), coordinates: n });
         }
         if found {
-            let all = std::mem::take(&mut self.names);
+            let all = core::mem::take(&mut self.names);
             for (row, name) in all.into_iter().enumerate() {
                 if needed.contains(&row) { &mut self.names } else { &mut self.redundant }.push(name);
             }

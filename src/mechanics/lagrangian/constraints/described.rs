@@ -3,8 +3,10 @@
 use super::Constraints;
 use crate::lagrangian::expression::{Compiler, Expression, ExpressionError, Formula, Meaning, Value};
 use crate::scalar::Real;
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// Constraints by formulas that vanish: of coordinates, or linear in velocities, such as `x_dot - R*phi_dot*cos(theta)`.
 #[derive(Clone, Debug)]

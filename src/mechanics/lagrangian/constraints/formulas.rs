@@ -4,7 +4,10 @@ use super::{Constrained, ConstraintError, ExpressionConstraints, Manifold};
 use crate::lagrangian::expression::{is_name, is_reserved};
 use crate::lagrangian::{EulerLagrange, ExpressionError, Lagrangian, Mechanics};
 use crate::scalar::{Real, Scalar};
-use std::collections::BTreeMap;
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 /// Most constraints.
 const MOST: usize = 256;
@@ -37,8 +40,8 @@ pub enum FormulaError {
     Constraints(ConstraintError),
 }
 
-impl std::fmt::Display for FormulaError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for FormulaError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Number(found) => write!(f, "constraints: expected 1 to {MOST} formulas, found {found}"),
             Self::Name => f.write_str("constraints: expected names of 1 to 100 characters on one line"),
@@ -52,8 +55,8 @@ impl std::fmt::Display for FormulaError {
     }
 }
 
-impl std::error::Error for FormulaError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+impl core::error::Error for FormulaError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
             Self::Constraints(error) => Some(error),
             _ => None,

@@ -4,6 +4,7 @@ use super::rows::independent_rows;
 use crate::lagrangian::MechanicsError;
 use crate::linalg::{self, Failure, Workspace};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// The matrices of a batch of motions.
 #[derive(Clone, Copy)]

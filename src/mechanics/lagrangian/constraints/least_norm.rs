@@ -5,6 +5,7 @@ use super::{ReducedMass, along_rows};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{Workspace, minimum_norm};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// A model whose accelerations of least norm are taken where its mass matrix is singular within its constraints: along the null
 /// directions nothing is determined, and they are 0 there.

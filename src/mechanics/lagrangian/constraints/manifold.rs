@@ -2,6 +2,8 @@
 
 use super::programs::RowPrograms;
 use crate::scalar::Scalar;
+use alloc::string::String;
+use alloc::vec::Vec;
 
 /// Constraints at one state, `m` rows of `n` coordinates.
 #[derive(Clone, Debug, Default)]

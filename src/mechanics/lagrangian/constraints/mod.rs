@@ -42,6 +42,8 @@ pub(super) use rows::length;
 pub(crate) use rows::take_out;
 
 use crate::scalar::Real;
+use alloc::string::String;
+use alloc::vec::Vec;
 
 /// Constraints written once over [`Real`], as a [`Lagrangian`](super::Lagrangian) is: derivatives follow.
 pub trait Constraints: Send + Sync {

@@ -5,10 +5,12 @@ use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::{Balance, Lists, eliminate};
 use crate::lagrangian::linearization::Rate;
+use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Program, ROWS, Replay, Tracer};
-use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use alloc::collections::BTreeMap;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// An elimination is recorded up to so many products for each element of the full matrix; with more a dense solver is the faster one.
 const PRODUCTS: usize = 8;

@@ -6,6 +6,7 @@ use crate::lagrangian::accelerations::are_safe;
 use crate::linalg::{Workspace, minimum_norm};
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
+use alloc::vec::Vec;
 
 /// Steps of Newton's method.
 const MAX_STEPS: usize = 60;

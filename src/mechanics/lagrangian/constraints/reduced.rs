@@ -3,6 +3,7 @@
 use super::rows::{complement, dot, independent_rows};
 use crate::linalg::{LinalgError, Workspace, eigh};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// `Z^T M Z` of one state, `Z` an orthonormal basis of the directions that the constraints allow: what motion determines of `M`.
 #[derive(Clone, Debug, PartialEq)]

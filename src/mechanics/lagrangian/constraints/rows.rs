@@ -1,6 +1,7 @@
 //! Rows of small matrices: which of them are independent, and what is perpendicular to them.
 
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Rows at unit length whose part beside the others is below this many roots of the rounding depend on them.
 const RANK: f64 = 16.0;

@@ -13,10 +13,14 @@ use super::{CoordinateDescription, Description, DescriptionError, ParameterDescr
 use crate::lagrangian::recursion::{Row, Shape};
 use crate::lagrangian::system::Range;
 use crate::names::unknown;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::f64::consts::PI;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
 
 /// Most links.
 const MAX_LINKS: usize = 16;
@@ -289,10 +293,10 @@ impl Description {
         let [sa, ca] = sine_cosine(alpha);
         let place = [Term::number(a), along.scaled(-sa), along.scaled(ca)];
         let height = [0, 1, 2].map(|i| place[i].times(&base.gravity[i]));
-        let height = self.sum(own("u"), &[&height[..], std::slice::from_ref(&base.height)].concat())?;
+        let height = self.sum(own("u"), &[&height[..], core::slice::from_ref(&base.height)].concat())?;
         let mut carried = |i: usize| {
             let swung = cross(&base.turning, &place, i);
-            self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], std::slice::from_ref(&base.moving[i])].concat())
+            self.sum(own(&format!("o{}", AXES[i])), &[&swung[..], core::slice::from_ref(&base.moving[i])].concat())
         };
         let there = [carried(0)?, carried(1)?, carried(2)?];
         // R^T, first about x and then about z; the motion of the joint is along z.

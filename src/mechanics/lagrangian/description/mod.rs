@@ -17,13 +17,15 @@ use super::expression::{ExpressionError, Formula};
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
 use crate::scalar::Real;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
 #[derive(Clone, Debug, PartialEq)]
@@ -236,17 +238,17 @@ pub struct DescriptionError {
     pub problem: String,
 }
 
-impl std::fmt::Display for DescriptionError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for DescriptionError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { key, problem } = self;
         if key.is_empty() { f.write_str(problem) } else { write!(f, "{key}: {problem}") }
     }
 }
 
-impl std::error::Error for DescriptionError {}
+impl core::error::Error for DescriptionError {}
 
 impl DescriptionError {
-    fn new(key: impl Into<String>, problem: impl std::fmt::Display) -> Self {
+    fn new(key: impl Into<String>, problem: impl core::fmt::Display) -> Self {
         Self { key: key.into(), problem: problem.to_string() }
     }
     fn formula(key: impl Into<String>) -> impl FnOnce(ExpressionError) -> Self {

@@ -1,8 +1,10 @@
 //! Pairs of numbers in a file: a list of two, no more. serde itself passes over what a list of fixed length has beyond it.
 
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
-use std::collections::BTreeMap;
 
 /// A list of two.
 struct Pair<T>([T; 2]);

@@ -1,5 +1,7 @@
 //! Numbers of a description: written as numbers, or as text.
 
+use alloc::string::String;
+
 #[cfg(feature = "serde")]
 use serde::Serialize;
 

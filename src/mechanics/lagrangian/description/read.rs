@@ -4,11 +4,12 @@ use super::ParameterDescription;
 use super::quantity::{Decimal, Quantity};
 use crate::lagrangian::expression::{Compiler, Expression};
 use crate::lagrangian::system::Range;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use core::fmt;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
-use std::collections::BTreeMap;
-use std::fmt;
 
 /// A number or a text, as text.
 struct Written(&'static str);

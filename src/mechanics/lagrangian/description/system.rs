@@ -10,10 +10,12 @@ use crate::lagrangian::{ExpressionLagrangian, constrained_description, systems};
 use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
-use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::PI;
-use std::sync::Arc;
+use alloc::borrow::Cow;
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::f64::consts::PI;
 
 /// Most coordinates of a system in a file.
 const MAX_COORDINATES: usize = 64;

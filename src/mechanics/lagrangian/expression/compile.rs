@@ -4,8 +4,11 @@ use super::parse::Number;
 use super::{Expression, ExpressionError, Node, PI};
 use crate::names::unknown;
 use crate::ops::{Binary, Unary};
+use crate::platform::Map;
 use crate::scalar::{Real, Scalar};
-use std::collections::{BTreeMap, HashMap};
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
 
 /// Most operations of a program.
 const MAX_OPERATIONS: usize = 1 << 16;
@@ -24,10 +27,10 @@ pub enum Meaning {
 }
 
 /// A value of the program that is being compiled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Value(u32);
 
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum Entry {
     Parameter(u32),
     Position(u32),
@@ -42,9 +45,9 @@ enum Entry {
 #[derive(Default)]
 pub struct Compiler {
     entries: Vec<Entry>,
-    known: HashMap<Entry, Value>,
+    known: Map<Entry, Value>,
     numbers: Vec<Number>,
-    places: HashMap<(u64, u64, u32), u32>,
+    places: Map<(u64, u64, u32), u32>,
     /// `true` if a value depends on velocities.
     moving: Vec<bool>,
 }

@@ -21,9 +21,11 @@ pub(super) use parse::is_name;
 use crate::lagrangian::Lagrangian;
 use crate::ops::{Binary, Unary};
 use crate::scalar::Real;
-use std::collections::BTreeMap;
-use std::fmt;
-use std::sync::Arc;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
 
 /// A mistake in the text of a formula.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,7 +43,7 @@ impl fmt::Display for ExpressionError {
     }
 }
 
-impl std::error::Error for ExpressionError {}
+impl core::error::Error for ExpressionError {}
 
 impl ExpressionError {
     pub(in crate::mechanics::lagrangian) fn new(column: usize, problem: impl Into<String>) -> Self {
@@ -94,7 +96,7 @@ impl fmt::Display for Expression {
         let mut texts: Vec<(String, u8)> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
             let mut operand = |index: u32, least: u8| {
-                let (text, level) = std::mem::take(&mut texts[index as usize]);
+                let (text, level) = core::mem::take(&mut texts[index as usize]);
                 if level < least { format!("({text})") } else { text }
             };
             let joined = |a: String, sign: &str, b: String| format!("{a}{sign}{b}");

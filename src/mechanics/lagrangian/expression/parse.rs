@@ -4,7 +4,11 @@ use super::{Expression, ExpressionError, FUNCTIONS, Function, Node, PI, function
 use crate::names::nearest;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
-use std::str::FromStr;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::str::FromStr;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
 
 /// Deepest nesting of parentheses, signs and powers: far more than formulas need, far less than the stack holds.
 const MAX_DEPTH: usize = 100;

@@ -3,6 +3,7 @@
 use super::{Held, Slopes};
 use crate::lagrangian::{EulerLagrange, GeneralizedForce, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar, update};
+use alloc::vec::Vec;
 
 /// Multiples of the step, and the weights of the values there; `12 h f' = f(-2h) - 8 f(-h) + 8 f(h) - f(2h)`.
 const STENCIL: [(f64, f64); 4] = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)];

@@ -3,6 +3,8 @@
 use super::{Held, Products, Slopes};
 use crate::lagrangian::{GeneralizedForce, MechanicsError};
 use crate::scalar::{Real, Scalar, update};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 
 /// The derivatives of a model without the force, and those of the force.
 pub(crate) fn with_force<'a, S: Scalar>(

@@ -14,6 +14,8 @@ use super::constraints::Bordered;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{self, Workspace};
 use crate::scalar::{MatMut, MatRef, Real, Scalar, product_by_loops, update, vectorized};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 use differences::Differences;
 
 /// A batch of states with their accelerations and multipliers, which are held.

@@ -5,7 +5,8 @@ use super::{Held, Products, Slopes};
 use crate::lagrangian::MechanicsError;
 use crate::scalar::{Real, Scalar, update};
 use crate::tape::{Program, ROWS, Replay, Tracer};
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// Programs of one part of the equations.
 #[derive(Clone, Debug)]

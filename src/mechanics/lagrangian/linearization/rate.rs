@@ -21,7 +21,8 @@ use crate::lagrangian::Constraints;
 use crate::lagrangian::elimination::Lists;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Directions, Program, ROWS, TANGENTS, TapeError, Tracer};
-use std::collections::BTreeMap;
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 /// The rate of a part as a program of `q`, `v`, `w`, `a`, `lambda`, `y` and parameters.
 #[derive(Debug)]

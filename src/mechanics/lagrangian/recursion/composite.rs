@@ -3,6 +3,7 @@
 use super::vector::{add, outer, scaled, sum, symmetric};
 use super::{Body, Chain, Frame, Load};
 use crate::scalar::Real;
+use alloc::vec::Vec;
 
 impl<R: Real> Body<R> {
     /// In and about the frame before.

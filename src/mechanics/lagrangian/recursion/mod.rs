@@ -20,6 +20,7 @@ mod vector;
 pub(super) use model::Recursive;
 
 use crate::scalar::Real;
+use alloc::vec::Vec;
 use vector::{Matrix, Vector, add, cross, scaled, transposed};
 
 /// A chain of links whatever its constants are: rows of Denavit and Hartenberg in the modified convention.

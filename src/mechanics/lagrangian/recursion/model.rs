@@ -4,9 +4,12 @@ use super::{Chain, Shape};
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::Balance;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Solved, Terms};
+use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar};
 use crate::tape::Tracer;
-use std::sync::{Arc, OnceLock};
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// The model of a chain of links with its recursions.
 pub(in crate::mechanics::lagrangian) struct Recursive<S> {

@@ -7,7 +7,8 @@ use crate::lagrangian::system::{
     StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 /// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, `L` the radius.
 ///

@@ -7,8 +7,9 @@ use crate::lagrangian::system::{
     TrajectoryTest,
 };
 use crate::scalar::{Real, Scalar};
-use std::borrow::Cow;
-use std::f64::consts::PI;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
+use core::f64::consts::PI;
 
 /// `L = (-f t'^2 + r'^2 / f + r^2 (theta'^2 + sin^2 theta phi'^2)) / 2`, `f = 1 - 2M/r`, per unit of mass.
 ///

@@ -6,7 +6,8 @@ use crate::lagrangian::system::{
     Bounds, ClosedForm, Conserved, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 /// `L = (v_x^2 + v_y^2) / 2 + mu / r`, `r^2 = x^2 + y^2`, per unit of mass; singular at `r = 0`.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,8 @@ use crate::lagrangian::system::{
     System, TrajectoryTest,
 };
 use crate::scalar::{Real, Scalar};
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 /// `L = (-t'^2 + x'^2 + y'^2 + z'^2 + f (t' + l.v)^2)/2`, `f = (2 M r - Q^2)/Sigma`, per unit of mass.
 ///

@@ -8,7 +8,8 @@ use crate::lagrangian::system::{
     TrajectoryTest,
 };
 use crate::scalar::{Real, Scalar};
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 /// `L = sum_i m v_i^2 / 2 - sum_i (k d_i^2 / 2 + beta d_i^4 / 4)` with the stretches `d_i = q_(i+1) - q_i` of the `n + 1` springs of `n`
 /// masses between fixed ends, `q_0 = q_(n+1) = 0` (Fermi, Pasta, Ulam, Tsingou, "Studies of nonlinear problems", 1955).
@@ -58,7 +59,7 @@ impl Lattice {
     /// Stretches of the springs from one end to the other.
     fn stretches<R: Real>(q: &[R]) -> impl Iterator<Item = R> {
         let next = q.iter().copied().chain([R::zero()]);
-        next.scan(R::zero(), |before, q| Some(q - std::mem::replace(before, q)))
+        next.scan(R::zero(), |before, q| Some(q - core::mem::replace(before, q)))
     }
 }
 

@@ -24,7 +24,11 @@ pub use uniform_fields::{ChargedParticle, ConstantForce};
 use super::system::{ClosedForm, Coordinate, Layout, Parameter, Plane, Range, System};
 use super::{EulerLagrange, LagrangianVisitor, Mechanics, SystemInstance};
 use crate::scalar::{Dd, Scalar};
-use std::any::Any;
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::any::Any;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
 
 /// One line per system: its catalogue entry and how its Lagrangian is made from the number of coordinates.
 macro_rules! catalogue {

@@ -7,7 +7,8 @@ use crate::lagrangian::system::{
     Bounds, ClosedForm, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 /// `L = m v^2 / 2 - k q^2 / 2`.
 #[derive(Clone, Copy, Debug)]

@@ -11,8 +11,9 @@ use crate::lagrangian::system::{
     Size, StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
-use std::borrow::Cow;
-use std::f64::consts::PI;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
+use core::f64::consts::PI;
 
 /// `L = (m1 + m2) l1^2 v1^2 / 2 + m2 l2^2 v2^2 / 2 + m2 l1 l2 v1 v2 cos(q1 - q2) + (m1 + m2) g l1 cos q1 + m2 g l2 cos q2`.
 #[derive(Clone, Copy, Debug)]

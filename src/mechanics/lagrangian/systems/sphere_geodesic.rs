@@ -7,8 +7,9 @@ use crate::lagrangian::system::{
     Size, StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
-use std::borrow::Cow;
-use std::f64::consts::PI;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
+use core::f64::consts::PI;
 
 /// `L = m R^2 (v_theta^2 + sin^2 theta v_phi^2) / 2`.
 #[derive(Clone, Copy, Debug)]

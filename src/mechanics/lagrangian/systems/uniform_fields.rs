@@ -6,7 +6,8 @@ use crate::lagrangian::system::{
     Bounds, ClosedForm, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 /// `L = m v^2 / 2 + F q`.
 #[derive(Clone, Copy, Debug)]

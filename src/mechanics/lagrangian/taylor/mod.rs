@@ -8,8 +8,9 @@
 mod number;
 
 use crate::scalar::{Real, Scalar};
-use std::cell::RefCell;
-use std::fmt;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::fmt;
 
 /// Variables at a point, and the coefficients of all numbers made of them.
 #[derive(Debug)]

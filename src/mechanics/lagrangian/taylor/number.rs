@@ -5,7 +5,8 @@ use crate::forward::{HyperDual, assign_operators};
 use crate::linalg::{MatMut, MatRef, gemm};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Elementary, Real, Scalar};
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use alloc::vec::Vec;
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 impl<'a, S: Scalar> Taylor<'a, S> {
     /// `self * factor`, a factor 0 leaving nothing.
@@ -79,7 +80,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
             for k in (0..order - 1).rev() {
                 variables.multiply((sum, degrees), (rest, place.degrees), (next, degrees));
                 next[0] = coefficient(k);
-                std::mem::swap(sum, next);
+                core::mem::swap(sum, next);
             }
             out.copy_from_slice(sum);
         })
@@ -253,7 +254,10 @@ impl<S: Scalar> Real for Taylor<'_, S> {
         let (Some(first), true) = (places.first(), constant(weights) && constant(bias)) else {
             let product = |row: &[Self]| row.iter().zip(x).fold(Self::zero(), |sum, (&w, &x)| sum + w * x);
             let rows = weights.chunks_exact(x.len()).map(product);
-            return rows.zip(bias.iter().copied().chain(std::iter::repeat(Self::zero()))).map(|(y, b)| y + b).collect();
+            return rows
+                .zip(bias.iter().copied().chain(core::iter::repeat(Self::zero())))
+                .map(|(y, b)| y + b)
+                .collect();
         };
         let degrees = places.iter().fold(first.degrees, |all, place| all.of_sum(place.degrees));
         first.space.layer(degrees, weights, bias, x)

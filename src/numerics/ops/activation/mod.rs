@@ -97,8 +97,8 @@ impl Activation {
     }
 }
 
-impl std::fmt::Display for Activation {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for Activation {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.pad(self.name())
     }
 }
@@ -121,7 +121,7 @@ impl Activation {
                 slope * slope * (-0.5 * z * z).exp()
             })
             .sum();
-        let mean = mean * STEP / (2.0 * std::f64::consts::PI).sqrt();
+        let mean = mean * STEP / (2.0 * core::f64::consts::PI).sqrt();
         mean.sqrt().recip()
     }
 }

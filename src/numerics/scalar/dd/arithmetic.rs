@@ -5,8 +5,10 @@ use super::Dd;
 use super::elementary::LN_2;
 use super::trigonometry::HALF_PI;
 use crate::scalar::Scalar;
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Rem, RemAssign, Sub, SubAssign};
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
 use num_traits::{FloatConst, FromPrimitive, Num, NumCast, One, ToPrimitive, Zero};
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Rem, RemAssign, Sub, SubAssign};
 
 /// Pairs as the algorithms make them, not a number at infinities and at the ends of the range.
 impl Dd {
@@ -191,15 +193,15 @@ impl Num for Dd {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnreadableNumber;
 
-impl std::fmt::Display for UnreadableNumber {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for UnreadableNumber {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("not a decimal number")
     }
 }
 
-impl std::error::Error for UnreadableNumber {}
+impl core::error::Error for UnreadableNumber {}
 
-impl std::str::FromStr for Dd {
+impl core::str::FromStr for Dd {
     type Err = UnreadableNumber;
 
     fn from_str(text: &str) -> Result<Self, UnreadableNumber> {
@@ -271,24 +273,24 @@ const fn pair(high: f64, low: f64) -> Dd {
 #[allow(non_snake_case, clippy::approx_constant)]
 impl FloatConst for Dd {
     constants! {
-        E = pair(std::f64::consts::E, 1.4456468917292502e-16);
+        E = pair(core::f64::consts::E, 1.4456468917292502e-16);
         PI = <Self as Scalar>::pi();
         TAU = <Self as Scalar>::pi().ldexp(1);
         FRAC_PI_2 = HALF_PI;
-        FRAC_PI_3 = pair(std::f64::consts::FRAC_PI_3, -1.072081766451091e-16);
+        FRAC_PI_3 = pair(core::f64::consts::FRAC_PI_3, -1.072081766451091e-16);
         FRAC_PI_4 = HALF_PI.ldexp(-1);
-        FRAC_PI_6 = pair(std::f64::consts::FRAC_PI_6, -5.360408832255455e-17);
+        FRAC_PI_6 = pair(core::f64::consts::FRAC_PI_6, -5.360408832255455e-17);
         FRAC_PI_8 = HALF_PI.ldexp(-2);
-        FRAC_1_PI = pair(std::f64::consts::FRAC_1_PI, -1.9678676675182486e-17);
-        FRAC_2_PI = pair(std::f64::consts::FRAC_2_PI, -3.935735335036497e-17);
-        FRAC_2_SQRT_PI = pair(std::f64::consts::FRAC_2_SQRT_PI, 1.533545961316588e-17);
+        FRAC_1_PI = pair(core::f64::consts::FRAC_1_PI, -1.9678676675182486e-17);
+        FRAC_2_PI = pair(core::f64::consts::FRAC_2_PI, -3.935735335036497e-17);
+        FRAC_2_SQRT_PI = pair(core::f64::consts::FRAC_2_SQRT_PI, 1.533545961316588e-17);
         FRAC_1_SQRT_2 = Self::SQRT_HALF;
         SQRT_2 = Self::SQRT_HALF.ldexp(1);
         LN_2 = LN_2;
-        LN_10 = pair(std::f64::consts::LN_10, -2.1707562233822494e-16);
-        LOG2_E = pair(std::f64::consts::LOG2_E, 2.0355273740931033e-17);
-        LOG10_E = pair(std::f64::consts::LOG10_E, 1.098319650216765e-17);
-        LOG2_10 = pair(std::f64::consts::LOG2_10, 1.661617516973592e-16);
-        LOG10_2 = pair(std::f64::consts::LOG10_2, -2.8037281277851704e-18);
+        LN_10 = pair(core::f64::consts::LN_10, -2.1707562233822494e-16);
+        LOG2_E = pair(core::f64::consts::LOG2_E, 2.0355273740931033e-17);
+        LOG10_E = pair(core::f64::consts::LOG10_E, 1.098319650216765e-17);
+        LOG2_10 = pair(core::f64::consts::LOG2_10, 1.661617516973592e-16);
+        LOG10_2 = pair(core::f64::consts::LOG10_2, -2.8037281277851704e-18);
     }
 }

@@ -1,11 +1,12 @@
 //! Roots, powers, exponentials, logarithms, the complementary error function.
 
 use super::Dd;
+use crate::platform::float;
 use crate::scalar::{Real, Scalar};
 
 const ONE: Dd = Dd::leading(1.0);
 const HALF: Dd = Dd::leading(0.5);
-pub(super) const LN_2: Dd = Dd { high: std::f64::consts::LN_2, low: 2.3190468138462996e-17 };
+pub(super) const LN_2: Dd = Dd { high: core::f64::consts::LN_2, low: 2.3190468138462996e-17 };
 /// Rest of the logarithm of 2 behind `LN_2`.
 const LN_2_REST: f64 = 5.707708438416212e-34;
 
@@ -36,7 +37,7 @@ impl Dd {
     /// Reduction by multiples of `ln 2` in three parts, the series at `r / 256`, then eight times
     /// `e^(2r) - 1 = 2 p + p^2`.
     fn exponential_parts(self) -> (i32, Self) {
-        let k = (self.high * std::f64::consts::LOG2_E).round();
+        let k = float!(f64, round(self.high * core::f64::consts::LOG2_E));
         let r = if k == 0.0 {
             self
         } else {
@@ -162,7 +163,7 @@ impl Dd {
     }
 
     pub(super) fn real_power(self, exponent: Self) -> Self {
-        let whole = exponent.low == 0.0 && exponent.high.fract() == 0.0 && exponent.high.abs() <= 1024.0;
+        let whole = exponent.low == 0.0 && float!(f64, fract(exponent.high)) == 0.0 && exponent.high.abs() <= 1024.0;
         if whole {
             return self.integer_power(exponent.high as i32);
         }
@@ -226,9 +227,9 @@ impl Dd {
 fn exact_square(x: Dd) -> (Dd, f64) {
     let (high, low) = (x.high(), x.low());
     let square = high * high;
-    let square_rest = high.mul_add(high, -square);
+    let square_rest = float!(f64, mul_add(high, high, -square));
     let cross = 2.0 * high * low;
-    let cross_rest = (2.0 * high).mul_add(low, -cross);
+    let cross_rest = float!(f64, mul_add(2.0 * high, low, -cross));
     let middle = Dd::new(square_rest, cross);
     let sum = Dd::new(square, middle.high());
     (sum, middle.low() + cross_rest + low * low)

@@ -8,8 +8,9 @@ mod trigonometry;
 pub use arithmetic::UnreadableNumber;
 
 use super::{Real, Scalar};
-use std::cmp::Ordering;
-use std::fmt;
+use alloc::string::String;
+use core::cmp::Ordering;
+use core::fmt;
 
 /// An unevaluated sum of two `f64`, about 31 decimal digits (unit round-off near `2^-104`), range of `f64`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,7 +21,7 @@ pub struct Dd {
 
 impl Dd {
     /// `1 / sqrt(2)`.
-    pub const SQRT_HALF: Self = Self { high: std::f64::consts::FRAC_1_SQRT_2, low: -4.833646656726457e-17 };
+    pub const SQRT_HALF: Self = Self { high: core::f64::consts::FRAC_1_SQRT_2, low: -4.833646656726457e-17 };
 
     /// The sum `high + low`, renormalised so that `high` is its nearest `f64`.
     #[inline]
@@ -172,7 +173,7 @@ impl Scalar for Dd {
     }
     #[inline]
     fn pi() -> Self {
-        Self { high: std::f64::consts::PI, low: 1.2246467991473532e-16 }
+        Self { high: core::f64::consts::PI, low: 1.2246467991473532e-16 }
     }
 
     #[inline]

@@ -2,7 +2,9 @@
 
 use super::Dd;
 use crate::scalar::Scalar;
-use std::cmp::Ordering;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::cmp::Ordering;
 
 /// Significant digits that are read; more only matter as "not zero".
 const DIGITS_READ: usize = 1600;

@@ -70,9 +70,9 @@ impl Dd {
         let special = y.high == 0.0 || x.high == 0.0 || !y.is_finite() || !x.is_finite();
         if special {
             return match () {
-                () if start.abs() == std::f64::consts::PI => Self::pi().with_sign_of(start),
-                () if start.abs() == std::f64::consts::FRAC_PI_2 => HALF_PI.with_sign_of(start),
-                () if start.abs() == std::f64::consts::FRAC_PI_4 => (HALF_PI * Self::leading(0.5)).with_sign_of(start),
+                () if start.abs() == core::f64::consts::PI => Self::pi().with_sign_of(start),
+                () if start.abs() == core::f64::consts::FRAC_PI_2 => HALF_PI.with_sign_of(start),
+                () if start.abs() == core::f64::consts::FRAC_PI_4 => (HALF_PI * Self::leading(0.5)).with_sign_of(start),
                 () if start.abs() > 2.0 => (HALF_PI * Self::leading(1.5)).with_sign_of(start),
                 () => Self::leading(start),
             };
@@ -107,7 +107,7 @@ impl Dd {
 }
 
 /// A quarter turn.
-pub(super) const HALF_PI: Dd = Dd { high: std::f64::consts::FRAC_PI_2, low: 6.123233995736766e-17 };
+pub(super) const HALF_PI: Dd = Dd { high: core::f64::consts::FRAC_PI_2, low: 6.123233995736766e-17 };
 
 /// Words of a window; the two leading bits are the quarter turn, the rest a fraction.
 const WORDS: usize = 6;
@@ -143,7 +143,7 @@ const TWO_OVER_PI: [u64; 22] = [
 fn window(skip: usize) -> Fixed {
     let (word, bit) = (skip / 64, (skip % 64) as u32);
     let at = |k: usize| TWO_OVER_PI.get(k).copied().unwrap_or(0);
-    std::array::from_fn(|k| match bit {
+    core::array::from_fn(|k| match bit {
         0 => at(word + k),
         _ => at(word + k) << bit | at(word + k + 1) >> (64 - bit),
     })
@@ -175,7 +175,7 @@ fn turns(x: f64) -> Fixed {
         Some(0) => carry as u64,
         Some(k) => product.get(k - 1).copied().unwrap_or(0),
     };
-    std::array::from_fn(|k| match bits {
+    core::array::from_fn(|k| match bits {
         0 => at(k + 1),
         _ => at(k + 1) >> bits | at(k) << (64 - bits),
     })
@@ -201,7 +201,7 @@ fn add(mut x: Fixed, y: Fixed) -> Fixed {
 
 /// `(k, z)` with `x = (k + 4 m) pi/2 + z` for an integer `m`, `0 <= k < 4` and `|z| <= pi/4` up to rounding.
 fn quarter_turns(x: Dd) -> (u8, Dd) {
-    if x.high.abs() <= std::f64::consts::FRAC_PI_4 {
+    if x.high.abs() <= core::f64::consts::FRAC_PI_4 {
         return (0, x);
     }
     let signed = |part: f64| if part < 0.0 { negated(turns(part)) } else { turns(part) };

@@ -21,7 +21,7 @@ pub struct Exponential<S> {
     pub minus_one: S,
 }
 
-impl<S: Copy + std::ops::Mul<Output = S>> Exponential<S> {
+impl<S: Copy + core::ops::Mul<Output = S>> Exponential<S> {
     /// `factor * first * second`, where `factor` contains the mantissa already.
     #[inline(always)]
     pub fn scale(self, factor: S) -> S {

@@ -1,6 +1,8 @@
 //! Branch-free pieces for `f32` and `f64`.
 
 use super::{Exponential, Lanes};
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
 
 /// `even[0] + odd[0] x + even[1] x^2 + ...` by two interleaved Horner rules in `square = x^2`.
 trait Polynomial: Sized {
@@ -49,7 +51,7 @@ macro_rules! impl_pieces {
                 const OFFSET: $bits = 1 << 11;
                 let y = if self < -$limit { -$limit } else { self };
                 let y = if y > $limit { $limit } else { y };
-                let shifted = y.mul_add(std::$float::consts::LOG2_E, MAGIC);
+                let shifted = y.mul_add(core::$float::consts::LOG2_E, MAGIC);
                 let n = shifted - MAGIC;
                 let r = n.mul_add(-$ln2_low, n.mul_add(-$ln2_high, y));
                 let square = r * r;
@@ -81,7 +83,7 @@ macro_rules! impl_pieces {
             #[inline(always)]
             fn lane_ln(self) -> Self {
                 const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;
-                const SQRT_HALF: $bits = std::$float::consts::FRAC_1_SQRT_2.to_bits();
+                const SQRT_HALF: $bits = core::$float::consts::FRAC_1_SQRT_2.to_bits();
                 const ONE: $bits = (1.0 as $float).to_bits();
                 // An integer added to the bits of this number is that integer added to its value.
                 const INTEGER: $float = ((1 as $bits) << FRACTION) as $float;
@@ -114,7 +116,7 @@ macro_rules! impl_pieces {
             fn lane_sin_cos(self) -> (Self, Self) {
                 const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;
                 const MAGIC: $float = 1.5 * ((1 as $bits) << FRACTION) as $float;
-                let shifted = self.mul_add(std::$float::consts::FRAC_2_PI, MAGIC);
+                let shifted = self.mul_add(core::$float::consts::FRAC_2_PI, MAGIC);
                 let n = shifted - MAGIC;
                 let r = n.mul_add(-$quarter_high, self);
                 // r is exact; z and what is lost of the difference r - p, rounding of the product included.
@@ -139,7 +141,7 @@ macro_rules! impl_pieces {
 }
 
 impl_pieces! {
-    f32, u32, limit: 150.0, ln2: (std::f32::consts::LN_2, -1.904_654_2e-9),
+    f32, u32, limit: 150.0, ln2: (core::f32::consts::LN_2, -1.904_654_2e-9),
     exp: (
         [0.5, 1.0 / 24.0, 1.0 / 720.0],
         [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0]
@@ -153,11 +155,11 @@ impl_pieces! {
     artanh: [0.666_666_6, 0.400_009_72, 0.284_987_87, 0.242_790_79],
     sin: [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0],
     cos: [1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3_628_800.0],
-    quarter: (std::f32::consts::FRAC_PI_2, -4.371_139e-8, -1.715_124_5e-15), fast_angle: 8192.0
+    quarter: (core::f32::consts::FRAC_PI_2, -4.371_139e-8, -1.715_124_5e-15), fast_angle: 8192.0
 }
 
 impl_pieces! {
-    f64, u64, limit: 800.0, ln2: (std::f64::consts::LN_2, 2.3190468138462996e-17),
+    f64, u64, limit: 800.0, ln2: (core::f64::consts::LN_2, 2.3190468138462996e-17),
     exp: (
         [0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0, 1.0 / 3628800.0, 1.0 / 479001600.0],
         [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0, 1.0 / 362880.0, 1.0 / 39916800.0, 1.0 / 6227020800.0]
@@ -191,5 +193,5 @@ impl_pieces! {
         0.0416666666666666, -0.001388888888887411, 2.480158728947673e-05,
         -2.7557314351390663e-07, 2.087572321298175e-09, -1.1359647557788195e-11
     ],
-    quarter: (std::f64::consts::FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33), fast_angle: 1048576.0
+    quarter: (core::f64::consts::FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33), fast_angle: 1048576.0
 }

@@ -4,10 +4,11 @@ use super::Depth;
 use super::operation::{Combination, Dense, Elementwise, Function, Gather, Input, Operation, Product, Select};
 use super::value::{Dependence, Layout, Order, Value};
 use crate::ops::{Binary, Unary};
+use crate::platform::Map;
 use crate::scalar::{Real, Scalar};
 use crate::tape::TapeError;
 use crate::tape::program::{Graph, Node, Recorder, Tracer};
-use std::collections::HashMap;
+use alloc::vec::Vec;
 
 /// A recorded function `L(q, v)` with parameters, ready to be evaluated by an [`Evaluation`](super::Evaluation).
 #[derive(Clone, Debug)]
@@ -140,7 +141,7 @@ struct Compiler<'g, S> {
     /// Value and unit of each row.
     place: Vec<Option<(usize, usize)>>,
     /// Single numbers taken out of values of several units.
-    taken: HashMap<(usize, usize), usize>,
+    taken: Map<(usize, usize), usize>,
     needed: Vec<bool>,
 }
 
@@ -156,7 +157,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
             slopes: 0,
             functions: 0,
             place: vec![None; rows],
-            taken: HashMap::new(),
+            taken: Map::new(),
             needed: vec![false; rows],
         }
     }

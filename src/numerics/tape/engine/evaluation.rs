@@ -5,7 +5,8 @@ use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reve
 use super::value::{Dependence, Order, Store, View};
 use super::{Recorded, STATES};
 use crate::scalar::{Column, Real, Scalar, update_column};
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// Directions of mixed Taylor coefficients `L_st`, one of every state; vectors are in scaled coordinates.
 #[derive(Clone, Debug, Default)]

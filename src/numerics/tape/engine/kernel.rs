@@ -3,6 +3,7 @@
 use crate::forward::Dual;
 use crate::ops::{Activation, Binary, Unary};
 use crate::scalar::{Real, Scalar, exp_lanes, sin_cos_lanes, update, update2, update3, vectorized};
+use alloc::vec::Vec;
 
 /// Runs a loop over `count` numbers for the widest vector instructions, as it is where that is not worth a call.
 #[inline(always)]

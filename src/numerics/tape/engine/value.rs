@@ -6,7 +6,8 @@
 //! by linear operations only.
 
 use super::Depth;
-use std::ops::Range;
+use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Dependence of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -24,6 +24,8 @@ use single::Single;
 
 use super::TapeError;
 use crate::scalar::Scalar;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 /// Lanes of a chunk, of programs whose rows then stay in the nearest caches.
 pub const LANES: usize = 64;

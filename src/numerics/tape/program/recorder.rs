@@ -2,11 +2,11 @@
 
 use super::Tracer;
 use crate::ops::{Binary, Unary};
+use crate::platform::SmallKeyMap;
 use crate::scalar::{Real, Scalar};
 use crate::tape::TapeError;
-use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
+use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
 
 /// One operation; operands are rows.
 #[derive(Clone, Debug)]
@@ -64,7 +64,7 @@ impl<S> Node<S> {
 }
 
 /// Identity of an expression.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum Key {
     Input(u32),
     Parameter(u32),
@@ -73,29 +73,6 @@ enum Key {
     SinCos(u32),
     Binary(Binary, u32, u32),
     Select(u32, u32, u32),
-}
-
-/// Mixes the words of a [`Key`] by products: keys are small numbers that nobody chooses to collide.
-#[derive(Debug, Default)]
-struct Mixer(u64);
-
-impl Hasher for Mixer {
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&byte| self.write_u64(u64::from(byte)));
-    }
-    fn write_u32(&mut self, word: u32) {
-        self.write_u64(u64::from(word));
-    }
-    fn write_u64(&mut self, word: u64) {
-        // An odd number without a pattern, from the golden ratio.
-        self.0 = (self.0.rotate_left(23) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-    fn write_isize(&mut self, word: isize) {
-        self.write_u64(word as u64);
-    }
-    fn finish(&self) -> u64 {
-        self.0 ^ (self.0 >> 32)
-    }
 }
 
 /// The recorded expressions.
@@ -107,7 +84,7 @@ pub(in crate::numerics::tape) struct Graph<S> {
     pub(in crate::numerics::tape) first: Vec<u32>,
     /// Operation of each row.
     pub(in crate::numerics::tape) node_of_row: Vec<u32>,
-    known: HashMap<Key, u32, BuildHasherDefault<Mixer>>,
+    known: SmallKeyMap<Key, u32>,
 }
 
 /// Bit of a row that names a parameter which is not recorded yet: most weights of a network are read by blocks alone.
@@ -130,7 +107,8 @@ impl<S: Scalar> Recorder<S> {
     }
     /// Of so many rows at most.
     pub(in crate::numerics::tape) fn within(limit: u32, blocks: bool) -> Self {
-        let graph = Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: HashMap::default() };
+        let graph =
+            Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: SmallKeyMap::default() };
         Self { graph: RefCell::new(graph), error: Cell::new(None), blocks, limit }
     }
     /// The numbers of lane inputs `first..first + count`.
@@ -195,7 +173,7 @@ impl<S: Scalar> Recorder<S> {
         match number.recorder() {
             None => self.row(Node::Constant(number.constant_value())),
             Some(recorder) => {
-                if !std::ptr::eq(recorder, self) {
+                if !core::ptr::eq(recorder, self) {
                     self.latch(TapeError::MixedTapes);
                     recorder.latch(TapeError::MixedTapes);
                 }
@@ -209,7 +187,7 @@ impl<S: Scalar> Recorder<S> {
     /// Where a stretch of parameters starts, if that is what the numbers are.
     fn stretch(&self, numbers: &[Tracer<'_, S>]) -> Option<usize> {
         let place = |number: &Tracer<'_, S>| {
-            let own = number.recorder().is_some_and(|recorder| std::ptr::eq(recorder, self));
+            let own = number.recorder().is_some_and(|recorder| core::ptr::eq(recorder, self));
             (own && number.row() & PARAMETER != 0).then(|| (number.row() & !PARAMETER) as usize)
         };
         let start = place(numbers.first()?)?;

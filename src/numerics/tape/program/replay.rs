@@ -10,7 +10,8 @@ use crate::scalar::{
     tanh_lanes, vectorized,
 };
 use crate::tape::{TapeError, check_length};
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 /// Bytes of the rows of a chunk at most, for [`LANES`] lanes: those of larger programs leave the second cache.
 const CHUNK: usize = 1 << 19;
@@ -91,7 +92,7 @@ impl<S: Scalar> Replay<S> {
     /// Computes some states of a batch in chunks of `W`.
     fn chunks<const W: usize>(
         &mut self,
-        states: std::ops::Range<usize>,
+        states: core::ops::Range<usize>,
         batch: &Batch<'_, S>,
         outputs: &mut [&mut [S]],
     ) {

@@ -3,8 +3,9 @@
 use super::{Graph, Node};
 use crate::ops::{Binary, Unary};
 use crate::scalar::Scalar;
-use std::collections::VecDeque;
-use std::ops::Range;
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+use core::ops::Range;
 
 /// From so many operations on a run takes none that reads another one of it.
 const UNCHAINED: usize = 6;

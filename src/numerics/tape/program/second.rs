@@ -16,6 +16,7 @@ use super::replay::Step;
 use super::run::Kind;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
 
 /// Numbers by rising direction; those left out are zero.
 type Sparse<R> = Vec<(u32, R)>;
@@ -188,7 +189,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         adjoints[output] = R::one();
         // Of uniform rows nothing is asked.
         for step in program.steps().rev().take_while(|step| step.out >= program.uniform_rows) {
-            let (w, z) = (adjoints[step.out], std::mem::replace(&mut curved[step.out], Curve::none()));
+            let (w, z) = (adjoints[step.out], core::mem::replace(&mut curved[step.out], Curve::none()));
             let operand = |k: usize| step.operands[k] as usize;
             if step.kind == Kind::Input {
                 derivatives.first[operand(0)] = w;
@@ -198,7 +199,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
             if step.kind == Kind::SinCos {
                 let (sin, cos) = (self.values[step.out], self.values[step.out + 1]);
                 let other = adjoints[step.out + 1];
-                let z_cos = std::mem::replace(&mut curved[step.out + 1], Curve::none());
+                let z_cos = core::mem::replace(&mut curved[step.out + 1], Curve::none());
                 let x = operand(0);
                 let (z, z_cos) = (self.passed_on(z, step.out, 1), self.passed_on(z_cos, step.out + 1, 1));
                 adjoints[x] += w * cos - other * sin;

@@ -5,8 +5,9 @@ use crate::forward::assign_operators;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Elementary, Real, Scalar};
 use crate::tape::TapeError;
-use std::fmt;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use alloc::vec::Vec;
+use core::fmt;
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number of a program while it is recorded: it has no value yet, unless it is a constant.
 ///
@@ -280,7 +281,7 @@ impl<S: Scalar> Real for Tracer<'_, S> {
         let block = weights.first().and_then(|first| first.recorder?.dense(weights, bias, x));
         block.unwrap_or_else(|| {
             let product = |row: &[Self]| row.iter().zip(x).fold(Self::zero(), |sum, (&w, &x)| sum + w * x);
-            let bias = bias.iter().copied().chain(std::iter::repeat(Self::zero()));
+            let bias = bias.iter().copied().chain(core::iter::repeat(Self::zero()));
             weights.chunks_exact(x.len()).zip(bias).map(|(row, b)| product(row) + b).collect()
         })
     }

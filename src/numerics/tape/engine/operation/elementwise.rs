@@ -6,6 +6,7 @@ use crate::scalar::{Real, Scalar, update2, update3, vectorized};
 use crate::tape::engine::Depth;
 use crate::tape::engine::kernel::jets;
 use crate::tape::engine::value::{Dependence, Mixed};
+use alloc::vec::Vec;
 
 /// `f(x)`, unit by unit.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +31,7 @@ fn planes_mut<S>(all: &mut [S], channels: Mixed, size: usize) -> [&mut [S]; 4] {
     [value, s, t, st].map(|channel| match channel {
         None => &mut [] as &mut [S],
         Some(_) => {
-            let (plane, after) = std::mem::take(&mut rest).split_at_mut(size);
+            let (plane, after) = core::mem::take(&mut rest).split_at_mut(size);
             rest = after;
             plane
         }

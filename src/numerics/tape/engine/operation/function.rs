@@ -22,7 +22,7 @@ pub(crate) const PARTIALS: usize = 9;
 impl Function {
     /// The planes of partial derivatives, `(9, lanes)`.
     fn planes<S>(self, partials: &[S], lanes: usize) -> [&[S]; PARTIALS] {
-        std::array::from_fn(|k| &partials[(self.number * PARTIALS + k) * lanes..][..lanes])
+        core::array::from_fn(|k| &partials[(self.number * PARTIALS + k) * lanes..][..lanes])
     }
 
     pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {

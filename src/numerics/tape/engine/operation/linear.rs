@@ -5,6 +5,7 @@ use super::{Forward, MixedForward, MixedReverse, Reverse};
 use crate::scalar::{Column, Real, Scalar, update_column, update2};
 use crate::tape::engine::kernel::add_scaled;
 use crate::tape::engine::value::{Mixed, View};
+use alloc::vec::Vec;
 
 /// Operands of one unit, and their shares: `add(target, view, source, k)` adds the share of operand `k`, and of its adjoint, whose
 /// factor may depend on the forward values of `view`.
@@ -21,7 +22,7 @@ impl<A> Linear<'_, A> {
         let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
         planes.fill(<S as Real>::zero());
-        let channels = std::iter::once(None).chain(layout.directions(out).iter().map(Some));
+        let channels = core::iter::once(None).chain(layout.directions(out).iter().map(Some));
         for (direction, plane) in channels.zip(planes.chunks_exact_mut(lanes)) {
             for (k, &x) in self.operands.iter().enumerate() {
                 let of = |&direction: &usize| before.tangent(x, direction);
@@ -233,7 +234,7 @@ impl Gather {
         let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
         let size = self.sources.len() * lanes;
-        let channels = std::iter::once(None).chain(layout.directions(out).iter().map(Some));
+        let channels = core::iter::once(None).chain(layout.directions(out).iter().map(Some));
         for (direction, plane) in channels.zip(planes.chunks_exact_mut(size)) {
             let of = |x| direction.map_or_else(|| Some(before.plane(x, 0)), |&direction| before.tangent(x, direction));
             for (to, &(value, unit)) in self.sources.iter().enumerate() {

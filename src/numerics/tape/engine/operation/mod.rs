@@ -26,6 +26,7 @@ use super::kernel::{add_product, add_product3};
 use super::value::{Dependence, Mixed, Order, Store, Value, View};
 use super::{Depth, MixedDirections};
 use crate::scalar::{Real, Scalar, in_vectors};
+use alloc::vec::Vec;
 use contraction::{Contraction, ROWS};
 
 /// An operation; operands are values before it.
@@ -62,7 +63,7 @@ impl<S> Operation<S> {
             Self::Product(op) => [op.a, op.b].into_iter().for_each(visit),
             Self::Combination(op) => op.operands().iter().copied().for_each(visit),
             Self::Function(op) => [op.a, op.b].into_iter().for_each(visit),
-            Self::Select(op) => std::iter::once(op.condition).chain(op.branches).for_each(visit),
+            Self::Select(op) => core::iter::once(op.condition).chain(op.branches).for_each(visit),
             Self::Dense(op) => visit(op.x),
             Self::Gather(op) => op.sources.iter().for_each(|&(value, _)| visit(value)),
         }
