@@ -9,6 +9,8 @@ use super::replay::value;
 use super::run::{Kind, Run};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, in_lanes, sin_cos_lane};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 
 /// Rows of a program at most: those of more would leave the first cache.
 const MANY: usize = 2048;
