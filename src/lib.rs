@@ -189,6 +189,7 @@ pub use learning::{configuration, data, optimizers, presets, training};
 #[cfg(feature = "rollout")]
 pub use mechanics::rollout;
 pub use mechanics::{lagrangian, network};
+pub(crate) use numerics::platform;
 #[doc(hidden)]
 pub use numerics::{forward, ops, random};
 pub use numerics::{linalg, scalar, tape};
@@ -203,10 +204,10 @@ pub use physics::{analysis, formula, identification};
 pub use physics::{relativity, symmetry};
 #[cfg(feature = "std")]
 pub use support::cancellation;
+pub(crate) use support::names;
 #[cfg(feature = "std")]
 #[doc(hidden)]
 pub use support::storage;
-pub(crate) use support::{names, platform};
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]
 #[cfg(any(doc, doctest))]

@@ -2,6 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
+//! | [`platform`] | what the standard library gives, and what stands in for it without |
 //! | [`scalar`] | number types, vector lanes, exact sums |
 //! | [`random`] | random streams: one seed, independent draws for each purpose |
 //! | [`ops`] | the one table of operations: values, first and second partial derivatives |
@@ -12,6 +13,7 @@
 pub mod forward;
 pub mod linalg;
 pub mod ops;
+pub mod platform;
 pub mod random;
 pub mod scalar;
 pub mod tape;

@@ -1,15 +1,13 @@
-//! What every floor above needs and none is about: cancellation, names in messages, locks and maps, files, memory.
+//! What every floor above needs and none is about: cancellation, names in messages, files, memory.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`cancellation`] | the flag that ends a long search, and reports of how far it is |
 //! | [`names`] | nearest known name for error messages, numbers and counts in words |
-//! | [`platform`] | what the standard library gives, and what stands in for it without |
 //! | [`storage`] | files: read within limits, written completely or not at all; locks of directories; the container of model files and checkpoints |
 
 #[cfg(feature = "std")]
 pub mod cancellation;
 pub mod names;
-pub mod platform;
 #[cfg(feature = "std")]
 pub mod storage;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// Floors from the bottom to the top, with their modules in order.
 const FLOORS: [(&str, &[&str]); 6] = [
-    ("numerics", &["scalar", "random", "ops", "forward", "linalg", "tape"]),
+    ("numerics", &["platform", "scalar", "random", "ops", "forward", "linalg", "tape"]),
     ("support", &["cancellation", "names", "storage"]),
     ("mechanics", &["lagrangian", "rollout", "network"]),
     ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
@@ -17,9 +17,10 @@ const FLOORS: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates with the only places that name them.
-const ADAPTERS: [(&str, &[&str]); 13] = [
+const ADAPTERS: [(&str, &[&str]); 14] = [
     ("pulp", &["numerics/scalar/"]),
     ("libm", &["numerics/scalar/"]),
+    ("spin", &["numerics/platform.rs"]),
     ("faer", &["numerics/linalg/by_faer.rs"]),
     ("nalgebra", &["mechanics/rollout/"]),
     ("ode_solvers", &["mechanics/rollout/"]),
