@@ -5,6 +5,7 @@ use super::batch::Workspace;
 use super::dot;
 use super::eigen::eigh;
 use super::{LinalgError, expect_length};
+#[cfg(any(test, not(feature = "faer")))]
 use crate::platform::float;
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
