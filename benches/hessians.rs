@@ -8,7 +8,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use lnn::lagrangian::{Accelerations, EulerLagrange, Lagrangian, Linearizer, Mechanics, Request, Terms};
 use lnn::rollout::{Options, rollout};
-use lnn::scalar::Real;
+use lnn::scalar::{Real, vectorized};
 use lnn::tape::{Function, ScalarFunction, hessian};
 use std::hint::black_box;
 use std::time::Instant;
@@ -136,6 +136,7 @@ fn lagrangians(c: &mut Criterion) {
             println!("{name} {n}: first call in {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
             for (what, batch, request) in [
                 ("M, c, g, one state", 1, matrices),
+                ("M, c, g, 128 states", 128, matrices),
                 ("acceleration, one state", 1, Request::ACCELERATION),
                 ("acceleration, 16 states", 16, Request::ACCELERATION),
                 ("acceleration, 128 states", 128, Request::ACCELERATION),
@@ -169,6 +170,37 @@ fn lagrangians(c: &mut Criterion) {
     };
     row("chain", &|n| Box::new(Mechanics::new(Chain(n), [])), &[2, 4, 8, 16, 32, 64, 128, 256]);
     row("lattice", &|n| Box::new(Mechanics::new(Lattice(n), [])), &[2, 8, 64, 256, 1000]);
+    group.finish();
+}
+
+/// Products of rows of 64 numbers without an interpreter: what a program could reach at most, with rows in the first and in the second cache.
+fn roof(c: &mut Criterion) {
+    const LANES: usize = 64;
+    let mut group = c.benchmark_group("Products of rows");
+    for count in [48, 400] {
+        let rows: Vec<[f64; LANES]> = (0..count).map(|k| [1.0 + 1e-9 * k as f64; LANES]).collect();
+        let mut products = rows.clone();
+        // Operands in no order, as those of a program.
+        let places: Vec<[usize; 2]> = (0..count).map(|k| [(7 * k + 5) % count, (11 * k + 3) % count]).collect();
+        group.throughput(Throughput::Elements((count * LANES) as u64));
+        group.bench_function(BenchmarkId::new("rows", count), |b| {
+            b.iter(|| {
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for k in 0..count {
+                            let [a, b] = places[k].map(|place| &rows[place]);
+                            let product = &mut products[k];
+                            for l in 0..LANES {
+                                product[l] = a[l] * b[l];
+                            }
+                        }
+                    },
+                );
+            });
+        });
+        assert!(products.iter().flatten().all(|x| (1.0..1.001).contains(x)));
+    }
     group.finish();
 }
 
@@ -274,7 +306,7 @@ fn count(name: &str, n: usize, times: usize) {
     }
 }
 
-criterion_group!(hessian_benches, functions, lagrangians, constrained);
+criterion_group!(hessian_benches, functions, lagrangians, constrained, roof);
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();

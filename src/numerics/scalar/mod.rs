@@ -29,8 +29,8 @@ pub use dd::Dd;
 pub use dd::UnreadableNumber;
 #[doc(hidden)]
 pub use float::{AnyFloat, Foreign};
-#[doc(hidden)]
 pub(crate) use lanes::sin_cos_lane;
+#[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 #[doc(hidden)]
 pub use loops::vectorized;
