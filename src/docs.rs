@@ -70,6 +70,7 @@ macro_rules! page {
             "[page]: crate::docs::commands#lnn-page\n",
             "[library]: crate::docs::library\n",
             "[stability]: crate::docs::library#stability\n",
+            "[no-std]: crate::docs::library#without-the-standard-library\n",
             "[python]: crate::docs::python\n",
             "[model-format]: crate::docs::model_format\n",
             "[results]: crate::docs::results\n",
