@@ -19,10 +19,10 @@ mod with_std {
         mutex.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A map of keys that anybody may choose.
+    /// A map whose keys may come from a user: its hash resists collisions that are made on purpose.
     pub type Map<K, V> = HashMap<K, V>;
 
-    /// A map of keys that are small numbers: nobody chooses them to collide.
+    /// A map with small numbers as keys, which no user chooses, under a faster hash.
     pub type SmallKeyMap<K, V> = HashMap<K, V, BuildHasherDefault<Mixer>>;
 
     /// Mixes the words of a key by products.

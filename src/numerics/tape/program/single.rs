@@ -9,7 +9,6 @@ use super::replay::value;
 use super::run::{Kind, Run};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, in_lanes, sin_cos_lane};
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 /// Rows of a program at most: those of more would leave the first cache.
@@ -54,6 +53,7 @@ struct Operation {
 /// The operations of a small program.
 #[derive(Clone, Debug)]
 pub(super) struct Single<S> {
+    /// `true` if [`FEW`] rows are enough.
     few: bool,
     /// Row of each input and of each parameter.
     inputs: Vec<u16>,
@@ -156,35 +156,33 @@ impl<S: Scalar> Single<S> {
 /// The rows of a single state.
 #[derive(Debug)]
 pub(super) struct Rows<S> {
-    few: Box<[S; FEW]>,
-    /// Those of larger programs.
-    many: Option<Box<[S; MANY]>>,
-    /// Parameters for which the uniform rows were computed last.
-    parameters: Option<Vec<S>>,
-}
-
-impl<S: Scalar> Default for Rows<S> {
-    fn default() -> Self {
-        Self { few: boxed(), many: None, parameters: None }
-    }
-}
-
-fn boxed<S: Scalar, const N: usize>() -> Box<[S; N]> {
-    Box::new([<S as Real>::zero(); N])
+    /// [`FEW`] or [`MANY`].
+    rows: Vec<S>,
+    /// `true` once the uniform rows were computed, and the parameters for which they were.
+    are_computed: bool,
+    parameters: Vec<S>,
 }
 
 impl<S: Scalar> Rows<S> {
+    /// Rows for a program.
+    pub fn new(program: &Single<S>) -> Self {
+        let count = if program.few { FEW } else { MANY };
+        Self { rows: vec![<S as Real>::zero(); count], are_computed: false, parameters: Vec::new() }
+    }
+
     /// Computes the outputs of one state; the lengths of all fields are those of the program.
     pub fn evaluate(&mut self, program: &Single<S>, inputs: &[&[S]], parameters: &[S], outputs: &mut [&mut [S]]) {
-        let are_known = self.parameters.as_deref() == Some(parameters);
+        let are_known = self.are_computed && self.parameters == parameters;
         let uniform = if are_known { None } else { Some(parameters) };
-        if program.few {
-            program.evaluate(&mut self.few, inputs, uniform, outputs);
-        } else {
-            program.evaluate(self.many.get_or_insert_with(boxed), inputs, uniform, outputs);
+        if let Ok(rows) = <&mut [S; FEW]>::try_from(&mut self.rows[..]) {
+            program.evaluate(rows, inputs, uniform, outputs);
+        } else if let Ok(rows) = <&mut [S; MANY]>::try_from(&mut self.rows[..]) {
+            program.evaluate(rows, inputs, uniform, outputs);
         }
         if !are_known {
-            self.parameters = Some(parameters.to_vec());
+            self.are_computed = true;
+            self.parameters.clear();
+            self.parameters.extend_from_slice(parameters);
         }
     }
 }
