@@ -67,7 +67,7 @@ impl<S: Scalar> Replay<S> {
         {
             check_length("inputs of a state", program.inputs, inputs.iter().map(|field| field.len()).sum())?;
             check_length("outputs of a state", program.outputs.len(), outputs.iter().map(|field| field.len()).sum())?;
-            self.single.get_or_insert_with(|| Rows::new(single)).evaluate(single, inputs, parameters, outputs);
+            self.single.get_or_insert_default().evaluate(single, inputs, parameters, outputs);
             return Ok(());
         }
         let columns = |length: usize| length / lanes.max(1);

@@ -1,27 +1,22 @@
 //! Single states of small programs: one operation after the other.
 //!
 //! A run is decided on once for its operations and lanes. Of a single state with few operations that decision takes more time than the
-//! operations; here each is decided on by itself, and no index needs a check, because the number of rows is a power of two known to the
-//! compiler. The results are the same to the bit.
+//! operations; here each is decided on by itself, and no index needs a check, because a byte names one of 256 rows. The results are the same
+//! to the bit.
 
 use super::Program;
 use super::replay::value;
-use super::run::{Kind, Run};
+use super::run::Kind;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, in_lanes, sin_cos_lane};
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-/// Rows of a program at most: those of more would leave the first cache.
-const MANY: usize = 2048;
-/// Of fewer rows a byte is the index.
-const FEW: usize = 256;
-/// Instructions of an operation here, of one in a run, and of a run (`valgrind --tool=callgrind` on `cargo bench --bench hessians -- --count
-/// handle 2 60` and `rosenbrock 32 60`).
-const DECISION: usize = 22;
-const OPERATION: usize = 13;
-const RUN: usize = 50;
-/// The last row of either takes the inputs that no operation reads.
-const UNREAD: u16 = (MANY - 1) as u16;
+/// Rows of a program at most. One more takes the inputs that no operation reads.
+const ROWS: usize = u8::MAX as usize;
+/// Operations at most: a processor foretells only so many jumps. By `cargo bench --bench hessians -- "one state, by the handle/"` a chain of two
+/// pendula is faster without runs, and one of four is not, though it takes fewer instructions.
+const OPERATIONS: usize = 80;
 
 /// What an operation does.
 #[derive(Clone, Copy, Debug)]
@@ -46,48 +41,45 @@ enum Code {
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     code: Code,
-    out: u16,
-    operands: [u16; 3],
+    out: u8,
+    operands: [u8; 3],
 }
 
 /// The operations of a small program.
 #[derive(Clone, Debug)]
 pub(super) struct Single<S> {
-    /// `true` if [`FEW`] rows are enough.
-    few: bool,
     /// Row of each input and of each parameter.
-    inputs: Vec<u16>,
-    parameters: Vec<u16>,
-    constants: Vec<(u16, S)>,
+    inputs: Vec<u8>,
+    parameters: Vec<u8>,
+    constants: Vec<(u8, S)>,
     /// Those that depend on parameters alone, then those of the state.
     uniform: Vec<Operation>,
     lanes: Vec<Operation>,
     functions: Vec<Kind>,
-    outputs: Vec<u16>,
+    outputs: Vec<u8>,
 }
 
 impl<S: Scalar> Single<S> {
-    /// The operations of a program; `None` of one with too many rows, or with runs so long that they are the faster ones.
+    /// The operations of a program; `None` of a larger one.
     pub fn new(program: &Program<S>) -> Option<Self> {
         let count = program.uniform_rows + program.lane_rows;
-        if count >= MANY {
+        if count > ROWS {
             return None;
         }
         let mut single = Self {
-            few: count < FEW,
-            inputs: vec![UNREAD; program.inputs],
-            parameters: vec![UNREAD; program.parameters],
+            inputs: vec![u8::MAX; program.inputs],
+            parameters: vec![u8::MAX; program.parameters],
             constants: Vec::new(),
             uniform: Vec::new(),
             lanes: Vec::new(),
             functions: Vec::new(),
-            outputs: program.outputs.iter().map(|&row| row as u16).collect(),
+            outputs: program.outputs.iter().map(|&row| row as u8).collect(),
         };
         let (mut readers, mut products, mut is_joined) = (vec![0; count], vec![None; count], vec![false; count]);
         let rows = program.steps().filter(|step| step.kind.reads_rows()).flat_map(|step| step.operands);
         rows.chain(&program.outputs).for_each(|&row| readers[row as usize] += 1);
         for step in program.steps() {
-            let (out, named) = (step.out as u16, step.operands[0] as usize);
+            let (out, named) = (step.out as u8, step.operands[0] as usize);
             let code = match step.kind {
                 Kind::Input => {
                     single.inputs[named] = out;
@@ -111,16 +103,16 @@ impl<S: Scalar> Single<S> {
                 Kind::Select => Code::Select,
                 Kind::Unary(_) | Kind::Binary(_) => Code::Function,
             };
-            let mut operands = [0, 1, 2].map(|k| step.operands.get(k).map_or(0, |&row| row as u16));
+            let mut operands = [0, 1, 2].map(|k| step.operands.get(k).map_or(0, |&row| row as u8));
             if matches!(code, Code::Function) {
-                operands[2] = single.functions.len() as u16;
+                operands[2] = single.functions.len() as u8;
                 single.functions.push(step.kind);
             }
-            let is_uniform = |row: u16| (row as usize) < program.uniform_rows;
+            let is_uniform = |row: u8| (row as usize) < program.uniform_rows;
             let mut operation = Operation { code, out, operands };
             // A product that one sum or difference alone reads is computed within it.
             let [first, second, _] = operands;
-            let product = |row: u16| products[row as usize].filter(|_| is_uniform(row) == is_uniform(out));
+            let product = |row: u8| products[row as usize].filter(|_| is_uniform(row) == is_uniform(out));
             let joined = match code {
                 Code::Mul if readers[step.out] == 1 => {
                     products[step.out] = Some([first, second]);
@@ -147,64 +139,43 @@ impl<S: Scalar> Single<S> {
         for section in [&mut single.uniform, &mut single.lanes] {
             section.retain(|operation| !is_joined[operation.out as usize]);
         }
-        let operations: usize = program.lanes.iter().filter(|run| run.kind.reads_rows()).map(Run::count).sum();
-        let by_runs = operations * OPERATION + program.lanes.len() * RUN;
-        (single.lanes.len() * DECISION < by_runs).then_some(single)
+        (single.lanes.len() <= OPERATIONS).then_some(single)
     }
 }
 
 /// The rows of a single state.
 #[derive(Debug)]
 pub(super) struct Rows<S> {
-    /// [`FEW`] or [`MANY`].
-    rows: Vec<S>,
-    /// `true` once the uniform rows were computed, and the parameters for which they were.
-    are_computed: bool,
-    parameters: Vec<S>,
+    rows: Box<[S; ROWS + 1]>,
+    /// Parameters for which the uniform rows were computed last.
+    parameters: Option<Vec<S>>,
+}
+
+impl<S: Scalar> Default for Rows<S> {
+    fn default() -> Self {
+        Self { rows: Box::new([<S as Real>::zero(); ROWS + 1]), parameters: None }
+    }
 }
 
 impl<S: Scalar> Rows<S> {
-    /// Rows for a program.
-    pub fn new(program: &Single<S>) -> Self {
-        let count = if program.few { FEW } else { MANY };
-        Self { rows: vec![<S as Real>::zero(); count], are_computed: false, parameters: Vec::new() }
-    }
-
     /// Computes the outputs of one state; the lengths of all fields are those of the program.
     pub fn evaluate(&mut self, program: &Single<S>, inputs: &[&[S]], parameters: &[S], outputs: &mut [&mut [S]]) {
-        let are_known = self.are_computed && self.parameters == parameters;
-        let uniform = if are_known { None } else { Some(parameters) };
-        if let Ok(rows) = <&mut [S; FEW]>::try_from(&mut self.rows[..]) {
-            program.evaluate(rows, inputs, uniform, outputs);
-        } else if let Ok(rows) = <&mut [S; MANY]>::try_from(&mut self.rows[..]) {
-            program.evaluate(rows, inputs, uniform, outputs);
-        }
+        let are_known = self.parameters.as_deref() == Some(parameters);
+        program.evaluate(&mut self.rows, inputs, (!are_known).then_some(parameters), outputs);
         if !are_known {
-            self.are_computed = true;
-            self.parameters.clear();
-            self.parameters.extend_from_slice(parameters);
+            let kept = self.parameters.get_or_insert_default();
+            kept.clear();
+            kept.extend_from_slice(parameters);
         }
     }
-}
-
-/// The place of a row.
-#[inline(always)]
-fn at<const N: usize>(row: u16) -> usize {
-    row as usize & const { N - 1 }
 }
 
 impl<S: Scalar> Single<S> {
     /// The outputs of one state, after the uniform rows of other parameters.
-    fn evaluate<const N: usize>(
-        &self,
-        rows: &mut [S; N],
-        inputs: &[&[S]],
-        parameters: Option<&[S]>,
-        outputs: &mut [&mut [S]],
-    ) {
+    fn evaluate(&self, rows: &mut [S; ROWS + 1], inputs: &[&[S]], parameters: Option<&[S]>, outputs: &mut [&mut [S]]) {
         if let Some(parameters) = parameters {
-            self.parameters.iter().zip(parameters).for_each(|(&row, &p)| rows[at::<N>(row)] = p);
-            self.constants.iter().for_each(|&(row, c)| rows[at::<N>(row)] = c);
+            self.parameters.iter().zip(parameters).for_each(|(&row, &p)| rows[row as usize] = p);
+            self.constants.iter().for_each(|&(row, c)| rows[row as usize] = c);
             self.perform(&self.uniform, rows);
         }
         let mut next = 0;
@@ -212,7 +183,7 @@ impl<S: Scalar> Single<S> {
             let places = &self.inputs[next..][..field.len()];
             next += field.len();
             for k in 0..field.len() {
-                rows[at::<N>(places[k])] = field[k];
+                rows[places[k] as usize] = field[k];
             }
         }
         self.perform(&self.lanes, rows);
@@ -221,35 +192,35 @@ impl<S: Scalar> Single<S> {
             let places = &self.outputs[next..][..field.len()];
             next += field.len();
             for k in 0..field.len() {
-                field[k] = rows[at::<N>(places[k])];
+                field[k] = rows[places[k] as usize];
             }
         }
     }
 
     /// Computes operations in order.
-    fn perform<const N: usize>(&self, operations: &[Operation], rows: &mut [S; N]) {
+    fn perform(&self, operations: &[Operation], rows: &mut [S; ROWS + 1]) {
         in_lanes::<1, _>(
             #[inline(always)]
             || {
                 for operation in operations {
                     let [first, second, third] = operation.operands;
-                    let (a, b) = (rows[at::<N>(first)], rows[at::<N>(second)]);
-                    rows[at::<N>(operation.out)] = match operation.code {
+                    let (a, b) = (rows[first as usize], rows[second as usize]);
+                    rows[operation.out as usize] = match operation.code {
                         Code::Add => a + b,
                         Code::Sub => a - b,
                         Code::Mul => a * b,
                         Code::Div => a / b,
-                        Code::MulAdd => a * b + rows[at::<N>(third)],
-                        Code::MulSub => a * b - rows[at::<N>(third)],
-                        Code::SubMul => rows[at::<N>(third)] - a * b,
+                        Code::MulAdd => a * b + rows[third as usize],
+                        Code::MulSub => a * b - rows[third as usize],
+                        Code::SubMul => rows[third as usize] - a * b,
                         Code::Neg => -a,
                         Code::Square => a * a,
                         Code::SinCos => {
                             let (sin, cos) = sin_cos_lane(a);
-                            rows[at::<N>(operation.out + 1)] = cos;
+                            rows[operation.out as usize + 1] = cos;
                             sin
                         }
-                        Code::Select => a.select(b, rows[at::<N>(third)]),
+                        Code::Select => a.select(b, rows[third as usize]),
                         Code::Function => function(self.functions[third as usize], a, b),
                     };
                 }
@@ -295,10 +266,9 @@ mod tests {
 
     #[test]
     fn a_single_state_has_the_bits_of_a_batch() {
-        for (rounds, few) in [(1, true), (30, false)] {
+        for rounds in [1, 2] {
             let program = Program::record(4, 2, |x, p| every_operation(x, p, rounds)).unwrap();
             let single = program.single.as_ref().expect("a small program");
-            assert_eq!(single.few, few);
             let joined = |o: &Operation| matches!(o.code, Code::MulAdd | Code::MulSub | Code::SubMul);
             assert!(single.lanes.iter().filter(|o| joined(o)).count() >= 3 * rounds);
             let outputs = program.outputs();
@@ -324,9 +294,10 @@ mod tests {
     }
 
     #[test]
-    fn long_runs_are_left_alone() {
-        // Sums of neighbours, all of one kind.
-        let program = Program::<f64>::record(300, 0, |x, _| x.windows(2).map(|x| x[0] + x[1]).collect()).unwrap();
+    fn large_programs_keep_their_runs() {
+        let program = Program::record(4, 2, |x, p| every_operation(x, p, 30)).unwrap();
+        assert!(program.single.is_none());
+        let program = Program::<f64>::record(100, 0, |x, _| x.windows(2).map(|x| x[0] + x[1]).collect()).unwrap();
         assert!(program.single.is_none());
     }
 }
