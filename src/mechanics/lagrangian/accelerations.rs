@@ -1,9 +1,11 @@
 //! Accelerations of one state after the other: the system `M a = g - c` of a sparse mass matrix is solved within the program that computes it.
 
 use super::elimination::{Balance, eliminate};
+use super::linearization::{Linearized, Rate, SparseRows};
 use super::programs::derivatives;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::SMALL_PIVOT;
+use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::{Program, ROWS, Replay, Tracer};
 use alloc::sync::Arc;
@@ -14,10 +16,29 @@ use core::sync::atomic::{AtomicBool, Ordering};
 /// Products of an elimination that are always worth recording: it takes less time than the call of a solver.
 pub(super) const SMALL: usize = 60;
 
+/// Coordinates of a Lagrangian at most for which one program of the linearization takes less time than programs of its parts: in turns by
+/// `cargo bench --bench hessians -- linearization`, 0.4 times at two, 0.6 at four, the same at six and eight.
+const WHOLE: usize = 4;
+
 /// What records the equations of motion of a model, at a state and with parameters that are being recorded.
 pub(super) trait RecordMotion<S>: Debug + Send + Sync {
     /// The equations; `None` if they are too large.
     fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>>;
+
+    /// The derivatives of their right sides less their left sides by the state, with the accelerations and the multipliers held: `x` holds `q`,
+    /// `v`, `a`, `lambda`. `None` if they are too large, or not known.
+    fn record_slopes<'t>(
+        &self,
+        _x: &[Tracer<'t, S>],
+        _parameters: &[Tracer<'t, S>],
+    ) -> Option<SparseRows<Tracer<'t, S>>> {
+        None
+    }
+
+    /// Coordinates at most for which the linearization is worth a program of its own.
+    fn whole_coordinates(&self) -> usize {
+        0
+    }
 }
 
 /// A program of accelerations, in which the elimination with the pattern of the mass matrix is recorded too.
@@ -33,6 +54,8 @@ pub struct Solved<'a, S> {
     parameters: Vec<S>,
     /// Number of pairs of a pivot and the element of the diagonal that it was.
     pivots: usize,
+    /// The program of the linearization, recorded on first use.
+    linearized: Arc<OnceLock<Option<Linearized<S>>>>,
     /// Once it is raised, every call fails.
     flag: Option<&'a AtomicBool>,
 }
@@ -51,6 +74,17 @@ impl<'a, S: Scalar> Solved<'a, S> {
     /// What it was recorded from, and the values of its parameters.
     pub(super) fn motion(&self) -> (&Arc<dyn RecordMotion<S>>, &[S]) {
         (&self.motion, &self.parameters)
+    }
+
+    /// `true` once the flag is raised.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.flag.is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
+    /// The program of the linearization; `None` if its parts are the faster way, or the only one.
+    pub(super) fn linearized(&self) -> Option<Linearized<S>> {
+        let n = self.program.inputs() / 2;
+        self.linearized.get_or_init(|| Linearized::record(self.motion.as_ref(), n, &self.parameters)).clone()
     }
 }
 
@@ -71,7 +105,7 @@ impl<S: Scalar> Solved<'static, S> {
             Some(outputs)
         });
         let (program, parameters) = (Arc::new(program.ok()?), parameters.to_vec());
-        Some(Self { motion, program, parameters, pivots, flag: None })
+        Some(Self { motion, program, parameters, pivots, linearized: Arc::default(), flag: None })
     }
 
     /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.
@@ -90,6 +124,18 @@ impl<S: Scalar> RecordMotion<S> for Value<S> {
         let found = derivatives(&self.0, state, parameters, Request::ACCELERATION)?;
         let right = found.dl_dq.iter().zip(&found.coriolis).map(|(&g, &c)| g - c).collect();
         Some(Balance { coordinates: state.len() / 2, lower: found.mass_matrix, right })
+    }
+
+    fn record_slopes<'t>(
+        &self,
+        x: &[Tracer<'t, S>],
+        parameters: &[Tracer<'t, S>],
+    ) -> Option<SparseRows<Tracer<'t, S>>> {
+        Rate::of_lagrangian(&self.0).ok()?.slopes(x, parameters, &[])
+    }
+
+    fn whole_coordinates(&self) -> usize {
+        WHOLE
     }
 }
 
@@ -156,9 +202,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         if a.len() != q.len() {
             return Err(MechanicsError::Shape { what: "accelerations", expected: q.len(), found: a.len() });
         }
-        if let Some((Solved { flag: Some(flag), .. }, _)) = &self.solved
-            && flag.load(Ordering::Relaxed)
-        {
+        if self.solved.as_ref().is_some_and(|(solved, _)| solved.is_interrupted()) {
             return Err(MechanicsError::Interrupted);
         }
         if self.is_solved(q, v, a) {

@@ -17,58 +17,111 @@ pub(super) struct Balance<R> {
     pub right: Vec<R>,
 }
 
+/// A symmetric matrix after its elimination along its pattern.
+pub(super) struct Eliminated<R> {
+    coordinates: usize,
+    /// Rows in the order of their elimination, with the factors by which they were subtracted from which others.
+    steps: Vec<(usize, Vec<(usize, R)>)>,
+    /// By row.
+    pivots: Vec<R>,
+    /// What every pivot was before it was reduced.
+    diagonal: Vec<R>,
+}
+
 /// Solves in at most so many products: the solution, and every pivot behind what it was before it was reduced.
-///
-/// The coordinates come first, and of them as of the constraints the one that fills in the least. Of a positive definite `M` and
-/// independent rows `A` the pivots of the former are positive, those of the latter, of `-A M^-1 A^T`, negative; the elements of this
-/// matrix are what they were. They are handed over with their signs turned.
 pub(super) fn eliminate<R: Real>(balance: Balance<R>, most: usize) -> Option<(Vec<R>, Vec<[R; 2]>)> {
-    let Balance { coordinates, lower, mut right } = balance;
-    let count = lower.len();
-    let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
-    let mut diagonal: Vec<R> = lower.iter().enumerate().map(own).collect::<Option<_>>()?;
-    let mut pivots = diagonal.clone();
-    let mut rest: Vec<BTreeMap<usize, R>> = vec![BTreeMap::new(); count];
-    for (i, row) in lower.into_iter().enumerate() {
-        for (j, m) in row.into_iter().filter(|(j, _)| *j != i) {
-            rest[i].insert(j, m);
-            rest[j].insert(i, m);
-        }
-    }
-    let (mut steps, mut products) = (Vec::with_capacity(count), 0);
-    let mut left: Vec<usize> = (0..count).collect();
-    while !left.is_empty() {
-        if left.len() == count - coordinates {
-            diagonal[coordinates..].copy_from_slice(&pivots[coordinates..]);
-        }
-        // The row that fills in the least.
-        let at = (0..left.len()).min_by_key(|&at| (left[at] >= coordinates, rest[left[at]].len()))?;
-        let k = left.remove(at);
-        let row = core::mem::take(&mut rest[k]);
-        products += row.len() * (row.len() + 3) / 2;
-        if products > most {
-            return None;
-        }
-        let factors: Vec<(usize, R)> = row.iter().map(|(&i, &m)| (i, m / pivots[k])).collect();
-        let known = right[k];
-        for &(i, factor) in &factors {
-            rest[i].remove(&k);
-            right[i] -= factor * known;
-            pivots[i] -= factor * row[&i];
-            for (&j, &m) in row.range(..i) {
-                let term = factor * m;
-                let element = rest[i].get(&j).map_or(-term, |&element| element - term);
-                rest[i].insert(j, element);
-                rest[j].insert(i, element);
+    let eliminated = Eliminated::of(balance.coordinates, balance.lower, most)?;
+    Some((eliminated.solve(balance.right), eliminated.guards()))
+}
+
+impl<R: Real> Eliminated<R> {
+    /// Eliminates the matrix with this lower triangle in at most so many products.
+    ///
+    /// The coordinates come first, and of them as of the constraints the one that fills in the least. Of a positive definite `M` and
+    /// independent rows `A` the pivots of the former are positive, those of the latter, of `-A M^-1 A^T`, negative; the elements of this
+    /// matrix are what they were.
+    pub fn of(coordinates: usize, lower: Lists<R>, most: usize) -> Option<Self> {
+        let count = lower.len();
+        let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
+        let mut diagonal: Vec<R> = lower.iter().enumerate().map(own).collect::<Option<_>>()?;
+        let mut pivots = diagonal.clone();
+        let mut rest: Vec<BTreeMap<usize, R>> = vec![BTreeMap::new(); count];
+        for (i, row) in lower.into_iter().enumerate() {
+            for (j, m) in row.into_iter().filter(|(j, _)| *j != i) {
+                rest[i].insert(j, m);
+                rest[j].insert(i, m);
             }
         }
-        steps.push((k, factors));
+        let (mut steps, mut products) = (Vec::with_capacity(count), 0);
+        let mut left: Vec<usize> = (0..count).collect();
+        while !left.is_empty() {
+            if left.len() == count - coordinates {
+                diagonal[coordinates..].copy_from_slice(&pivots[coordinates..]);
+            }
+            // The row that fills in the least.
+            let at = (0..left.len()).min_by_key(|&at| (left[at] >= coordinates, rest[left[at]].len()))?;
+            let k = left.remove(at);
+            let row = core::mem::take(&mut rest[k]);
+            products += row.len() * (row.len() + 3) / 2;
+            if products > most {
+                return None;
+            }
+            let factors: Vec<(usize, R)> = row.iter().map(|(&i, &m)| (i, m / pivots[k])).collect();
+            for &(i, factor) in &factors {
+                rest[i].remove(&k);
+                pivots[i] -= factor * row[&i];
+                for (&j, &m) in row.range(..i) {
+                    let term = factor * m;
+                    let element = rest[i].get(&j).map_or(-term, |&element| element - term);
+                    rest[i].insert(j, element);
+                    rest[j].insert(i, element);
+                }
+            }
+            steps.push((k, factors));
+        }
+        Some(Self { coordinates, steps, pivots, diagonal })
     }
-    let mut solution = right;
-    for (k, factors) in steps.into_iter().rev() {
-        solution[k] = factors.iter().fold(solution[k] / pivots[k], |x, &(i, factor)| x - factor * solution[i]);
+
+    /// The solution of the system with this right-hand side.
+    pub fn solve(&self, right: Vec<R>) -> Vec<R> {
+        let mut solution = right;
+        for (k, factors) in &self.steps {
+            let known = solution[*k];
+            factors.iter().for_each(|&(i, factor)| solution[i] -= factor * known);
+        }
+        for (k, factors) in self.steps.iter().rev() {
+            solution[*k] =
+                factors.iter().fold(solution[*k] / self.pivots[*k], |x, &(i, factor)| x - factor * solution[i]);
+        }
+        solution
     }
-    let signed = |(k, pair): (usize, [R; 2])| if k < coordinates { pair } else { pair.map(|x| -x) };
-    let guards = diagonal.into_iter().zip(pivots).map(|(element, pivot)| [element, pivot]);
-    Some((solution, guards.enumerate().map(signed).collect()))
+
+    /// The inverse, from the row that was eliminated last: each follows from those behind it, and symmetry gives half of them.
+    pub fn inverse(&self) -> Vec<Vec<R>> {
+        let count = self.pivots.len();
+        let mut inverse = vec![vec![R::zero(); count]; count];
+        let mut known: Vec<usize> = Vec::with_capacity(count);
+        for (k, factors) in self.steps.iter().rev() {
+            let k = *k;
+            for &j in &known {
+                let x = factors.iter().fold(R::zero(), |x, &(i, factor)| x - factor * inverse[i][j]);
+                (inverse[k][j], inverse[j][k]) = (x, x);
+            }
+            inverse[k][k] = factors.iter().fold(self.pivots[k].recip(), |x, &(i, factor)| x - factor * inverse[i][k]);
+            known.push(k);
+        }
+        inverse
+    }
+
+    /// Every pivot behind what it was before it was reduced; of constraints with their signs turned.
+    pub fn guards(&self) -> Vec<[R; 2]> {
+        let signed = |(k, pair): (usize, [R; 2])| if k < self.coordinates { pair } else { pair.map(|x| -x) };
+        self.diagonal
+            .iter()
+            .zip(&self.pivots)
+            .map(|(&element, &pivot)| [element, pivot])
+            .enumerate()
+            .map(signed)
+            .collect()
+    }
 }

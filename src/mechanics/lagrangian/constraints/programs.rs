@@ -4,7 +4,7 @@ use super::Constraints;
 use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::{Balance, Lists, eliminate};
-use crate::lagrangian::linearization::Rate;
+use crate::lagrangian::linearization::{Rate, SparseRows, add};
 use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Program, ROWS, Replay, Tracer};
@@ -93,6 +93,23 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
         }
         balance.right.extend(drift.into_iter().map(|drift| -drift));
         Some(balance)
+    }
+
+    fn record_slopes<'t>(
+        &self,
+        x: &[Tracer<'t, S>],
+        parameters: &[Tracer<'t, S>],
+    ) -> Option<SparseRows<Tracer<'t, S>>> {
+        let (n, _) = self.rows.rate.size;
+        let mut rows = self.rows.rate.slopes(x, &[], &[])?;
+        for (row, beneath) in rows.iter_mut().zip(self.beneath.record_slopes(&x[..3 * n], parameters)?) {
+            beneath.into_iter().for_each(|(column, slope)| add(row, column, slope));
+        }
+        Some(rows)
+    }
+
+    fn whole_coordinates(&self) -> usize {
+        self.beneath.whole_coordinates()
     }
 }
 

@@ -4,16 +4,19 @@ mod differences;
 mod forces;
 mod programs;
 mod rate;
+mod whole;
 
 pub(super) use differences::add_jacobian;
 pub(super) use forces::{Sum, with_force};
 pub(super) use programs::{ProgramSlopes, SlopePrograms};
-pub(super) use rate::{Rate, add};
+pub(super) use rate::{Rate, SparseRows, add};
+pub(super) use whole::Linearized;
 
 use super::constraints::Bordered;
-use super::{EulerLagrange, MechanicsError, Request, Terms};
+use super::{EulerLagrange, MechanicsError, Request, Solved, Terms};
 use crate::linalg::{self, Workspace};
 use crate::scalar::{MatMut, MatRef, Real, Scalar, product_by_loops, update, vectorized};
+use crate::tape::Replay;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use differences::Differences;
@@ -125,7 +128,7 @@ pub struct Gradient<S> {
 ///
 /// With `f = g - c + Q` the motion is `M a = f`, so that `da/dx = M^-1 (df/dx - dM/dx a)`: the inverse times the derivatives of
 /// the equations at fixed accelerations. Those are exact: of a Lagrangian written down by a program of its third derivatives that is
-/// recorded on first use, without what is zero; of a network by the sweeps of its training. Forces given as a closure, and types of yours
+/// recorded on first use, without what is zero; of `[[links]]` by their recursion; of a network by the sweeps of its training. Forces given as a closure, and types of yours
 /// that implement [`EulerLagrange`] themselves, are differentiated numerically, with errors of about `eps^(4/5)`.
 ///
 /// ```
@@ -144,7 +147,9 @@ pub struct Gradient<S> {
 /// ```
 pub struct Linearizer<'a, S: Scalar> {
     model: &'a dyn EulerLagrange<S>,
-    slopes: Box<dyn Slopes<S> + 'a>,
+    /// Of a small model: its program.
+    whole: Option<(Solved<'a, S>, Linearized<S>, Replay<S>)>,
+    slopes: Option<Box<dyn Slopes<S> + 'a>>,
     terms: Terms<S>,
     bordered: Bordered<S>,
     /// Derivatives of the equations, or weights.
@@ -161,7 +166,12 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         Self {
             model,
-            slopes: model.slopes().unwrap_or_else(|| Box::new(Differences::new(model))),
+            whole: model.solved().and_then(|solved| {
+                let whole = solved.linearized()?;
+                let replay = whole.replay();
+                Some((solved, whole, replay))
+            }),
+            slopes: None,
             terms: Terms::default(),
             bordered: Bordered::default(),
             right: Vec::new(),
@@ -191,11 +201,19 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
     /// As of [`EulerLagrange::terms`]; another length of the forces.
     pub fn under(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<&Linearization<S>, MechanicsError> {
         let n = self.model.coordinates();
+        if force.is_none()
+            && let Some((solved, whole, replay)) = &mut self.whole
+            && !solved.is_interrupted()
+            && whole.evaluate(replay, (q, v), &mut self.linearization, &mut self.right)
+        {
+            return Ok(&self.linearization);
+        }
         let (m, batch) = (self.solve_motion(q, v, force)?, q.len() / n.max(1));
         let (size, zero) = (n + m, <S as Real>::zero());
         self.right.clear();
         self.right.resize(batch * size * 2 * n, zero);
-        self.slopes.add_matrices(&held(n, (q, v), &self.terms), &mut self.right)?;
+        let slopes = self.slopes.get_or_insert_with(|| slopes(self.model));
+        slopes.add_matrices(&held(n, (q, v), &self.terms), &mut self.right)?;
         self.solution.resize(batch * size * size, zero);
         let matrices = if m == 0 { &self.terms.mass_matrix } else { self.bordered.matrices() };
         let inverted = linalg::inverse(size, matrices, &mut self.solution, &mut self.workspace);
@@ -257,7 +275,8 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
             field.resize(q.len(), zero);
         }
         let mut products = Products { by_q, by_v, by_parameters };
-        self.slopes.add_products(&held(n, (q, v), &self.terms), &self.solution, &mut products)?;
+        let slopes = self.slopes.get_or_insert_with(|| slopes(self.model));
+        slopes.add_products(&held(n, (q, v), &self.terms), &self.solution, &mut products)?;
         Ok(&self.gradient)
     }
 
@@ -281,6 +300,11 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
             _ => Ok(()),
         }
     }
+}
+
+/// The derivatives of the equations of motion, by differences where a model knows none.
+fn slopes<'a, S: Scalar>(model: &'a dyn EulerLagrange<S>) -> Box<dyn Slopes<S> + 'a> {
+    model.slopes().unwrap_or_else(|| Box::new(Differences::new(model)))
 }
 
 /// States with their accelerations.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::lagrangian::{
-    Description, Dissipation, Lagrangian, Mechanics, Rayleigh, System, WithForces, configure_system,
+    Description, Dissipation, Interruptible, Lagrangian, Mechanics, Rayleigh, System, WithForces, configure_system,
     constrained_descriptions, project, systems,
 };
 use crate::scalar::Dd;
@@ -188,6 +188,36 @@ fn functions_given_as_values_are_differentiated_numerically() {
         let found = linearizer.gradient(&q, &v, &w).unwrap();
         assert!(near(&found.by_q, &gradient.by_q) && near(&found.by_v, &gradient.by_v));
     }
+}
+
+/// A Lagrangian with its sign turned.
+struct Turned;
+
+impl Lagrangian for Turned {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+        -Pair.lagrangian(p, q, v)
+    }
+}
+
+#[test]
+fn what_is_not_positive_definite_and_what_is_interrupted_get_a_second_look() {
+    let (pair, turned) = (Mechanics::<_, f64>::new(Pair, []), Mechanics::<_, f64>::new(Turned, []));
+    let (q, v) = ([0.3, -0.5], [1.0, 0.4]);
+    assert!([&pair as &dyn EulerLagrange<f64>, &turned].iter().all(|model| Linearizer::new(*model).whole.is_some()));
+    let (mut ours, mut theirs) = (Linearizer::new(&turned), Linearizer::new(&pair));
+    let (found, expected) = (ours.at(&q, &v).unwrap(), theirs.at(&q, &v).unwrap());
+    let near = |a: &[f64], b: &[f64], sign: f64| a.iter().zip(b).all(|(a, b)| (a - sign * b).abs() < 1e-13);
+    assert!(near(&found.by_q, &expected.by_q, 1.0) && near(&found.by_v, &expected.by_v, 1.0));
+    assert!(near(&found.by_force, &expected.by_force, -1.0), "{found:?}, {expected:?}");
+    let flag = core::sync::atomic::AtomicBool::new(false);
+    let interruptible = Interruptible::new(&pair, &flag);
+    let mut linearizer = Linearizer::new(&interruptible);
+    assert!(linearizer.at(&q, &v).is_ok());
+    flag.store(true, core::sync::atomic::Ordering::Relaxed);
+    assert!(matches!(linearizer.at(&q, &v), Err(MechanicsError::Interrupted)));
 }
 
 #[test]

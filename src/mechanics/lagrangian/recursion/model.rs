@@ -1,13 +1,16 @@
 //! A chain of links as a model: terms by its Lagrangian, accelerations and forces of single states by recursion.
 
 use super::{Chain, Shape};
+use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::Balance;
+use crate::lagrangian::linearization::SparseRows;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Solved, Terms};
 use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar};
 use crate::tape::Tracer;
 use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -58,6 +61,32 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
         }
         let lower = chain.mass_matrix(q).into_iter().enumerate().map(sparse).collect();
         Some(Balance { coordinates: n, lower, right })
+    }
+
+    /// By forward tangents: links before a joint do not move with it.
+    fn record_slopes<'t>(&self, x: &[Tracer<'t, S>], _: &[Tracer<'t, S>]) -> Option<SparseRows<Tracer<'t, S>>> {
+        let n = self.shape.rows.len();
+        let constants: Vec<_> = self.parameters.iter().map(|&value| Dual::lift(Tracer::constant(value))).collect();
+        let chain = Chain::new(&self.shape, &constants);
+        let (mut rows, mut torques) = (vec![BTreeMap::new(); n], vec![Dual::lift(Tracer::zero()); n]);
+        let mut state: Vec<_> = x.iter().map(|&x| Dual::lift(x)).collect();
+        for column in 0..2 * n {
+            state[column].tangent = Tracer::one();
+            let [q, v, a] = [0, 1, 2].map(|field| &state[field * n..][..n]);
+            chain.inverse_dynamics([q, v, a], &mut Vec::new(), &mut torques);
+            for (k, row) in rows.iter_mut().enumerate() {
+                let slope = (chain.friction(k, v[k]) - torques[k]).tangent;
+                if !slope.is_exact_zero() {
+                    row.insert(column, slope);
+                }
+            }
+            state[column].tangent = Tracer::zero();
+        }
+        Some(rows)
+    }
+
+    fn whole_coordinates(&self) -> usize {
+        usize::MAX
     }
 }
 

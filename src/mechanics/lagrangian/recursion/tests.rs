@@ -1,7 +1,7 @@
 use super::Chain;
 use crate::lagrangian::{
-    Accelerations, Description, EulerLagrange, Request, SystemInstance, Terms, Torques, configure_system,
-    inertia_symbols, inverse_dynamics, loss_symbols,
+    Accelerations, Description, EulerLagrange, Linearization, Linearizer, Request, SystemInstance, Terms, Torques,
+    configure_system, inertia_symbols, inverse_dynamics, loss_symbols,
 };
 use crate::random::RngStream;
 use crate::scalar::Scalar;
@@ -130,6 +130,19 @@ fn single_states_are_those_of_the_terms_with_friction() {
         let mut all = several(&torques);
         Torques::new(model.as_ref()).at(&q, &v, &a, &mut all).unwrap();
         assert!(distance(&all, &several(&torques)) < 1e-14, "{what}");
+    });
+}
+
+#[test]
+fn linearizations_by_recursion_are_those_of_the_lagrangian() {
+    with_arms(|arm, [q, v, _], what| {
+        let model = arm.configured::<f64>().build().unwrap();
+        assert!(model.solved().unwrap().linearized().is_some());
+        let lagrangian = model.inner().unwrap();
+        let (mut ours, mut theirs) = (Linearizer::new(&*model), Linearizer::new(lagrangian));
+        let (found, expected) = (ours.at(q, v).unwrap(), theirs.at(q, v).unwrap());
+        let all = |of: &Linearization<f64>| [&of.acceleration[..], &of.by_q, &of.by_v, &of.by_force].concat();
+        assert!(distance(&all(found), &all(expected)) < 1e-10, "{what}: {found:?} {expected:?}");
     });
 }
 
