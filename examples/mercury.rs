@@ -162,11 +162,11 @@ pub fn show(track: &RecordedTrajectory) -> Outcome<[f64; 3]> {
         println!("{:6} {value:.9e} +- {error:.1e} {}", constant.symbol, constant.unit);
     }
     let rms = both.residuals.iter().map(|r| r.rms).fold(0.0, f64::max);
-    println!("residual {:.2} m, correlation of beta and gamma {:.3}", rms * AU * 1e3, both.correlations[5]);
+    println!("residual {:.2} m, correlation of beta and gamma {:.3}", rms * AU * 1e3, both.correlations.matrix[1][2]);
     // The precession knows beta and gamma in one combination alone.
     let parts = [0.0, -1.0 / 3.0, 2.0 / 3.0];
     let share = (2.0 - values[1][0] + 2.0 * values[2][0]) / 3.0;
-    let covariance = |at: usize| both.correlations[at] * values[at / 3][1] * values[at % 3][1];
+    let covariance = |at: usize| both.correlations.matrix[at / 3][at % 3] * values[at / 3][1] * values[at % 3][1];
     let square = (0..9).filter(|at| parts[at / 3] * parts[at % 3] != 0.0);
     let error = square.map(|at| parts[at / 3] * parts[at % 3] * covariance(at)).sum::<f64>().sqrt();
     println!("(2 + 2 gamma - beta)/3 = {share:.6} +- {error:.1e}");

@@ -204,6 +204,7 @@ pub use physics::{analysis, formula, identification};
 pub use physics::{relativity, symmetry};
 #[cfg(feature = "std")]
 pub use support::cancellation;
+pub use support::findings;
 pub(crate) use support::names;
 #[cfg(feature = "std")]
 #[doc(hidden)]

@@ -1,6 +1,7 @@
 //! CSV files, printed tables, diagrams and the report.
 
-use lnn::report::{Figure, LinePlot, Report, Series, line_plot, text_table};
+use lnn::findings::text_table;
+use lnn::report::{Figure, LinePlot, Report, Series, line_plot};
 use lnn::storage::write_atomically;
 use std::path::Path;
 

@@ -110,6 +110,12 @@ def names(what: str, given: Any) -> list[str]:
     return [str(name) for name in given]
 
 
+def read_result(text: str) -> dict[str, Any]:
+    """A result of the library, with what it says for a terminal and for a notebook."""
+    whole = json.loads(text)
+    return {**whole["result"], "_text": whole["text"], "_html": whole["html"]}
+
+
 def as_json(given: Mapping[str, Any]) -> str:
     """Choices as JSON; one that JSON does not hold is named."""
     return json.dumps({str(key): _held(str(key), x) for key, x in given.items()})

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _lnn
-from ._arrays import as_json, bounds_of, doubles, doubles_list, real, states, thread_count, whole
+from ._arrays import as_json, bounds_of, doubles, doubles_list, read_result, real, states, thread_count, whole
 from ._results import Certificate, Formula, Geometry, Linearization, OwnConstraints, Symmetries, Trajectory
 from .reader import files
 from .reader.functions import DescribedModel, Functions, Terms
@@ -228,8 +228,9 @@ class Mechanics:
         """
         points = None if points is None else whole("points", points, 1)
         tolerance = None if tolerance is None else real("tolerance", tolerance, positive=True)
-        found = self._subject.symmetries(bounds_of(region), basis, points, whole("seed", seed), tolerance)
-        fields = json.loads(found)
+        fields = read_result(self._subject.symmetries(bounds_of(region), basis, points, whole("seed", seed), tolerance))
+        for name in "system", "closes", "functions", "seed":
+            del fields[name]
         for name in "structure_constants", "singular_values":
             fields[name] = np.array(fields[name], float)
         return Symmetries(**fields)
@@ -242,7 +243,7 @@ class Mechanics:
         seed : int
             Of the states at which the mass matrix is looked at.
         """
-        found = json.loads(self._subject.constraints(whole("seed", seed)))
+        found = read_result(self._subject.constraints(whole("seed", seed)))
         of = lambda key: {constraint["name"]: constraint[key] for constraint in found["constraints"]}
         return OwnConstraints(
             formulas=of("formula"),
@@ -252,6 +253,8 @@ class Mechanics:
             signature=found["signature"] and tuple(found["signature"]),
             states=found["states"],
             open_states=found["open_states"],
+            _text=found["_text"],
+            _html=found["_html"],
         )
 
     def formula(
@@ -301,7 +304,8 @@ class Mechanics:
             signature = whole("signature", positive), whole("signature", negative)
         condition = None if condition is None else real("condition", condition, positive=True)
         limits = real("seconds", seconds, positive=True), whole("boxes", boxes, 1), thread_count(threads)
-        fields = json.loads(self._subject.certify(bounds_of(region), signature, condition, *limits))
+        fields = read_result(self._subject.certify(bounds_of(region), signature, condition, *limits))
+        fields["limit"], fields["condition"] = fields["condition"], fields.pop("condition_bound")
         return Certificate(**{**fields, "signature": tuple(fields["signature"])})
 
 

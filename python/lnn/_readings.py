@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from . import _lnn
-from ._arrays import as_json, doubles_list, names, real, thread_count, whole
+from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
 from ._recorded import errors_beside, recorded
 from ._mechanics import System
 from ._results import Bodies, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
@@ -43,7 +42,7 @@ def find_constraints(
     more = {"dt": dt, "t": t, "v": v, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
     degrees = whole("degree", degree, 1, 8), whole("velocity_degree", velocity_degree, 0, 8)
-    found = json.loads(_lnn.find_constraints(motion, degrees))
+    found = read_result(_lnn.find_constraints(motion, degrees))
     of = lambda c: Constraint(**{**c, "range": {name: tuple(ends) for name, ends in c["range"].items()}})
     found["constraints"], found["noise"] = tuple(map(of, found["constraints"])), np.array(found["noise"])
     return Constraints(**found)
@@ -184,18 +183,18 @@ def identify(
     choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
     choices["segment"] = None if segment is None else real("segment", segment, positive=True)
     choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors}
-    found = json.loads(_lnn.identify(motion, system._subject, as_json(choices)))
-    found["constants"] = {constant["symbol"]: IdentifiedConstant(**constant) for constant in found["constants"]}
+    found = read_result(_lnn.identify(motion, system._subject, as_json(choices)))
+    found["constants"] = {symbol: IdentifiedConstant(**constant) for symbol, constant in found["constants"].items()}
     found["obstacles"] = tuple(found["obstacles"])
     found["sensors"] = tuple(SensorConstant(**sensor) for sensor in found["sensors"])
     unknowns = len(found["constants"]) + len(found["sensors"])
-    found["correlations"] = np.array(found["correlations"], float).reshape(unknowns, unknowns)
+    found["correlations"] = np.array(found["correlations"]["matrix"], float).reshape(unknowns, unknowns)
     found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
     found["combinations"] = tuple(Combination(**known) for known in found["combinations"])
     found["bodies"] = Bodies(**{**found["bodies"], "moved": tuple(found["bodies"]["moved"])}) if found["bodies"] else None
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
     found["force_noise"] = tuple(found["force_noise"])
-    found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
+    found["outliers"] = tuple(Outlier(**outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)
 
 
@@ -225,14 +224,14 @@ def formula_choices(
 
 def read_formula(text: str) -> Formula:
     """The formula that the library found."""
-    found = json.loads(text)
+    found = read_result(text)
     number = lambda x: np.nan if x is None else x
     terms = found["terms"]
     column = lambda key: np.array([number(term[key]) for term in terms], float)
     return Formula(
         verdict=found["verdict"],
         lagrangian=found["lagrangian"],
-        dissipation=found["dissipation"],
+        dissipation=found.get("dissipation", "0"),
         terms=tuple(term["term"] for term in terms),
         coefficients=column("coefficient"),
         standard_errors=column("standard_error"),
@@ -249,11 +248,13 @@ def read_formula(text: str) -> Formula:
         tried=tuple(found["tried"]),
         doubts=tuple(found["doubts"]),
         notes=tuple(found["notes"]),
-        left=tuple(map(tuple, found["left"])),
+        left=tuple((found["coordinates"][part.pop("coordinate")], *part.values()) for part in found["left"]),
         searched=found["searched"],
         removed=found["removed"],
         coordinates=tuple(found["coordinates"]),
         toml=found["toml"],
         rust=found["rust"],
         _latex=tuple(found["latex"]),
+        _text=found["_text"],
+        _html=found["_html"],
     )

@@ -25,6 +25,19 @@ def _axes(ax: Axes | None) -> Axes:
     return plt.subplots()[1]
 
 
+class _Shown:
+    """A result that prints as the program prints it, and as tables in a notebook."""
+
+    _text: str
+    _html: str
+
+    def __str__(self) -> str:
+        return self._text
+
+    def _repr_html_(self) -> str:
+        return self._html
+
+
 @dataclass(frozen=True)
 class Linearization:
     """Accelerations and their derivatives, a row for each acceleration.
@@ -150,7 +163,7 @@ class Geometry:
 
 
 @dataclass(frozen=True)
-class Symmetries:
+class Symmetries(_Shown):
     """Point symmetries found in a Lagrangian.
 
     Attributes
@@ -165,12 +178,20 @@ class Symmetries:
         Every vector field as a formula, and the function by whose rate it changes L.
     structure_constants : (k, k, k)
     time_translation : bool
-        Whether ``p.v - L`` is conserved: the energy, or ``g(v, v)/2`` along geodesics of a metric with a time.
+        Whether what `invariant` names is conserved.
     singular_values : (unknowns,)
-    basis : str
-        Highest degrees of the functions that fields are made of.
-    points : int
-        States that were looked at.
+    basis : dict of str to int
+        Highest degrees of the functions that fields are made of, by family.
+    points, singular_states : int
+        States that were looked at, and those among them at which the mass matrix is singular.
+    killing_form_signature : (int, int, int) or None
+        Negative, positive and zero eigenvalues of the Killing form.
+    closure : float or None
+        Rest of the commutators beside combinations of the fields, relative.
+    conserved : list of bool
+        Of every field, whether its charge is conserved: friction may change it.
+    invariant : str
+        What is conserved because L does not depend on time: ``"energy"``, ``"g(v, v)"``, ``"p.v - L"`` or ``"nothing"``.
     """
 
     count: int | None
@@ -181,8 +202,15 @@ class Symmetries:
     structure_constants: np.ndarray
     time_translation: bool
     singular_values: np.ndarray
-    basis: str
+    basis: dict[str, int]
     points: int
+    killing_form_signature: tuple[int, int, int] | None
+    closure: float | None
+    conserved: list[bool]
+    invariant: str
+    singular_states: int
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
     def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws the singular values, those of symmetries before the gap, into `ax` or new axes of matplotlib, and returns these."""
@@ -218,7 +246,7 @@ class Constraint:
 
 
 @dataclass(frozen=True)
-class Constraints:
+class Constraints(_Shown):
     """Constraints that were found in motion.
 
     Attributes
@@ -231,6 +259,7 @@ class Constraints:
         The next combination of coordinates varies by so many times as much.
     trajectories, refuted : int
         Trajectories, and candidates that did not hold on those that were left out.
+    coordinates : list of str
     noise : (n,)
         Of each coordinate over its size: smaller deviations are not seen.
     still : dict of str to str
@@ -247,6 +276,9 @@ class Constraints:
     noise: np.ndarray
     still: dict[str, str]
     limits: list[str]
+    coordinates: list[str]
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -256,7 +288,7 @@ class Constraints:
 
 
 @dataclass(frozen=True)
-class OwnConstraints:
+class OwnConstraints(_Shown):
     """Constraints of a system, and the directions that no equation moves.
 
     Attributes
@@ -282,10 +314,12 @@ class OwnConstraints:
     signature: tuple[int, int] | None
     states: int
     open_states: int
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
 
 @dataclass(frozen=True)
-class Formula:
+class Formula(_Shown):
     """A Lagrangian as a formula, and a dissipation function if there is one; arrays have an entry for each term.
 
     Attributes
@@ -347,11 +381,13 @@ class Formula:
     coordinates: tuple[str, ...]
     toml: str = field(repr=False)
     rust: str = field(repr=False)
-    _latex: tuple[str, str] = field(repr=False)
+    _latex: tuple[str, ...] = field(repr=False)
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
     def latex(self, dissipation: bool = False) -> str:
         """L, or D, in LaTeX."""
-        return self._latex[dissipation]
+        return self._latex[dissipation] if dissipation < len(self._latex) else "0"
 
     def sympy(self, dissipation: bool = False) -> sympy.Expr:
         """L, or D, as an expression of SymPy in real symbols: ``x`` for a coordinate, ``x_dot`` for its velocity."""
@@ -538,7 +574,7 @@ class Outlier:
 
 
 @dataclass(frozen=True)
-class Identified:
+class Identified(_Shown):
     """Constants of a system with their errors, and how far they can be trusted.
 
     Attributes
@@ -578,6 +614,8 @@ class Identified:
         Samples and segments that were followed, the usual length of these in s, integration steps from sample to sample.
     between : str or None
         How known forces were taken between the samples.
+    robust : bool
+        Whether residuals beyond three standard deviations counted linearly.
     """
 
     constants: dict[str, IdentifiedConstant]
@@ -602,7 +640,10 @@ class Identified:
     segment_seconds: float
     substeps: int
     between: str | None
+    robust: bool
     _form: System = field(repr=False)
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
     def system(self) -> System:
         """The system with the constants that were found."""
@@ -618,7 +659,7 @@ class Identified:
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(_Shown):
     """Shares of a region in which the mass matrix is proven to have its signature, or not to.
 
     Attributes
@@ -631,6 +672,8 @@ class Certificate:
         A state whose mass matrix is proven to be wrong: ``q``, ``v``, ``eigenvalues``.
     condition : float or None
         Proven bound of the condition number in the certified share.
+    limit : float or None
+        Largest condition number that was allowed.
     by_construction : bool
         Whether the structure of the model proves it everywhere.
     boxes, seconds
@@ -644,8 +687,11 @@ class Certificate:
     boxes: int
     witness: dict | None
     condition: float | None
+    limit: float | None
     by_construction: bool
     seconds: float
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
 
 @dataclass(frozen=True)

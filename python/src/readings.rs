@@ -7,8 +7,11 @@ use crate::subject::Subject;
 use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
 use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
 use lnn::identification::{Between, IdentifyOptions, identify as identified};
+use lnn::findings::Findings;
 use lnn::recording::smooth::SmoothOptions;
+use lnn::report::Report;
 use pyo3::prelude::*;
+use serde::Serialize;
 use serde_json::json;
 
 /// The constraints of recorded motion, as JSON; `degrees` are those of functions of the coordinates and of factors of velocities.
@@ -26,7 +29,7 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
         let samples = samples.watched(&watch.cancellation());
         let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
-        serde_json::to_string(&found).map_err(runtime)
+        shown(&found, &found.findings())
     })?
 }
 
@@ -42,7 +45,7 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
         if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
             return Err(value(format_args!("noise: expected {n} numbers, found {}", noise.len())));
         }
-        Ok(described(&formula_of_motion(&recording, &options).map_err(value)?, &name))
+        formula_shown(&formula_of_motion(&recording, &options).map_err(value)?, &name)
     })?
 }
 
@@ -59,18 +62,8 @@ pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str)
         if options.errors.is_empty() {
             options.errors = std::mem::take(&mut loaded.errors);
         }
-        let found = identified(&instance, &loaded.recording, &options).map_err(value)?;
-        let outliers: Vec<_> = found
-            .outliers
-            .iter()
-            .map(|o| {
-                let (trajectory, row) = (&loaded.recording.tracks[o.track].name, loaded.rows[o.track].row(o.sample));
-                json!([trajectory, row, o.time, o.coordinate, o.size])
-            })
-            .collect();
-        let mut whole = serde_json::to_value(&found).map_err(runtime)?;
-        whole["outliers"] = outliers.into();
-        Ok(whole.to_string())
+        let found = identified(&instance, &loaded.recording, &options).map_err(value)?.with_rows_of(&loaded);
+        shown(&found, &found.findings())
     })?
 }
 
@@ -127,20 +120,14 @@ impl FormulaChoices {
     }
 }
 
-/// A formula as JSON.
-pub fn described(found: &FoundFormula, name: &str) -> String {
-    json!({
-        "verdict": found.verdict,
-        "lagrangian": found.text(false), "dissipation": found.text(true),
-        "latex": [found.latex(false), found.latex(true)],
-        "rust": found.rust(), "toml": found.system_file(name),
-        "terms": found.terms, "residual": found.residual,
-        "noise": found.noise, "noise_resolved": found.noise_resolved,
-        "searched": found.searched.0, "removed": found.searched.1,
-        "basis": found.basis, "tried": found.tried, "blocks": found.blocks,
-        "rival": found.rival, "several": found.several, "doubts": found.doubts, "notes": found.notes,
-        "left": found.left.iter().map(|left| json!([found.coordinates[left.coordinate], left.low, left.high, left.residual, left.samples])).collect::<Vec<_>>(),
-        "coordinates": found.coordinates,
-    })
-    .to_string()
+/// A formula, and the system file of this name, as JSON.
+pub fn formula_shown(found: &FoundFormula, name: &str) -> PyResult<String> {
+    shown(&found.summary(name), &found.findings())
+}
+
+/// A result as JSON, with what it says for a terminal and for a notebook.
+pub fn shown(result: &impl Serialize, findings: &Findings) -> PyResult<String> {
+    let html = Report::new("").findings(findings);
+    let whole = json!({ "result": result, "text": findings.to_string(), "html": html.fragment() });
+    serde_json::to_string(&whole).map_err(runtime)
 }

@@ -2,7 +2,7 @@
 
 use crate::attend::{left, whole};
 use crate::errors::{pipeline, runtime, value};
-use crate::readings::{FormulaChoices, described};
+use crate::readings::{FormulaChoices, formula_shown, shown};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
 use lnn::constraints::{EXAMINED_STATES, examine};
 use lnn::formula::{MODEL_STATES, formula_of_model};
@@ -162,6 +162,13 @@ impl Subject {
             return Err(value("region: nearly all of its states are outside the domain of the system"));
         }
         Ok((q, v))
+    }
+
+    fn name(&self) -> &str {
+        match &self.kind {
+            Kind::System(configured, _) => &configured.system.name,
+            Kind::Model(header, ..) => &header.system,
+        }
     }
 
     fn periodic(&self) -> Vec<bool> {
@@ -545,20 +552,8 @@ impl Subject {
             let model = Interruptible::new(this.moving(), &watch.interrupt);
             most_symmetries(&model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
         })??;
-        let closed = found.algebra.as_ref().filter(|algebra| algebra.closes);
-        Ok(json!({
-            "count": found.separation.count,
-            "gap": found.separation.gap,
-            "name": closed.and_then(|algebra| algebra.name.clone()),
-            "fields": found.fields.iter().map(|field| field.text(&found.basis)).collect::<Vec<_>>(),
-            "gauge_functions": found.fields.iter().map(|field| field.gauge_text(&found.basis)).collect::<Vec<_>>(),
-            "structure_constants": closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
-            "time_translation": this.moving().conserves_energy(),
-            "singular_values": found.singular_values,
-            "basis": degrees.to_string(),
-            "points": found.states,
-        })
-        .to_string())
+        let summary = found.summary(this.name(), degrees, seed, None);
+        shown(&summary, &summary.findings())
     }
 
     /// Its constraints, and the directions that no equation moves, as JSON.
@@ -569,9 +564,10 @@ impl Subject {
         let found = whole(py, None, |watch| {
             let (q, v) = self.sampled(&self.interest(), EXAMINED_STATES, seed)?;
             let model = Interruptible::new(self.moving(), &watch.interrupt);
-            Ok::<_, PyErr>(examine(&model, &formulas, (&q, &v)))
+            let about = (self.name(), &self.columns[..self.n()]);
+            Ok::<_, PyErr>(examine(about, &model, &formulas, (&q, &v)))
         })??;
-        serde_json::to_string(&found).map_err(runtime)
+        shown(&found, &found.findings())
     }
 
     /// The Lagrangian as a formula, as JSON.
@@ -583,7 +579,7 @@ impl Subject {
             options.cancellation = watch.cancellation();
             let (q, v) = self.sampled(&self.interest(), MODEL_STATES, options.seed)?;
             let found = formula_of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
-            Ok(described(&found, &name))
+            formula_shown(&found, &name)
         })?
     }
 
@@ -627,14 +623,7 @@ impl Subject {
             }
         })?
         .map_err(value)?;
-        Ok(json!({
-            "signature": [signature.positive, signature.negative],
-            "certified": found.certified, "refuted": found.refuted, "open": found.open, "boxes": found.boxes,
-            "witness": found.witness.map(|w| json!({ "q": w.q, "v": w.v, "eigenvalues": w.eigenvalues })),
-            "condition": found.condition, "by_construction": found.by_construction,
-            "seconds": found.elapsed.as_secs_f64(),
-        })
-        .to_string())
+        shown(&found, &found.findings(&self.columns))
     }
 
     /// The page of a model, HTML.

@@ -3,11 +3,13 @@
 //! | module | contents |
 //! |---|---|
 //! | [`cancellation`] | the flag that ends a long search, and reports of how far it is |
+//! | [`findings`] | what a result says, in sentences and tables |
 //! | [`names`] | nearest known name for error messages, numbers and counts in words |
 //! | [`storage`] | files: read within limits, written completely or not at all; locks of directories; the container of model files and checkpoints |
 
 #[cfg(feature = "std")]
 pub mod cancellation;
+pub mod findings;
 pub mod names;
 #[cfg(feature = "std")]
 pub mod storage;

@@ -9,9 +9,9 @@ use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
-use crate::names::{pluralize, unknown};
+use crate::names::unknown;
 use crate::network::file::{Header, MAX_COORDINATES};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -70,6 +70,15 @@ fn signature(text: &str) -> Result<Signature, String> {
     found.ok_or_else(|| "expected P,N, the numbers of positive and of negative eigenvalues".to_string())
 }
 
+/// What was proven, and of which columns.
+#[derive(Serialize)]
+struct Named {
+    system: String,
+    columns: Vec<String>,
+    #[serde(flatten)]
+    certificate: Certificate,
+}
+
 /// Searches and prints what was proven.
 ///
 /// # Errors
@@ -78,7 +87,7 @@ fn signature(text: &str) -> Result<Signature, String> {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let stop = interrupt::flag().map_err(CliError::signals)?;
     let refused = |error: CertificateError| CliError::usage(error);
-    let (name, columns, options, found) = match &args.subject.model {
+    let (name, columns, found) = match &args.subject.model {
         Some(path) => {
             let Learned { header, network } = Learned::<f64>::load_free(path)?;
             let time = learned_system(&header).ok().and_then(|system| system.time_like);
@@ -86,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
                 args.options(header.columns.len() / 2, header.architecture.time_like.or(time).is_some(), &stop);
             let region = args.region(&header.columns, trained(&header))?;
             let found = certify_network(&network, &region, &options).map_err(refused)?;
-            (header.system, header.columns, options, found)
+            (header.system, header.columns, found)
         }
         None => {
             let system = system_arg::system(args.subject.system.as_deref().unwrap_or_default())?;
@@ -97,19 +106,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             let options = args.options(n, configured.system.time_like.is_some(), &stop);
             let region = args.region(&columns, configured.system.validation(n))?;
             let found = certify_system(&configured, &region, &options).map_err(refused)?;
-            (configured.system.name.to_string(), columns, options, found)
+            (configured.system.name.to_string(), columns, found)
         }
     };
-    if args.json || args.format == TableOrJson::Json {
-        output::print(&format!("{}\n", object(&name, &columns, &options, &found)))?;
-    } else {
-        output::print(&table(&columns, &options, &found))?;
-    }
+    let open = found.open;
+    let named = Named { system: name, columns, certificate: found };
+    let json = args.json || args.format == TableOrJson::Json;
+    output::print(&output::shown(&named, json, |named| named.certificate.findings(&named.columns))?)?;
     if stop.load(Ordering::Relaxed) {
-        return Err(CliError::interrupted(format_args!(
-            "interrupted, {:.4} % of the region is open",
-            100.0 * found.open
-        )));
+        return Err(CliError::interrupted(format_args!("interrupted, {:.4} % of the region is open", 100.0 * open)));
     }
     Ok(())
 }
@@ -153,54 +158,6 @@ impl Args {
         }
         Ok(bounds)
     }
-}
-
-fn object(name: &str, columns: &[String], options: &Options<'_>, found: &Certificate) -> Value {
-    let witness = found.witness.as_ref().map(|witness| {
-        let state = columns.iter().zip(witness.q.iter().chain(&witness.v));
-        let state: Map<String, Value> = state.map(|(column, x)| (column.clone(), json!(x))).collect();
-        json!({ "state": state, "eigenvalues": witness.eigenvalues })
-    });
-    json!({
-        "system": name,
-        "signature": [options.signature.positive, options.signature.negative],
-        "condition": options.condition,
-        "certified": found.certified,
-        "refuted": found.refuted,
-        "open": found.open,
-        "boxes": found.boxes,
-        "witness": witness,
-        "by_construction": found.by_construction,
-        "condition_bound": found.condition,
-        "seconds": found.elapsed.as_secs_f64(),
-    })
-}
-
-fn table(columns: &[String], options: &Options<'_>, found: &Certificate) -> String {
-    let Signature { positive, negative } = options.signature;
-    let limit = options.condition.map_or(String::new(), |k| format!(" and a condition number of at most {k}"));
-    let boxes = pluralize(found.boxes, "box", "boxes");
-    let mut text = format!(
-        "Share of the region where the mass matrix is proven to have {positive} positive and {negative} negative eigenvalues{limit}:\n"
-    );
-    let share = |name: &str, x: f64| format!("  {name:<12} {:>9.4} %\n", 100.0 * x);
-    text += &share("certified", found.certified);
-    text += &share("refuted", found.refuted);
-    text += &share("open", found.open);
-    if found.by_construction {
-        text += "The structure of the model proves the signature at every state.\n";
-    }
-    if let Some(bound) = found.condition {
-        text += &format!("Condition number in the certified share: at most {bound:.6}.\n");
-    }
-    if let Some(witness) = &found.witness {
-        let state = columns.iter().zip(witness.q.iter().chain(&witness.v));
-        text += "A state where the opposite is proven:\n";
-        text += &state.map(|(column, x)| format!("  {column:<12} {x:>24.16e}\n")).collect::<String>();
-        let values = witness.eigenvalues.iter().map(|x| format!("  {:<12} {x:>24.16e}\n", "eigenvalue"));
-        text += &values.collect::<String>();
-    }
-    text + &format!("{boxes}, {:.2} s\n", found.elapsed.as_secs_f64())
 }
 
 #[cfg(test)]

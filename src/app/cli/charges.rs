@@ -2,8 +2,8 @@
 
 use crate::cli::CliError;
 use crate::cli::probe::Probe;
+use crate::findings::text_table;
 use crate::names::rounded;
-use crate::report::text_table;
 use crate::rollout::Trajectory;
 use crate::symmetry::{charges, unknowns};
 use serde::Serialize;

@@ -3,11 +3,11 @@
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
 use crate::configuration::Precision;
+use crate::findings::text_table;
 use crate::names::{WIDTH, percent, percentage, pluralize, rounded, wrap_text};
 use crate::pipeline::{FitOptions, PreparedFit};
 use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Warning, survey};
 use crate::recording::{LARGE_ERROR, Targets};
-use crate::report::text_table;
 use serde::Serialize;
 use std::fmt::Write;
 

@@ -5,8 +5,8 @@ use crate::cli::probe::{Bound, Probe, bound};
 use crate::cli::source::parameter;
 use crate::cli::symmetries::degrees;
 use crate::cli::{CliError, number, output};
+use crate::findings::text_table;
 use crate::names::{WIDTH, number as digits, rounded, wrap_text};
-use crate::report::text_table;
 use crate::symmetry::{Comparison, Degrees, compare, unknowns};
 use serde::Serialize;
 

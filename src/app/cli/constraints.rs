@@ -7,17 +7,14 @@ use crate::cli::recording_args::RecordingArgs;
 use crate::cli::watch::search;
 use crate::cli::{CliError, config, output};
 use crate::constraints::{
-    ConstraintKind, ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraint,
-    FoundConstraints, MOST_DEGREE, MotionSamples, OwnConstraint, examine, find_constraints,
+    ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraints, MOST_DEGREE,
+    MotionSamples, examine, find_constraints,
 };
 use crate::lagrangian::{EulerLagrange, FormulaConstraints};
-use crate::names::{percent, pluralize, rounded};
 use crate::recording::smooth::SmoothOptions;
-use crate::report::text_table;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -65,15 +62,6 @@ struct Table {
     constraints: BTreeMap<String, String>,
 }
 
-/// What there is to say of a system or a model, as JSON.
-#[derive(Serialize)]
-struct Examined<'a> {
-    system: &'a str,
-    gap: Option<f64>,
-    #[serde(flatten)]
-    examined: &'a ExaminedLagrangian,
-}
-
 /// Looks and says what it found.
 ///
 /// # Errors
@@ -100,11 +88,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(out) = &out {
         write_table(out, &found)?;
     }
-    if args.json {
-        let text = serde_json::to_string(&found).map_err(CliError::data)?;
-        return OutputFile::print(out, &format!("{text}\n"));
-    }
-    OutputFile::print(out, &text(&found, &recording.coordinates))
+    OutputFile::print(out, &output::shown(&found, args.json, FoundConstraints::findings)?)
 }
 
 /// Writes the constraints of the system as the table that a system file takes.
@@ -117,70 +101,6 @@ fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), Cli
     out.write(text.as_bytes())
 }
 
-/// The findings as text.
-fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
-    let mut text = String::new();
-    let kinds = |kind: ConstraintKind| match kind {
-        ConstraintKind::Holonomic => "holonomic",
-        ConstraintKind::Nonholonomic => "nonholonomic",
-        ConstraintKind::PerTrajectory => "per trajectory",
-        ConstraintKind::Nearly => "nearly",
-        ConstraintKind::Branching => "branching",
-    };
-    let on = pluralize(found.trajectories, "trajectory", "trajectories");
-    let _ = match found.count {
-        0 => writeln!(text, "no constraints found on {on}"),
-        count => writeln!(text, "{} found within the noise on {on}", pluralize(count, "constraint", "constraints")),
-    };
-    let row = |found: &FoundConstraint| {
-        let sign = if found.kind == ConstraintKind::PerTrajectory { "const" } else { "0" };
-        vec![kinds(found.kind).to_string(), format!("{} = {sign}", found.formula), rounded(found.defect, 3)]
-    };
-    if !found.constraints.is_empty() {
-        let rows: Vec<Vec<String>> = found.constraints.iter().map(row).collect();
-        let _ = writeln!(text, "\n{}", text_table(&["kind", "formula", "defect"], &rows).trim_end());
-    }
-    let noise: Vec<String> = coordinates
-        .iter()
-        .zip(&found.noise)
-        .map(|(name, &noise)| format!("{name} {}", percent(noise.max(1e-6))))
-        .collect();
-    let _ = writeln!(text, "\nsmaller deviations are not seen than the noise: {}", noise.join(", "));
-    for (column, how) in &found.still {
-        let _ = writeln!(text, "{column} {how}; it takes no part");
-    }
-    let has = |kind| found.constraints.iter().any(|found| found.kind == kind);
-    if has(ConstraintKind::Nearly) {
-        let _ = writeln!(
-            text,
-            "nearly: vanishes, but by more than the noise explains; something stiff, or a curve that looks straight"
-        );
-    }
-    if has(ConstraintKind::Branching) {
-        let _ = writeln!(
-            text,
-            "branching: its gradient vanishes along the motion, where a second branch begins; no roll-out can be held by it"
-        );
-    }
-    if let Some(gap) = found.gap {
-        let _ = writeln!(text, "the next combination of coordinates varies by {} times as much", rounded(gap, 3));
-    }
-    for limit in &found.limits {
-        let _ = writeln!(text, "{limit}");
-    }
-    if found.refuted > 0 {
-        let what = pluralize(found.refuted, "candidate does", "candidates do");
-        let _ = writeln!(text, "{what} not hold on trajectories that were left out, and are not listed");
-    }
-    if found.trajectories == 1 && !found.constraints.is_empty() {
-        let _ = writeln!(
-            text,
-            "one trajectory does not tell what is imposed from what its motion conserves: record others"
-        );
-    }
-    text
-}
-
 /// What a system or a model says of its constraints and of its degeneracy.
 fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if args.out.is_some() {
@@ -190,45 +110,16 @@ fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     }
     let probe = Probe::with_constraints(name)?;
     let (q, v) = probe.states(EXAMINED_STATES, 0)?;
-    let examined = examine(probe.model.as_ref(), &probe.constraints, (&q, &v));
+    let n = probe.model.coordinates();
+    let about = (probe.name.as_str(), &probe.columns[..n]);
+    let examined = examine(about, probe.model.as_ref(), &probe.constraints, (&q, &v));
     if examined.states == 0 {
         return Err(CliError::data(format_args!(
             "{}: the mass matrix is finite at none of the states of interest",
             probe.name
         )));
     }
-    if args.json {
-        let json = Examined { system: &probe.name, gap: None, examined: &examined };
-        let text = serde_json::to_string(&json).map_err(CliError::data)?;
-        return output::print(&format!("{text}\n"));
-    }
-    let mut text = format!("{}: {}\n", probe.name, pluralize(examined.count, "constraint", "constraints"));
-    for OwnConstraint { name, formula, .. } in &examined.constraints {
-        let _ = writeln!(text, "  {name:<12} {formula} = 0");
-    }
-    for name in &examined.redundant {
-        let _ = writeln!(text, "  {name:<12} follows from the others");
-    }
-    let _ = match examined.open {
-        0 => writeln!(
-            text,
-            "the motion is determined: the mass matrix has full rank within the constraints at {} states",
-            examined.states
-        ),
-        open => writeln!(
-            text,
-            "the Lagrangian is degenerate along {} at {} of {} states:",
-            pluralize(open, "direction", "directions"),
-            examined.open_states,
-            examined.states
-        ),
-    };
-    for direction in &examined.null_directions {
-        let parts: Vec<String> =
-            probe.columns.iter().zip(direction).map(|(name, x)| format!("{name} {}", rounded(*x, 4))).collect();
-        let _ = writeln!(text, "  {}", parts.join(", "));
-    }
-    output::print(&text)
+    output::print(&output::shown(&examined, args.json, ExaminedLagrangian::findings)?)
 }
 
 /// The table [constraints] of a file.

@@ -8,6 +8,7 @@ use crate::cli::source::parameter;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output, system_arg};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
+use crate::findings::text_table;
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{WIDTH, pluralize, wrap_text};
 use crate::pipeline::{
@@ -16,7 +17,7 @@ use crate::pipeline::{
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::relativity::depends_on_time;
-use crate::report::{Curve, text_table};
+use crate::report::Curve;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

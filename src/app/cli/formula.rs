@@ -5,14 +5,13 @@ use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::watch::search;
-use crate::cli::{CliError, parse_system};
+use crate::cli::{CliError, output, parse_system};
 use crate::formula::{
     Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, formula_of_model,
     formula_of_motion,
 };
 use crate::identification::Between;
 use crate::recording::LoadedRecording;
-use crate::report::formula_text;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -141,9 +140,9 @@ impl Args {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
     let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
-    let (found, of_model) = match args.recording.data.as_slice() {
-        [path] if is_model(path) => (of_model(args, path)?, true),
-        _ => (of_motion(args)?, false),
+    let found = match args.recording.data.as_slice() {
+        [path] if is_model(path) => of_model(args, path)?,
+        _ => of_motion(args)?,
     };
     if let Some(out) = &out {
         let text = found.system_file(&args.name);
@@ -152,11 +151,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         out.write(text.as_bytes())?;
     }
     if args.json {
-        let json = found.summary(args.friction, args.seed);
-        return OutputFile::print(out, &(serde_json::to_string(&json).map_err(CliError::data)? + "\n"));
+        return OutputFile::print(out, &output::json(&found.summary(&args.name))?);
     }
     let text = match args.format {
-        Format::Text => formula_text(&found, args.friction, of_model),
+        Format::Text => found.findings().to_string(),
         Format::Toml => found.system_file(&args.name),
         Format::Latex => {
             let friction = if args.friction { format!("D = {}\n", found.latex(true)) } else { String::new() };

@@ -5,19 +5,12 @@ use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::source::parameter;
 use crate::cli::watch::search;
-use crate::cli::{CliError, parse_system, system_arg};
-use crate::identification::{
-    Between, Bodies, Constant, Identified, IdentifyError, IdentifyOptions, Undetermined, identify,
-};
+use crate::cli::{CliError, output, parse_system, system_arg};
+use crate::identification::{Between, Identified, IdentifyError, IdentifyOptions, identify};
 use crate::lagrangian::{SystemInstance, configure_system};
-use crate::names::{number, pluralize, rounded};
+use crate::names::pluralize;
 use crate::recording::{Columns, LoadedRecording, Targets};
-use crate::report::text_table;
-use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
-
-/// Outliers that are printed.
-const SHOWN: usize = 10;
 
 /// Arguments.
 #[derive(Clone, Debug, clap::Args)]
@@ -139,8 +132,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(out) = &out {
         write(out, &instance, &found)?;
     }
-    let text = if args.json { json_text(&found, &reading)? } else { text(&found, &reading, args) };
-    OutputFile::print(out, &text)
+    let found = found.with_rows_of(&reading);
+    OutputFile::print(out, &output::shown(&found, args.json, Identified::findings)?)
 }
 
 /// The recording, its columns by the names of the system unless others are given.
@@ -200,184 +193,4 @@ fn write(out: &OutputFile<'_>, instance: &SystemInstance<f64>, found: &Identifie
     let text = toml::to_string(&description).map_err(CliError::data)?;
     parse_system(&text).map_err(|(_, problem)| CliError::data(format_args!("--out: no system file: {problem}")))?;
     out.write(text.as_bytes())
-}
-
-/// Name of the file and the row of a sample.
-fn place(reading: &LoadedRecording, track: usize, sample: usize) -> (String, u64) {
-    (reading.recording.tracks[track].name.clone(), reading.rows[track].row(sample))
-}
-
-fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, CliError> {
-    let constants: Map<String, Value> = found
-        .constants
-        .iter()
-        .map(|c| {
-            let value =
-                json!({ "value": c.value, "standard_error": c.standard_error, "unit": c.unit, "start": c.start, "at_bound": c.at_bound });
-            (c.symbol.clone(), value)
-        })
-        .collect();
-    let names: Vec<String> =
-        found.constants.iter().map(|c| c.symbol.clone()).chain(found.sensors.iter().map(sensor)).collect();
-    let m = names.len();
-    let matrix: Vec<&[f64]> = found.correlations.chunks(m.max(1)).collect();
-    let outliers: Vec<Value> = found
-        .outliers
-        .iter()
-        .map(|o| {
-            let (trajectory, row) = place(reading, o.track, o.sample);
-            json!({ "trajectory": trajectory, "row": row, "t": o.time, "coordinate": o.coordinate, "size": o.size })
-        })
-        .collect();
-    let whole = json!({
-        "constants": constants,
-        "sensors": found.sensors,
-        "obstacles": found.obstacles,
-        "converged": found.converged,
-        "decrement": found.decrement,
-        "undetermined": found.undetermined,
-        "combinations": found.combinations,
-        "bodies": found.bodies,
-        "correlations": { "names": names, "matrix": matrix },
-        "residual": {
-            "coordinates": found.residuals,
-            "over_noise": found.over_noise,
-            "explained": found.explained,
-            "verdict": found.verdict,
-            "says": found.verdict.to_string(),
-            "inflation": found.inflation,
-        },
-        "force_noise": found.force_noise,
-        "outliers": outliers,
-        "outlier_count": found.outlier_count,
-        "samples": found.samples,
-        "segments": found.segments,
-        "segment_seconds": found.segment_seconds,
-        "steps_between_samples": found.substeps,
-        "forces_between_samples": found.between,
-    });
-    Ok(serde_json::to_string(&whole).map_err(CliError::data)? + "\n")
-}
-
-fn sensor(sensor: &crate::identification::SensorConstant) -> String {
-    format!("{} of {}", sensor.kind, sensor.coordinate)
-}
-
-/// A value with the digits that its error leaves it, and the error.
-fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
-    let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
-        return [rounded(value, 4), "-".to_string()];
-    };
-    let exponent = |x: f64| x.abs().log10().floor() as i32;
-    let digits = if value == 0.0 { 2 } else { exponent(value) - exponent(error) + 2 };
-    [rounded(value, digits.clamp(1, 17) as usize), rounded(error, 2)]
-}
-
-/// What became of the inertias of links.
-fn bodies(bodies: &Bodies) -> String {
-    let Bodies { moved, largest_change, exist } = bodies;
-    let links = moved.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
-    let change = rounded(*largest_change, 2);
-    match (moved.is_empty(), exist) {
-        (_, false) if moved.is_empty() => "\nno bodies have the constants that are given\n".into(),
-        (_, false) => format!(
-            "\nno bodies have these sums within their errors: the nearest ones are {change} standard errors away; is the form complete?\n"
-        ),
-        (true, true) => String::new(),
-        (false, true) => format!(
-            "\nthe constants of links {links} are the nearest to the start that bodies have; known sums change by {change} standard errors at most\n"
-        ),
-    }
-}
-
-fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
-    let row = |name: String, (value, error): (f64, Option<f64>), unit: &str, start: f64| {
-        let [value, error] = with_error(value, error);
-        vec![name, value, error, unit.to_string(), rounded(start, 4)]
-    };
-    // Where sums are known, constants that they alone tell have no row of their own.
-    let alone = |c: &&Constant| found.combinations.is_empty() || c.standard_error.is_some();
-    let rows = found.constants.iter().filter(alone).map(|c| {
-        let mut row = row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start);
-        if c.at_bound {
-            row[2] = "at its bound".to_string();
-        }
-        row
-    });
-    let perfect = |kind: &str| if kind == "gain" { 1.0 } else { 0.0 };
-    let sensors = found.sensors.iter().map(|s| {
-        let unit = if s.kind == "delay" { "s" } else { "" };
-        row(sensor(s), (s.value, s.standard_error), unit, perfect(s.kind))
-    });
-    let headers = ["constant", "value", "standard error", "unit", "start"];
-    let said: String = found.obstacles.iter().map(|obstacle| format!("{obstacle}\n")).collect();
-    let mut text = said + &text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
-    let sums = found.combinations.iter().filter(|sum| sum.terms.len() > 1);
-    let known = sums.chain(found.undetermined.iter().flat_map(|open| &open.known)).map(|known| {
-        let [value, error] = with_error(known.value, Some(known.standard_error));
-        vec![known.name.clone(), value, error, known.unit.clone()]
-    });
-    let known: Vec<Vec<String>> = known.collect();
-    if !known.is_empty() {
-        text += &format!("\n{}", text_table(&["combination", "value", "standard error", "unit"], &known));
-    }
-    for Undetermined { text: open, cure, .. } in &found.undetermined {
-        text += &format!("\n{open}\n  what would determine it: {cure}\n");
-    }
-    text += &found.bodies.as_ref().map(bodies).unwrap_or_default();
-    let m = found.constants.len() + found.sensors.len();
-    let names: Vec<String> =
-        found.constants.iter().map(|c| c.symbol.clone()).chain(found.sensors.iter().map(sensor)).collect();
-    let mut pairs: Vec<(usize, usize, f64)> =
-        (0..m).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| (i, j, found.correlations[i * m + j])).collect();
-    pairs.retain(|(_, _, c)| c.abs() > 0.9);
-    pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    if !pairs.is_empty() {
-        let listed = pairs.iter().take(SHOWN).map(|(i, j, c)| format!("{} and {} {c:.3}", names[*j], names[*i]));
-        text += &format!("\ncorrelations of errors beyond 0.9: {}\n", listed.collect::<Vec<_>>().join(", "));
-    }
-    let rows = found.residuals.iter().map(|r| {
-        let white = if r.white { "independent" } else { "correlated" };
-        vec![
-            r.coordinate.clone(),
-            number(r.rms),
-            number(r.noise),
-            number(r.spread),
-            format!("{:.2}", r.autocorrelation),
-            white.to_string(),
-        ]
-    });
-    let what = if found.segments == 0 { "force on" } else { "coordinate" };
-    let headers = [what, "residual", "noise", "spread", "autocorrelation", ""];
-    text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
-    text += &format!("{}\n", found.verdict);
-    if !found.converged {
-        text += &format!("{} times the variance of the noise is left to gain\n", number(found.decrement));
-    }
-    text += &pluralize(found.samples, "sample", "samples");
-    if found.segments > 0 {
-        let segments = pluralize(found.segments, "segment", "segments");
-        text += &format!(" in {segments} of {} s", number(found.segment_seconds));
-    }
-    if let Some(between) = found.between {
-        let way = between.name();
-        text += &format!(", forces {way} between the samples (roll-outs: --between {way})");
-    }
-    if !found.force_noise.is_empty() {
-        let sizes: Vec<String> = found.force_noise.iter().map(|size| rounded(*size, 2)).collect();
-        text += &format!(", noise of forces {}", sizes.join(", "));
-    }
-    text += "\n";
-    if found.outlier_count > 0 {
-        let rows = found.outliers.iter().take(SHOWN).map(|o| {
-            let (trajectory, row) = place(reading, o.track, o.sample);
-            vec![trajectory, row.to_string(), rounded(o.time, 6), o.coordinate.clone(), rounded(o.size, 3)]
-        });
-        let headers = ["trajectory", "row", "t", "coordinate", "residual / typical"];
-        let advice = if args.robust || found.segments == 0 { "" } else { "; --robust limits their influence" };
-        let samples = pluralize(found.outlier_count, "sample", "samples");
-        text +=
-            &format!("\n{samples} far from the motion{advice}\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
-    }
-    text
 }

@@ -1,6 +1,8 @@
 //! Standard output, closed pipes and full disks included.
 
 use crate::cli::CliError;
+use crate::findings::Findings;
+use serde::Serialize;
 use std::io::Write;
 
 /// Writes `text` to standard output.
@@ -18,6 +20,22 @@ pub fn print(text: &str) -> Result<(), CliError> {
 pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
+}
+
+/// A result as one JSON object, or as what it says.
+///
+/// # Errors
+/// A data error for numbers that JSON cannot say.
+pub fn shown<T: Serialize>(result: &T, json: bool, findings: impl FnOnce(&T) -> Findings) -> Result<String, CliError> {
+    if json { self::json(result) } else { Ok(findings(result).to_string()) }
+}
+
+/// A result as a line of JSON.
+///
+/// # Errors
+/// A data error for numbers that JSON cannot say.
+pub fn json(result: &impl Serialize) -> Result<String, CliError> {
+    Ok(serde_json::to_string(result).map_err(CliError::data)? + "\n")
 }
 
 /// Writes how far long work is to standard error, one line; if that is closed, nothing more can be done.

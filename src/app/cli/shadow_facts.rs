@@ -1,8 +1,8 @@
 //! Facts of `lnn shadow`, as text or as a JSON object.
 
+use crate::findings::text_table;
 use crate::names::{percentage, pluralize, rounded};
 use crate::relativity::{Camera, Difference, Image, Outline, RelativityError, Shadow, Tracing};
-use crate::report::text_table;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 

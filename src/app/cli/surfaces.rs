@@ -2,9 +2,9 @@
 
 use crate::cli::source::Source;
 use crate::cli::{CliError, json, output};
+use crate::findings::text_table;
 use crate::geometry::{Change, Surface, surfaces};
 use crate::names::{pluralize, unknown};
-use crate::report::text_table;
 use crate::scalar::Scalar;
 
 /// A block of the metric and the line on which its determinant is followed.

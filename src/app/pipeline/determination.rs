@@ -5,13 +5,14 @@ use crate::analysis::{
     misfit,
 };
 use crate::data::RecordingSplit;
+use crate::findings::text_table;
 use crate::lagrangian::EulerLagrange;
 use crate::names::{number, percent};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::PipelineError;
 use crate::pipeline::hold_out::HoldOut;
 use crate::recording::Targets;
-use crate::report::{Report, text_table};
+use crate::report::Report;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

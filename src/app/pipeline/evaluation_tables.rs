@@ -1,6 +1,7 @@
 //! Tables, report and `evaluation.json` of an evaluation.
 
 use crate::analysis::{MassMatrixError, Statistics};
+use crate::findings::text_table;
 use crate::lagrangian::SystemInstance;
 use crate::names::{WIDTH, number, percentage, rounded, wrap_text};
 use crate::network::NetworkLagrangian;
@@ -8,7 +9,7 @@ use crate::network::file::Header;
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::report_files::{parameter_table, write_page, write_report_and_figures};
 use crate::pipeline::{Output, PipelineError, headline};
-use crate::report::{Figure, Report, text_table};
+use crate::report::{Figure, Report};
 use serde::Serialize;
 use std::fmt::Write as _;
 

@@ -1,6 +1,7 @@
 //! The report of an experiment: table, pictures, page, words.
 
 use crate::experiments::{Experiment, Record, Run, Scale};
+use crate::findings::text_table;
 use crate::names::{WIDTH, pluralize, wrap_text};
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
@@ -9,7 +10,7 @@ use crate::pipeline::run_table::run_table;
 use crate::pipeline::{Output, PipelineError, Watch, headline};
 use crate::report::{
     Curve, DataTable, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
-    experiment_table, experiment_view, reduction_table, text_table,
+    experiment_table, experiment_view, reduction_table,
 };
 use std::fmt::Write as _;
 use std::time::Instant;

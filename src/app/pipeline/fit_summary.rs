@@ -1,6 +1,7 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
 use crate::configuration::Config;
+use crate::findings::text_table;
 use crate::formula::{FormulaSummary, FoundFormula, Verdict};
 use crate::names::{WIDTH, number, percentage, pluralize, wrap_text};
 use crate::network::NetworkLagrangian;
@@ -14,7 +15,7 @@ use crate::pipeline::report_files::{ended, training_pictures, write_page, write_
 use crate::pipeline::time_steps::TimeSteps;
 use crate::pipeline::{Output, PipelineError, SUMMARY, headline};
 use crate::recording::{HeldOut, Recording, Targets};
-use crate::report::{Report, formula_text, text_table};
+use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::shooting::Fitted;
 use crate::training::Trained;
@@ -141,7 +142,7 @@ impl<'a, S: Scalar> Found<'a, S> {
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
         output.write(SUMMARY, json.as_bytes())?;
         let formula = self.formula.filter(|formula| formula.verdict == Verdict::Found);
-        let formula = formula.map(|formula| formula_text(formula, self.friction(), false));
+        let formula = formula.map(|formula| formula.findings().to_string());
         let headline = headline::of_hold_out(name, self.hold_out, self.determined, self.formula);
         let opening = summary.opening(recording);
         let mut figures = training_pictures(&self.trained.history);
@@ -217,15 +218,10 @@ impl<'a, S: Scalar> Found<'a, S> {
             wall_seconds: prepared.started.elapsed().as_secs_f64(),
             judgement: self.hold_out,
             determined: self.determined,
-            formula: self.formula.map(|formula| formula.summary(self.friction(), self.config.seed)),
+            formula: self.formula.map(|formula| formula.summary(&self.config.system)),
             members: self.members,
             physics: self.physics,
         }
-    }
-
-    /// `true` if a dissipation was looked for beside the Lagrangian.
-    fn friction(&self) -> bool {
-        self.formula.is_some_and(|formula| formula.terms.iter().any(|term| term.dissipation))
     }
 
     fn coordinates(&self) -> Vec<Coordinate> {

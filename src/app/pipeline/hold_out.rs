@@ -5,6 +5,7 @@ use crate::analysis::{
     prediction_error, spread, window_valid_times,
 };
 use crate::data::Split;
+use crate::findings::text_table;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
@@ -15,7 +16,7 @@ use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::recording::Smoothed;
-use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot, text_table};
+use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot};
 use crate::rollout::SampledForce;
 use serde::Serialize;
 use std::f64::consts::TAU;

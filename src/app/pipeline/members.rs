@@ -3,6 +3,7 @@
 
 use crate::analysis::{PredictionError, prediction_error};
 use crate::configuration::{Config, MOST_SEED};
+use crate::findings::text_table;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::names::{number, percent, percentage};
 use crate::network::NetworkLagrangian;
@@ -14,7 +15,7 @@ use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{Event, InMemory, MODEL, Output, PipelineError, SUMMARY, Watch, fit};
-use crate::report::{Report, text_table};
+use crate::report::Report;
 use crate::storage::read_regular;
 use crate::symmetry::{Chart, SymmetryError};
 use crate::training::StopReason;

@@ -1,6 +1,7 @@
 //! One self-contained HTML page, with its text escaped and its bytes in base64.
 
 use super::Figure;
+use crate::findings::{Finding, Findings};
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -100,6 +101,21 @@ impl Report {
         }
         self.body.push_str("</tbody></table></div>\n");
         self
+    }
+
+    /// Adds sentences and tables.
+    #[must_use]
+    pub fn findings(self, findings: &Findings) -> Self {
+        findings.parts().iter().fold(self, |report, part| match part {
+            Finding::Line(text) => report.paragraph(text),
+            Finding::Table { headers, rows } => report.table(headers, rows),
+            _ => report,
+        })
+    }
+
+    /// What was added, to stand in another page.
+    pub fn fragment(&self) -> &str {
+        &self.body
     }
 
     /// Adds a heading and pictures; nothing if there are none.

@@ -2,7 +2,6 @@
 
 mod evaluation;
 mod experiment;
-mod formula;
 mod grids;
 mod html;
 mod page;
@@ -14,7 +13,6 @@ pub use experiment::Curve;
 pub(crate) use experiment::{
     REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };
-pub(crate) use formula::formula_text;
 pub use grids::{Fit, GridComparison, grid_figures};
 pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
@@ -23,7 +21,7 @@ pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,
 };
-pub use table::{DataTable, text_table};
+pub use table::DataTable;
 pub(crate) use table::{READING_HEADER, reading_table};
 
 /// One picture of a report.

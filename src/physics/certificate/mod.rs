@@ -42,6 +42,7 @@ mod function;
 mod interval;
 mod models;
 mod number;
+mod says;
 mod search;
 mod spectrum;
 
@@ -57,18 +58,25 @@ use crate::scalar::Scalar;
 use search::{Tree, search};
 use spectrum::{Enclose, Source};
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Largest number of coordinates.
 const MOST_COORDINATES: usize = 32;
 
 /// Numbers of positive and of negative eigenvalues of a mass matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(into = "[usize; 2]"))]
 pub struct Signature {
     /// Positive eigenvalues.
     pub positive: usize,
     /// Negative eigenvalues.
     pub negative: usize,
+}
+
+impl From<Signature> for [usize; 2] {
+    fn from(of: Signature) -> Self {
+        [of.positive, of.negative]
+    }
 }
 
 impl Signature {
@@ -108,6 +116,7 @@ impl Options<'_> {
 
 /// A state where the mass matrix is proven not to be as it should.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Witness {
     /// Coordinates `(n)`.
     pub q: Vec<f64>,
@@ -119,7 +128,13 @@ pub struct Witness {
 
 /// Outcome of a search: shares of the region, which add up to 1, and what was proven of a single state.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Certificate {
+    /// The signature that was to be proven.
+    pub signature: Signature,
+    /// The largest condition number that was allowed.
+    #[cfg_attr(feature = "serde", serde(rename = "condition"))]
+    pub limit: Option<f64>,
     /// Share in which every state is proven to be as it should.
     pub certified: f64,
     /// Share in which every state is proven not to be.
@@ -131,12 +146,15 @@ pub struct Certificate {
     /// A state that is proven not to be as it should, if one was found.
     pub witness: Option<Witness>,
     /// Proven bound of the condition number in the whole certified share; `None` if no box was certified by enclosures.
+    #[cfg_attr(feature = "serde", serde(rename = "condition_bound"))]
     pub condition: Option<f64>,
     /// `true` if the structure of the model proves the signature at every state, in the region and outside of it.
     pub by_construction: bool,
-    /// Time taken.
-    pub elapsed: Duration,
+    /// Time taken in s.
+    pub seconds: f64,
+    #[cfg_attr(feature = "serde", serde(skip))]
     regions: Vec<Vec<(f64, f64)>>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     tree: Tree,
     /// Coordinates that are reduced to one turn before the Lagrangian sees them.
     wrapped: Vec<bool>,
@@ -286,6 +304,8 @@ fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, optio
     let roots = regions.iter().map(|(bounds, _)| bounds.clone()).collect();
     let found = search(source, regions, options);
     Certificate {
+        signature: options.signature,
+        limit: options.condition,
         certified: found.certified,
         refuted: found.refuted,
         // Shares of halvings are exact in binary; of cut turns they are rounded.
@@ -294,7 +314,7 @@ fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, optio
         witness: found.witness,
         condition: (found.condition > 0.0).then_some(found.condition),
         by_construction: false,
-        elapsed: start.elapsed(),
+        seconds: start.elapsed().as_secs_f64(),
         regions: roots,
         tree: found.tree,
         wrapped: vec![false; source.coordinates()],

@@ -9,7 +9,6 @@ use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Terms};
 use crate::network::{Architecture, NetworkLagrangian};
 use crate::scalar::Scalar;
 use std::f64::consts::TAU;
-use std::time::Duration;
 
 /// As [`certify`](super::certify), for a network with its weights.
 ///
@@ -32,7 +31,7 @@ pub fn certify_network<S: Scalar>(
     let bounds = checked(architecture.coordinates, region, options)?;
     let by_construction = signature_by_construction(architecture) == Some(options.signature);
     if by_construction && options.condition.is_none() {
-        return Ok(Certificate { by_construction, ..proven(bounds) });
+        return Ok(proven(options.signature, bounds));
     }
     let wrapped: Vec<bool> = (0..architecture.coordinates).map(|i| wraps(architecture, i)).collect();
     let source = Source::new(architecture, network.weights());
@@ -47,9 +46,11 @@ fn signature_by_construction(architecture: &Architecture) -> Option<Signature> {
 }
 
 /// A region that is certified without a box.
-fn proven(bounds: Vec<(f64, f64)>) -> Certificate {
+fn proven(signature: Signature, bounds: Vec<(f64, f64)>) -> Certificate {
     let (n, found) = (bounds.len() / 2, Found::proven());
     Certificate {
+        signature,
+        limit: None,
         certified: 1.0,
         refuted: 0.0,
         open: 0.0,
@@ -57,7 +58,7 @@ fn proven(bounds: Vec<(f64, f64)>) -> Certificate {
         witness: None,
         condition: None,
         by_construction: true,
-        elapsed: Duration::ZERO,
+        seconds: 0.0,
         regions: vec![bounds],
         tree: found.tree,
         wrapped: vec![false; n],

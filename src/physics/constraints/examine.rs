@@ -11,6 +11,10 @@ const ROUNDINGS: f64 = 1024.0;
 /// What there is to say of a Lagrangian.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ExaminedLagrangian {
+    /// Name of the system.
+    pub system: String,
+    /// Names of the coordinates.
+    pub coordinates: Vec<String>,
     /// Its constraints.
     pub count: usize,
     /// Each of them.
@@ -40,16 +44,18 @@ pub struct OwnConstraint {
     pub formula: String,
 }
 
-/// Examines a Lagrangian at states `(states, n)`, each brought to the constraints; `formulas` are those of the constraints by name.
+/// Examines the Lagrangian of a system with these coordinates at states `(states, n)`, each brought to the constraints; `formulas` are those of the constraints by name.
 ///
 /// States without a finite mass matrix are left out; all of them are if `states` is 0.
 pub fn examine(
+    (system, coordinates): (&str, &[String]),
     model: &dyn EulerLagrange<f64>,
     formulas: &BTreeMap<String, String>,
     (q, v): (&[f64], &[f64]),
 ) -> ExaminedLagrangian {
     let n = model.coordinates();
-    let mut examined = ExaminedLagrangian::default();
+    let (system, coordinates) = (system.to_string(), coordinates.to_vec());
+    let mut examined = ExaminedLagrangian { system, coordinates, ..ExaminedLagrangian::default() };
     if let Some(manifold) = model.manifold() {
         examined.redundant = manifold.redundant().to_vec();
         examined.constraints = (0..manifold.names().len())

@@ -14,6 +14,7 @@ mod generators;
 mod pencil;
 mod regular;
 mod samples;
+mod says;
 #[cfg(test)]
 mod tests;
 
@@ -121,6 +122,8 @@ pub struct FoundConstraints {
     pub trajectories: usize,
     /// Candidates that did not hold on trajectories that were left out.
     pub refuted: usize,
+    /// Names of the coordinates.
+    pub coordinates: Vec<String>,
     /// Noise of each coordinate over its size: smaller deviations are not seen.
     pub noise: Vec<f64>,
     /// Columns that do not move, in words; they take no part.
@@ -260,6 +263,7 @@ pub fn find_constraints(
         gap,
         trajectories: samples.trajectories(),
         refuted: held.refuted,
+        coordinates: samples.names().to_vec(),
         noise: samples.relative_noise(),
         still: samples.still(),
         limits: cut_short,

@@ -132,6 +132,12 @@ pub struct FoundFormula {
     pub notes: Vec<String>,
     /// Known forces between the samples.
     pub between: Option<Between>,
+    /// `true` if it is that of a model, not of recorded motion.
+    pub of_model: bool,
+    /// `true` if a dissipation was looked for.
+    pub friction: bool,
+    /// Seed of what was drawn.
+    pub seed: u64,
     /// Coordinates with known forces.
     pub(super) forced: Vec<bool>,
     pub(super) bounds: Vec<[f64; 2]>,
@@ -141,13 +147,17 @@ pub struct FoundFormula {
     units: (Vec<String>, String),
 }
 
-/// What there is to say of a formula, as JSON.
+/// A formula with what is written from it, as JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct FormulaSummary<'a> {
     verdict: Verdict,
     lagrangian: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     dissipation: Option<String>,
+    latex: Vec<String>,
+    rust: String,
+    toml: String,
+    coordinates: &'a [String],
     terms: &'a [FoundTerm],
     residual: f64,
     noise: &'a [f64],
@@ -224,6 +234,9 @@ impl FoundFormula {
             doubts: Vec::new(),
             notes: Vec::new(),
             between: None,
+            of_model: false,
+            friction: options.friction,
+            seed: options.seed,
             forced: vec![false; library.n()],
             bounds: Vec::new(),
             speeds: Vec::new(),
@@ -406,12 +419,17 @@ impl FoundFormula {
         (dot(&sums, &sizes) / whole, whole.recip().max(0.0).sqrt())
     }
 
-    /// What there is to say of it, the dissipation if one was looked for.
-    pub(crate) fn summary(&self, friction: bool, seed: u64) -> FormulaSummary<'_> {
+    /// The formula as JSON, with the dissipation if one was looked for; `name` is that of the system which it makes.
+    pub fn summary(&self, name: &str) -> FormulaSummary<'_> {
+        let wanted = if self.friction { &[false, true][..] } else { &[false] };
         FormulaSummary {
             verdict: self.verdict,
             lagrangian: self.text(false),
-            dissipation: friction.then(|| self.text(true)),
+            dissipation: self.friction.then(|| self.text(true)),
+            latex: wanted.iter().map(|&dissipation| self.latex(dissipation)).collect(),
+            rust: self.rust(),
+            toml: self.system_file(name),
+            coordinates: &self.coordinates,
             terms: &self.terms,
             residual: self.residual,
             noise: &self.noise,
@@ -427,7 +445,7 @@ impl FoundFormula {
             notes: &self.notes,
             forces_between_samples: self.between,
             left: &self.left,
-            seed,
+            seed: self.seed,
         }
     }
 

@@ -38,6 +38,7 @@ mod motion;
 mod obstacles;
 mod prepared;
 mod regress;
+mod says;
 mod search;
 mod select;
 mod units;
@@ -48,8 +49,7 @@ pub use error::FormulaError;
 #[doc(hidden)]
 pub use find::MOST_BOOTSTRAPS;
 pub use find::{FormulaOptions, formula_of_motion};
-pub(crate) use found::FormulaSummary;
-pub use found::{FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
+pub use found::{FormulaSummary, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
 pub use library::Families;
 #[doc(hidden)]
 pub use regress::MODEL_STATES;

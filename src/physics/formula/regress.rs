@@ -145,6 +145,7 @@ pub fn formula_of_model(
     found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
     found.residual = residual;
     found.noise = sigma;
+    found.of_model = true;
     found.searched = (library.searched, quotient.removed);
     (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
     (found.bounds, found.speeds) = (bounds, speeds);

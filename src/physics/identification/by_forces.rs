@@ -96,7 +96,7 @@ pub(super) fn identify(
     let far = |_, state: usize, i: usize, size: f64| {
         let (track, sample) = states.places[state];
         let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
-        Outlier { track, sample, time, coordinate, size }
+        Outlier { track, sample, trajectory: String::new(), row: 0, time, coordinate, size }
     };
     // States of all trajectories in a row.
     let (outliers, outlier_count) = outliers((&[whole], &[single]), n, far);

@@ -1,6 +1,7 @@
 //! What was identified.
 
 use super::{Between, Verdict};
+use crate::recording::{LoadedRecording, Recording};
 use serde::{Serialize, Serializer};
 
 /// A constant of the system.
@@ -31,6 +32,13 @@ pub struct SensorConstant {
     pub value: f64,
     /// Its standard error; none where the motion says nothing of it.
     pub standard_error: Option<f64>,
+}
+
+impl SensorConstant {
+    /// What it is, and of what: `"offset of q1"`.
+    pub fn name(&self) -> String {
+        format!("{} of {}", self.kind, self.coordinate)
+    }
 }
 
 /// Constants that the motion leaves open, alone or together.
@@ -68,6 +76,20 @@ pub struct Combination {
     pub standard_error: f64,
     /// Its unit; empty where it has none.
     pub unit: String,
+}
+
+fn by_symbol<S: Serializer>(constants: &[Constant], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(constants.iter().map(|constant| (&constant.symbol, constant)))
+}
+
+fn in_words<S: Serializer>(verdict: &Verdict, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct InWords<'a> {
+        #[serde(flatten)]
+        verdict: &'a Verdict,
+        says: String,
+    }
+    InWords { verdict, says: verdict.to_string() }.serialize(serializer)
 }
 
 fn as_object<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
@@ -108,9 +130,15 @@ pub struct Residual {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outlier {
     /// Index of the trajectory.
+    #[serde(skip)]
     pub track: usize,
     /// Its sample, from 0.
+    #[serde(skip)]
     pub sample: usize,
+    /// Name of the trajectory.
+    pub trajectory: String,
+    /// Row of the sample in its file, or its number from 1: see [`Identified::with_rows_of`].
+    pub row: u64,
     /// Its time in s.
     pub time: f64,
     /// The coordinate.
@@ -119,15 +147,25 @@ pub struct Outlier {
     pub size: f64,
 }
 
+/// Correlations of the errors of constants, then of sensors; 0 beside those without error.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Correlations {
+    /// Symbols of the constants, and `"offset of q1"` and the like.
+    pub names: Vec<String>,
+    /// One row for each.
+    pub matrix: Vec<Vec<f64>>,
+}
+
 /// Constants with their errors, and how far these can be trusted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Identified {
-    /// The constants that were unknown, in the order of the system.
+    /// The constants that were unknown, in the order of the system; in JSON an object by symbol.
+    #[serde(serialize_with = "by_symbol")]
     pub constants: Vec<Constant>,
     /// Constants of sensors.
     pub sensors: Vec<SensorConstant>,
-    /// Correlations of the errors of constants, then sensors, `(m, m)`; 0 beside those without error.
-    pub correlations: Vec<f64>,
+    /// How the errors are correlated.
+    pub correlations: Correlations,
     /// What the motion leaves open.
     pub undetermined: Vec<Undetermined>,
     /// Sums of constants that are known, where forces are met and are linear in the constants.
@@ -138,13 +176,16 @@ pub struct Identified {
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
     pub over_noise: f64,
+    /// `true` if residuals beyond three standard deviations counted linearly.
+    pub robust: bool,
     /// What is to be known before all else: coordinates that stand still, forces of which too little is known between the samples.
     pub obstacles: Vec<String>,
     /// `true` if the search arrived; if not, the constants are where it stopped.
     pub converged: bool,
     /// The decrease of the sum of squares that was left to gain at the end, over the variance of the noise: the Newton decrement.
     pub decrement: f64,
-    /// Whether the form explains what was measured, and if not, why.
+    /// Whether the form explains what was measured, and if not, why; in JSON also in words, as `says`.
+    #[serde(serialize_with = "in_words")]
     pub verdict: Verdict,
     /// `true` if it does: [`Verdict::explains`].
     pub explained: bool,
@@ -166,4 +207,25 @@ pub struct Identified {
     pub substeps: usize,
     /// How known forces were taken between the samples; none without forces.
     pub between: Option<Between>,
+}
+
+impl Identified {
+    /// The same with the names of trajectories; rows are samples, counted from 1.
+    pub(super) fn named(mut self, recording: &Recording, robust: bool) -> Self {
+        self.robust = robust;
+        for outlier in &mut self.outliers {
+            outlier.trajectory.clone_from(&recording.tracks[outlier.track].name);
+            outlier.row = outlier.sample as u64 + 1;
+        }
+        self
+    }
+
+    /// The same with the rows of the files that a recording was read from.
+    #[must_use]
+    pub fn with_rows_of(mut self, loaded: &LoadedRecording) -> Self {
+        for outlier in &mut self.outliers {
+            outlier.row = loaded.rows[outlier.track].row(outlier.sample);
+        }
+        self
+    }
 }

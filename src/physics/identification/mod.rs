@@ -42,6 +42,7 @@ pub(crate) mod linear;
 mod moves;
 mod pieces;
 mod quality;
+mod says;
 #[cfg(test)]
 mod search_tests;
 mod smoothed;
@@ -55,9 +56,9 @@ mod ways;
 
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
-pub use found::{Bodies, Combination, Constant, Identified, Residual, Undetermined};
-#[doc(hidden)]
-pub use found::{Outlier, SensorConstant};
+pub use found::{
+    Bodies, Combination, Constant, Correlations, Identified, Outlier, Residual, SensorConstant, Undetermined,
+};
 pub(crate) use innovations::Disturbances;
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;

@@ -172,7 +172,8 @@ pub fn identify(
         for outlier in &mut found.outliers {
             (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
         }
-        return Ok(Identified { obstacles: [pieces.still, repeated].concat(), ..found });
+        found.obstacles = [pieces.still, repeated].concat();
+        return Ok(found.named(recording, options.robust));
     }
     let states = States::new(&on_pieces, &pieces.smoothed);
     let fitted = states.len(n) == 0 || states.fit(&on_pieces, &mut x, met).is_some();
@@ -233,7 +234,7 @@ pub fn identify(
     }
     found.obstacles = [pieces.still, repeated].concat();
     rivals.widen(&mut found);
-    Ok(found)
+    Ok(found.named(recording, options.robust))
 }
 
 /// What is to be said of the readings that a sensor repeated.
@@ -546,6 +547,8 @@ fn result(
     let far = |track: usize, sample: usize, i: usize, size: f64| Outlier {
         track,
         sample,
+        trajectory: String::new(),
+        row: 0,
         time: recording.tracks[track].times[sample],
         coordinate: recording.coordinates[i].clone(),
         size,

@@ -3,7 +3,7 @@
 use super::bodies;
 use super::cure::{ByForces, Examiner};
 use super::determined::{Determined, NOTHING, echelon};
-use super::found::{Combination, Constant, Identified, SensorConstant, Undetermined};
+use super::found::{Combination, Constant, Correlations, Identified, SensorConstant, Undetermined};
 use super::invariants::{Invariant, Kind, unit_of, written};
 use super::moves::{Group, Moves, nearest};
 use super::smoothed::Met;
@@ -88,23 +88,18 @@ pub(super) fn unknowns(
         value: x[k],
         standard_error: errors[k],
     });
-    let correlation = |at: usize| {
-        let (i, j) = (at / m, at % m);
-        match (errors[i], errors[j]) {
-            _ if i == j => 1.0,
-            (Some(a), Some(b)) if a * b > 0.0 => determined.covariance[at] / (a * b),
-            _ => 0.0,
-        }
+    let correlation = |i: usize, j: usize| match (errors[i], errors[j]) {
+        _ if i == j => 1.0,
+        (Some(a), Some(b)) if a * b > 0.0 => determined.covariance[i * m + j] / (a * b),
+        _ => 0.0,
     };
-    Identified {
-        constants: constants.collect(),
-        sensors: sensors.collect(),
-        correlations: (0..m * m).map(correlation).collect(),
-        undetermined,
-        combinations,
-        bodies,
-        ..Identified::default()
-    }
+    let (constants, sensors): (Vec<_>, Vec<_>) = (constants.collect(), sensors.collect());
+    let named = constants.iter().map(|constant| constant.symbol.clone());
+    let correlations = Correlations {
+        names: named.chain(sensors.iter().map(SensorConstant::name)).collect(),
+        matrix: (0..m).map(|i| (0..m).map(|j| correlation(i, j)).collect()).collect(),
+    };
+    Identified { constants, sensors, correlations, undetermined, combinations, bodies, ..Identified::default() }
 }
 
 fn kind(kind: SensorKind) -> &'static str {

@@ -42,6 +42,7 @@ mod field;
 mod find;
 mod null_space;
 mod sample;
+mod says;
 
 pub use algebra::Algebra;
 pub(crate) use algebra::MOST_FIELDS;
@@ -65,6 +66,7 @@ pub use null_space::{Separation, bases, enough, most_symmetries};
 #[doc(hidden)]
 pub use sample::middle;
 pub use sample::{Invariant, Region};
+pub use says::{QuadraticSummary, SymmetrySummary};
 
 use crate::lagrangian::MechanicsError;
 

@@ -21,10 +21,7 @@ fn constants_and_friction_of_the_example_are_found_and_written() {
         assert!((value - truth).abs() < 4.0 * error && error < 0.02 * truth, "{name} {value} {error}");
     }
     assert_eq!(found["constants"]["m2"]["unit"], "kg");
-    assert_eq!(
-        (found["undetermined"].as_array().unwrap().len(), &found["residual"]["explained"]),
-        (0, &Value::Bool(true))
-    );
+    assert_eq!((found["undetermined"].as_array().unwrap().len(), &found["explained"]), (0, &Value::Bool(true)));
     // The file has friction: after ten minutes the arms hang.
     let rolled = ["rollout", "--system", &out, "--state", "1,1,0,0", "--t-end", "600", "--dt", "600", "--out", "-"];
     let rolled = lnn(&rolled);
@@ -154,7 +151,7 @@ fn a_listed_system_serves_and_what_is_wrong_is_named() {
     assert_eq!(listed.code, Some(0), "{}", listed.stderr);
     // The catalogue's pendulum has no friction.
     let found: Value = serde_json::from_str(&listed.stdout).unwrap();
-    assert_eq!(found["residual"]["explained"], Value::Bool(false), "{}", found["residual"]);
+    assert_eq!(found["explained"], Value::Bool(false), "{}", found["verdict"]);
     for (wrong, code, named) in [
         (&["double-pendulum", "--out", "found.toml"][..], 2, "--out"),
         (&[SYSTEM, "--out", "found.txt"], 2, "--out"),
@@ -229,7 +226,7 @@ fn torques_of_a_log_tell_the_sums_of_the_constants_of_an_arm() {
     let open = found["undetermined"].as_array().unwrap();
     let named = |at: usize, name: &str| open[at]["constants"].as_array().unwrap().iter().any(|known| known == name);
     assert!(open.len() == 2 && named(0, "m1") && named(1, "m3"), "{open:?}");
-    for left in found["residual"]["coordinates"].as_array().unwrap() {
+    for left in found["residuals"].as_array().unwrap() {
         let [rms, spread] = ["rms", "spread"].map(|key| left[key].as_f64().unwrap());
         assert!(rms < 0.2 * spread, "{left}");
     }
@@ -299,9 +296,9 @@ fn readings_that_are_repeated_do_not_excuse_a_wrong_form() {
         serde_json::from_str::<Value>(&run.stdout).unwrap()
     };
     let (right, wrong) = (found("G"), found(""));
-    let over_noise = |found: &Value| found["residual"]["over_noise"].as_f64().unwrap();
-    assert!((0.7..1.3).contains(&over_noise(&right)) && over_noise(&wrong) > 3.0, "{}", wrong["residual"]);
-    assert_eq!(wrong["residual"]["verdict"]["kind"], "large", "{}", wrong["residual"]);
+    let over_noise = |found: &Value| found["over_noise"].as_f64().unwrap();
+    assert!((0.7..1.3).contains(&over_noise(&right)) && over_noise(&wrong) > 3.0, "{}", wrong["verdict"]);
+    assert_eq!(wrong["verdict"]["kind"], "large", "{}", wrong["verdict"]);
     for (name, truth) in [("I", 0.14), ("G", 2.8), ("b", 0.05)] {
         let [value, error] = ["value", "standard_error"].map(|key| right["constants"][name][key].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * error && error < 0.2 * truth, "{name} {value} {error}");

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Floors from the bottom to the top, with their modules in order.
 const FLOORS: [(&str, &[&str]); 6] = [
     ("numerics", &["platform", "scalar", "random", "ops", "forward", "linalg", "tape"]),
-    ("support", &["cancellation", "names", "storage"]),
+    ("support", &["cancellation", "names", "findings", "storage"]),
     ("mechanics", &["lagrangian", "rollout", "network"]),
     ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
     (

@@ -1,0 +1,86 @@
+//! What is said of a formula.
+
+use super::found::{FoundFormula, FoundTerm, Rival, Verdict};
+use crate::findings::Findings;
+use crate::names::rounded;
+
+impl FoundFormula {
+    /// The verdict, the formula, and a table of its terms; of motion that it does not explain, where it does not.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        self.say_verdict(&mut findings);
+        findings.gap().line(format!("L = {}", self.text(false)));
+        if self.friction {
+            findings.line(format!("D = {}", self.text(true)));
+        }
+        let headers = ["term", "constant", "coefficient", "error", "95 % range", "unit", "probability", "near"];
+        findings.gap().table(&headers, self.terms.iter().map(FoundTerm::row));
+        if let Some(Rival { terms, cost }) = &self.rival {
+            let (terms, cost) = (terms.join(", "), rounded(*cost, 3));
+            findings.gap().line(format!("next best: {terms}; it costs {cost} units of noise more, a term counts 30"));
+        }
+        if self.verdict == Verdict::NotInLibrary && !self.left.is_empty() {
+            let rows = self.left.iter().map(|left| {
+                let name = self.coordinates[left.coordinate].clone();
+                let [low, high, residual] = [left.low, left.high, left.residual].map(|x| rounded(x, 4));
+                [name, low, high, residual, left.samples.to_string()]
+            });
+            let headers = ["coordinate", "from", "to", "residual over noise", "samples"];
+            findings.gap().line("what is left:").table(&headers, rows);
+        }
+        findings
+    }
+
+    fn say_verdict(&self, findings: &mut Findings) {
+        let verdict = match self.verdict {
+            Verdict::Found if self.several => "found, one of several",
+            Verdict::Found => "found",
+            Verdict::NotInLibrary => "not in the library",
+            Verdict::Undecided => "undecided",
+        };
+        let residual = rounded(self.residual, 4);
+        findings.line(if self.of_model {
+            format!("{verdict}: accelerations differ from the model's by {residual} of their size")
+        } else {
+            let bound = if self.noise_resolved { "" } else { ", which is at most what was assumed" };
+            format!("{verdict}: the residual of held-out motion is {residual} times its noise{bound}")
+        });
+        findings.lines(self.doubts.iter().map(|doubt| format!("in doubt: {doubt}")));
+        let (searched, removed) = self.searched;
+        findings.line(format!("{searched} terms searched, {removed} of them total derivatives or sums of others"));
+        if self.tried.len() > 1 {
+            findings.line(format!("functions of {}; searched: {}", self.basis, self.tried.join("; ")));
+        }
+        findings.lines(&self.notes).lines(self.independent());
+    }
+
+    /// What moves by itself.
+    fn independent(&self) -> Vec<String> {
+        let Some((first, others)) = self.blocks.split_first() else { return Vec::new() };
+        let first = first.join(", ");
+        let sentence = |names: &Vec<String>| {
+            let (verb, whose) =
+                if names.len() == 1 { ("moves by itself", "its") } else { ("move by themselves", "their") };
+            let names = names.join(", ");
+            if self.between.is_some() {
+                return format!("{names} {verb}, apart from {first}");
+            }
+            format!("{names} {verb}: {whose} mass relative to that of {first} is not determined")
+        };
+        others.iter().map(sentence).collect()
+    }
+}
+
+impl FoundTerm {
+    fn row(&self) -> [String; 8] {
+        let range = [-1.96, 1.96].map(|k| rounded(self.coefficient + k * self.standard_error, 6)).join(" .. ");
+        let name = if self.dissipation { format!("D: {}", self.term) } else { self.term.clone() };
+        let near = self.near.as_ref().map_or(String::new(), |near| match rounded(near.standard_errors, 1) {
+            off if near.standard_errors == 0.0 || off == "0" => near.fraction.clone(),
+            off => format!("{} ({off} errors off)", near.fraction),
+        });
+        let unit = self.unit.clone().unwrap_or_else(|| "hidden in the function".to_string());
+        let [coefficient, error] = [rounded(self.coefficient, 6), rounded(self.standard_error, 2)];
+        [name, self.constant.clone(), coefficient, error, range, unit, format!("{:.2}", self.probability), near]
+    }
+}

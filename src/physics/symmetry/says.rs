@@ -1,0 +1,233 @@
+//! What is said of symmetries.
+
+use super::{Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
+use crate::findings::Findings;
+use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
+use serde::Serialize;
+
+/// Singular values that are shown beyond the gap, and at most.
+const BEYOND: usize = 5;
+const SHOWN: usize = 20;
+
+/// Symmetries in formulas, as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SymmetrySummary {
+    /// Name of the system.
+    pub system: String,
+    /// Point symmetries; null if there is no gap between singular values.
+    pub count: Option<usize>,
+    /// First singular value that is not zero over the last that is.
+    pub gap: Option<f64>,
+    /// Name of the algebra.
+    pub name: Option<String>,
+    /// Components of every field.
+    pub fields: Vec<String>,
+    /// Function `F` of every field whose flow changes `L` by `dF/dt`.
+    pub gauge_functions: Vec<String>,
+    /// None of fields that are no algebra.
+    pub structure_constants: Vec<Vec<Vec<f64>>>,
+    /// Negative, positive and zero eigenvalues of the Killing form.
+    pub killing_form_signature: Option<[usize; 3]>,
+    /// Rest of the commutators beside combinations of the fields, relative; null where it was not looked at.
+    pub closure: Option<f64>,
+    /// Whether that is nothing but noise, so that the fields are an algebra.
+    pub closes: Option<bool>,
+    /// States at which the mass matrix is singular.
+    pub singular_states: usize,
+    /// The symmetry of the parameter of the motion, which is not counted, and what it conserves.
+    pub time_translation: bool,
+    /// What is conserved by it.
+    pub invariant: Invariant,
+    /// Of every field, whether its charge is conserved: friction may change it.
+    pub conserved: Vec<bool>,
+    /// Ascending.
+    pub singular_values: Vec<f64>,
+    /// Degrees of the functions that fields are made of.
+    pub basis: Degrees,
+    /// Functions of the basis.
+    pub functions: usize,
+    /// States that were looked at.
+    pub points: usize,
+    /// Seed of the states.
+    pub seed: u64,
+    /// Quantities of second degree in the momenta, if they were looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadratic: Option<QuadraticSummary>,
+}
+
+/// Conserved quantities of second degree in the momenta, in formulas.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct QuadraticSummary {
+    /// New conserved quantities; null if there is no gap.
+    pub count: Option<usize>,
+    /// All of these functions, known ones included.
+    pub with_known: Option<usize>,
+    /// First singular value that is not zero over the last that is.
+    pub gap: Option<f64>,
+    /// The new ones.
+    pub conserved: Vec<String>,
+    /// Ascending.
+    pub singular_values: Vec<f64>,
+}
+
+impl From<Quadratic> for QuadraticSummary {
+    fn from(found: Quadratic) -> Self {
+        let with_known = found.separation.count;
+        Self {
+            count: with_known.map(|_| found.conserved.len()),
+            with_known,
+            gap: found.separation.gap,
+            conserved: found.conserved.iter().map(|quantity| quantity.text()).collect(),
+            singular_values: found.singular_values,
+        }
+    }
+}
+
+impl Symmetries {
+    /// The symmetries of a system in formulas, fields being made of functions up to these degrees, states drawn by a seed.
+    pub fn summary(&self, system: &str, basis: Degrees, seed: u64, quadratic: Option<Quadratic>) -> SymmetrySummary {
+        let closed = self.algebra.as_ref().filter(|algebra| algebra.closes);
+        SymmetrySummary {
+            system: system.to_string(),
+            count: self.separation.count,
+            gap: self.separation.gap,
+            name: closed.and_then(|algebra| algebra.name.clone()),
+            fields: self.fields.iter().map(|field| field.text(&self.basis)).collect(),
+            gauge_functions: self.fields.iter().map(|field| field.gauge_text(&self.basis)).collect(),
+            structure_constants: closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
+            killing_form_signature: closed.map(|algebra| algebra.killing_form_signature),
+            closure: self.algebra.as_ref().map(|algebra| algebra.closure),
+            closes: self.algebra.as_ref().map(|algebra| algebra.closes),
+            singular_states: self.singular_states,
+            time_translation: self.invariant != Invariant::Nothing,
+            invariant: self.invariant,
+            conserved: self.conserved.clone(),
+            singular_values: self.singular_values.clone(),
+            basis,
+            functions: self.basis.len(),
+            points: self.states,
+            seed,
+            quadratic: quadratic.map(QuadraticSummary::from),
+        }
+    }
+}
+
+impl SymmetrySummary {
+    /// The number of symmetries, the fields, their algebra, and what was looked at.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        self.say_count(&mut findings);
+        self.say_search(&mut findings);
+        if !self.fields.is_empty() {
+            self.say_fields(&mut findings);
+            findings.lines(self.commutators());
+            if let Some([negative, positive, zero]) = self.killing_form_signature {
+                findings.line(format!("Killing form: {negative} negative, {positive} positive, {zero} zero"));
+            }
+        }
+        if let Some(second) = &self.quadratic {
+            second.say(&mut findings);
+        }
+        findings
+    }
+
+    fn say_count(&self, findings: &mut Findings) {
+        let time = match self.invariant {
+            Invariant::Energy => "time translation (the energy is conserved)",
+            Invariant::Square => "translation of the parameter (g(v, v) is conserved along geodesics)",
+            Invariant::Legendre => "translation of the parameter (p.v - L is conserved)",
+            Invariant::Nothing => "no time translation (friction removes energy)",
+        };
+        let count = match self.count {
+            None => "no gap between singular values, so that the number of symmetries is unknown".to_string(),
+            Some(0) => "no point symmetry in space".to_string(),
+            Some(count) => {
+                format!("{}, {}", pluralize(count, "point symmetry", "point symmetries"), self.algebra())
+            }
+        };
+        findings.line(format!("{}: {count}; {time}", self.system));
+        if self.singular_states > 0 {
+            let (singular, points) = (self.singular_states, self.points);
+            let text = format!(
+                "L is degenerate: its mass matrix is singular at {singular} of {points} states and determines no motion there; a null \
+                 direction of it times any function may be a symmetry, so that the number depends on the functions"
+            );
+            findings.line(wrap_text(&text, WIDTH).trim_end());
+        }
+    }
+
+    fn say_search(&self, findings: &mut Findings) {
+        let last = (self.count.unwrap_or(0) + BEYOND).min(SHOWN);
+        let shown: Vec<String> = self.singular_values.iter().take(last).map(|x| digits(*x)).collect();
+        let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
+        findings.line(wrap_text(&format!("singular values {}{more}", shown.join(", ")), WIDTH).trim_end());
+        let gap = self.gap.map_or(String::new(), |gap| format!("gap {}; ", digits(gap)));
+        findings.line(format!("{gap}{} functions ({}), {} states", self.functions, self.basis, self.points));
+    }
+
+    /// What the fields are, in words.
+    fn algebra(&self) -> String {
+        match (self.closes, self.closure, self.name.as_deref()) {
+            (Some(true), _, Some(name)) => format!("algebra {name}"),
+            (Some(true), ..) => "an algebra without a name".to_string(),
+            (_, Some(closure), _) => format!("which do not form an algebra (closure {})", digits(closure)),
+            _ => format!("too many for an algebra (at most {MOST_FIELDS})"),
+        }
+    }
+
+    fn say_fields(&self, findings: &mut Findings) {
+        let gauged = self.gauge_functions.iter().any(|gauge| gauge != "0");
+        let dissipates = self.invariant == Invariant::Nothing;
+        let rows = self.fields.iter().zip(&self.gauge_functions).enumerate().map(|(k, (field, gauge))| {
+            let gauge = gauged.then(|| gauge.clone());
+            let kept = if self.conserved[k] { "yes" } else { "no, by friction" };
+            let kept = dissipates.then(|| kept.to_string());
+            [format!("X{}", k + 1), field.clone()].into_iter().chain(gauge).chain(kept).collect::<Vec<_>>()
+        });
+        let more = [("gauge function", gauged), ("charge conserved", dissipates)];
+        let more = more.into_iter().filter(|(_, shown)| *shown).map(|(name, _)| name);
+        let headers: Vec<&str> = ["field", "components"].into_iter().chain(more).collect();
+        findings.gap().table(&headers, rows);
+    }
+
+    /// Commutators that do not vanish, each a line.
+    fn commutators(&self) -> Vec<String> {
+        let c = &self.structure_constants;
+        let pairs = (0..c.len()).flat_map(|a| (a + 1..c.len()).map(move |b| (a, b)));
+        let line = |(a, b): (usize, usize)| {
+            let terms = c[a][b].iter().enumerate().filter(|(_, x)| **x != 0.0);
+            let terms: Vec<String> = terms.map(|(k, x)| format!("{} X{}", factor(*x), k + 1)).collect();
+            let sum = terms.join(" ");
+            let sum = sum.strip_prefix("+ ").map_or_else(|| sum.replacen("- ", "-", 1), String::from);
+            (!terms.is_empty()).then(|| format!("[X{}, X{}] = {sum}", a + 1, b + 1))
+        };
+        pairs.filter_map(line).collect()
+    }
+}
+
+/// A factor with its sign, 1 left out.
+fn factor(x: f64) -> String {
+    let sign = if x < 0.0 { "-" } else { "+" };
+    let size = x.abs();
+    if (size - 1.0).abs() < 1e-6 { sign.to_string() } else { format!("{sign} {}", digits(size)) }
+}
+
+impl QuadraticSummary {
+    fn say(&self, findings: &mut Findings) {
+        findings.gap();
+        match self.count {
+            None => findings.line("quantities quadratic in the momenta: no gap, so that their number is unknown"),
+            Some(0) => findings
+                .line("no conserved quantity quadratic in the momenta beyond the energy and products of charges"),
+            Some(count) => {
+                let count = pluralize(count, "conserved quantity", "conserved quantities");
+                let list = self.conserved.iter().map(|quantity| format!("  {quantity}\n"));
+                let text = format!(
+                    "{count} quadratic in the momenta beyond the energy and products of charges:\n{}",
+                    list.collect::<String>()
+                );
+                findings.line(wrap_text(&text, WIDTH).trim_end())
+            }
+        };
+    }
+}
