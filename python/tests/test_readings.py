@@ -160,6 +160,8 @@ def test_constants_of_a_known_form_are_identified(swung):
     (residual,) = found.residuals.values()
     assert np.isclose(residual.rms, 1e-3, rtol=0.2) and residual.white
     assert found.correlations.shape == (1, 1) and found.samples == 602
+    shown, table = str(found), found._repr_html_()
+    assert "0.7" in shown and "residual" in shown and table.count("<table>") == 2 and str(pickle.loads(pickle.dumps(found))) == shown
     system = found.system()
     assert system.parameters == {**form.parameters, "l": length.value}
     assert system.acceleration([0.3], [0.0]) == lnn.System("n-pendulum", n=1, l=length.value).acceleration([0.3], [0.0])

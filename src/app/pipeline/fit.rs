@@ -3,7 +3,7 @@
 use crate::cancellation::Cancellation;
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit, sizes};
-use crate::formula::{FormulaError, FormulaOptions, formula_of_motion};
+use crate::formula::{FormulaError, FormulaOptions, FoundFormula, formula_of_motion};
 use crate::lagrangian::EulerLagrange;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Form, Layout, NetworkLagrangian};
@@ -23,9 +23,9 @@ use crate::pipeline::train::{RunOptions, write_model};
 use crate::pipeline::{Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
 use crate::recording::{Recording, Targets};
 use crate::scalar::Scalar;
-use crate::shooting::{self, Task};
+use crate::shooting::{self, Fitted, Task};
 use crate::storage::container::checksum;
-use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume as train, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resume as train, training_memory};
 
 /// A model of recorded motion, after its files were written.
 #[derive(Debug)]
@@ -102,164 +102,41 @@ pub fn fit(
 
 fn fit_in<S: Scalar>(
     prepared: &PreparedFit<'_>,
-    fit_config: &FitConfig,
+    config: &FitConfig,
     options: &RunOptions,
     output: &dyn Output,
     watch: &Watch,
 ) -> Result<FitReport, PipelineError> {
-    let PreparedFit { measured, targets, .. } = prepared;
-    prepared.check_horizon(fit_config.horizon)?;
-    let (recording, config, threads) = (&prepared.reading.recording, &fit_config.training, options.threads);
-    let names = &recording.coordinates;
+    prepared.check_horizon(config.horizon)?;
     prepared.remarks.iter().for_each(|text| watch.say(Event::Note(text)));
-    let mut data = prepared.datasets::<S>()?;
-    let faults = fit_config.faults(names.len());
-    if !faults.is_empty() {
-        return Err(PipelineError::Config(faults));
-    }
-    let periodic = recording.periodic.clone();
-    let unscaled = vec![1.0; names.len()];
-    let shape = config.architecture_with(names.iter().map(String::as_str), periodic.clone(), unscaled)?;
-    let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
-    let (architecture, weights) = match &config.from {
-        Some(from) => {
-            StartModel::read(from)?.require(config, periodic)?;
-            weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?
-        }
-        None => (shaped(data.training[0].physical_scale()), None),
-    };
-    let architecture = match (targets, &config.from) {
-        (Targets::Forces, None) => {
-            let sizes = sizes(&data.training[0], &architecture.scale);
-            Architecture { form: Form { sizes: Some(sizes), ..architecture.form }, ..architecture }
-        }
-        _ => architecture,
-    };
-    architecture.validate()?;
-    let around: Vec<usize> = architecture.form.radial.first().map(|r| r.coordinates.clone()).unwrap_or_default();
-    let floor = config.data.acceleration_weighting;
-    data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
-    let ranges = data.training[0].ranges();
-    // Every phase learns from the same states.
-    data.training = vec![data.training.swap_remove(0); config.phases.len()];
-    memory::require("training", training_memory(config, &architecture))?;
-    let penalty = config.penalty.resolve(names.iter().map(String::as_str))?;
-
-    let judges = LossStates { validation: data.validation.clone(), test: data.test.clone() };
-    let toml = toml::to_string(fit_config).map_err(PipelineError::format)?;
-    let sizes = (Layout::new(&architecture).parameters, data.training[0].len());
-    let opened = options.checkpoints.as_ref();
-    let opened = opened.map(|checkpoints| checkpoints.open::<S>(&toml, checksums(measured, &data), sizes, watch));
-    let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
-    let shots = restored.clone().filter(Snapshot::is_shooting);
-    let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
-    let resumed = ResumeOptions { checkpoints: manager.clone(), start };
-    let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), resumed)?;
-    let mut shot = None;
-    if let (Targets::Motion, StopReason::Finished) = (targets, &trained.stop) {
-        let settings = fit_config.shooting.clone().unwrap_or_default();
-        let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
-        let noise = measured.noise();
-        let task = Task {
-            architecture: &architecture,
-            penalty,
-            weights: trained.weights.clone(),
-            training: &training,
-            validation: &validation,
-            noise: &noise,
-            constraints: prepared.constraints(),
-            seed: config.seed,
-        };
-        let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));
-        let resumed = ResumeOptions { checkpoints: manager, start };
-        let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), resumed)?;
-        trained.weights.clone_from(&fitted.weights);
-        trained.stop.clone_from(&fitted.stop);
-        judges.judge(&architecture, penalty, threads, &mut trained)?;
-        shot = Some(fitted);
-    }
-
-    // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
-    let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
-    let header = config.header(architecture.clone(), columns, ranges, trained.validation_loss);
-    let constraints = prepared.constraints().map(|held| held.formulas().clone()).unwrap_or_default();
-    let header = Header { forces: named_forces(&fit_config.recording.force), constraints, ..header };
-    let model = ModelFile { header, weights: trained.weights.clone() };
+    let start = Start::<S>::new(prepared, config)?;
+    let toml = toml::to_string(config).map_err(PipelineError::format)?;
+    let learned = start.learn((prepared, config, &toml), options, watch)?;
     // Before the new model takes the place of the old one and of what was said of it.
-    let kept = options.checkpoints.as_ref().map_or_else(Vec::new, |kept| kept_members(kept.directory(), fit_config));
-    write_model(output, &model)?;
-    output.write("config.toml", toml.as_bytes())?;
-    output.write("history.csv", history(&trained.history).as_bytes())?;
-    if let Some(shot) = &shot {
-        output.write("shooting.csv", history(&shot.history).as_bytes())?;
-    }
-
-    let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
-    let unjudged = |error: PipelineError| match error {
+    let kept = options.checkpoints.as_ref().map_or_else(Vec::new, |kept| kept_members(kept.directory(), config));
+    learned.write(output, &toml)?;
+    let LearnedFit { mut trained, shot, model } = learned;
+    // Once the weights are known all numbers are doubles.
+    let ModelFile { header, weights } = model;
+    let network = NetworkLagrangian::new(header.architecture.clone(), weights)?.cast::<f64>();
+    // The flag that ended the training does not end the judgement of its model.
+    let was_interrupted = watch.is_interrupted();
+    let judged = JudgedFit::new(prepared, config, (&header, &network), (options.threads, watch, was_interrupted));
+    let judged = judged.map_err(|error| match error {
         PipelineError::Interrupted => {
-            let (network, header) = (network.cast::<f64>(), model.header.clone());
+            let (header, network) = (header.clone(), network.cast::<f64>());
             let (stop, history) = (trained.stop.clone(), trained.history.clone());
             PipelineError::Unjudged(Box::new(Unjudged { header, network, history, stop }))
         }
         error => error,
+    })?;
+    judged.determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
+    let (formula, mut unfinished) = formula(prepared, config, &network, (options.threads, watch, was_interrupted));
+    let trained_alone = (trained.stop == StopReason::Finished, (&network, &judged.hold_out, kept));
+    let (members, others) = match unfinished {
+        None => others(prepared, config, trained_alone, (options, output, watch), &mut unfinished)?,
+        Some(_) => (None, Vec::new()),
     };
-    let hold_out = judge(prepared, fit_config, (&model.header, &network), threads, watch).map_err(unjudged)?;
-    let subject = Subject {
-        network: &network,
-        trained: &trained_on(&model.header),
-        system: None,
-        columns: model.header.columns.clone(),
-        labels: labels(recording),
-        motion: None,
-        recorded: Some(&measured.training.recording),
-        threads,
-    };
-    // The flag that ended the training does not end the judgement of its model.
-    let before = watch.is_interrupted();
-    let check = || if watch.is_interrupted() && !before { Err(PipelineError::Interrupted) } else { Ok(()) };
-    let (physics, determined) = match prepared.constraints() {
-        None => {
-            let physics = Physics::new(&subject, &check).map_err(unjudged)?;
-            (physics, Determined::new(&network, (measured, *targets), &hold_out, threads)?)
-        }
-        Some(_) => (Physics::under_constraints(&subject), Determined::under_constraints()),
-    };
-    determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
-    let mut unfinished = None;
-    let formula = fit_config.formula.then(|| {
-        let options = FormulaOptions {
-            friction: network.architecture().has_friction(),
-            noise: fit_config.noise.clone(),
-            units: fit_config.recording.meaning().coordinate_units(),
-            seed: config.seed,
-            threads,
-            cancellation: if before { Cancellation::default() } else { watch.cancellation() },
-            ..FormulaOptions::default()
-        };
-        formula_of_motion(&measured.training.recording, &options)
-    });
-    let formula = formula.and_then(|found| match found {
-        Err(FormulaError::Cancelled(_)) => {
-            unfinished = Some("before a formula was found".to_string());
-            None
-        }
-        Err(error) => {
-            watch.say(Event::Note(&format!("no formula was looked for: {error}")));
-            None
-        }
-        Ok(found) => Some(found),
-    });
-    let members = match (&trained.stop, &unfinished) {
-        (StopReason::Finished, None) => {
-            Members::train(prepared, fit_config, (&network, &hold_out, kept), (options, output, watch))?
-        }
-        _ => None,
-    };
-    let (members, others) = members.unzip();
-    let (done, wanted) = (1 + others.as_ref().map_or(0, Vec::len), fit_config.members);
-    if trained.stop == StopReason::Finished && watch.is_interrupted() && done < wanted && unfinished.is_none() {
-        unfinished = Some(format!("{done} of {wanted} members are trained"));
-    }
     if unfinished.is_some() {
         trained.stop = StopReason::Interrupted;
     }
@@ -267,20 +144,233 @@ fn fit_in<S: Scalar>(
         members: members.as_ref(),
         formula: formula.as_ref(),
         prepared,
-        config,
-        threads,
+        config: &config.training,
+        threads: options.threads,
         trained: &trained,
         constants: network.architecture().known_constants(network.weights()),
         shot: shot.as_ref(),
-        hold_out: &hold_out,
-        determined: &determined,
-        physics: &physics,
-        model: (&model.header, &network),
+        hold_out: &judged.hold_out,
+        determined: &judged.determined,
+        physics: &judged.physics,
+        model: (&header, &network),
     };
     let (json, text) = found.write(output, &toml)?;
-    let (stop, history, header) = (trained.stop, trained.history, model.header);
-    let others = others.unwrap_or_default();
+    let (stop, history, hold_out) = (trained.stop, trained.history, judged.hold_out);
     Ok(FitReport { stop, unfinished, header, network, history, hold_out, others, json, text })
+}
+
+/// What a fit starts to learn from.
+struct Start<S: Scalar> {
+    data: Datasets<S>,
+    architecture: Architecture,
+    /// Those of the model that it starts from.
+    weights: Option<Vec<S>>,
+    /// Of the states that are learned from.
+    ranges: [Vec<[f64; 2]>; 2],
+}
+
+/// What a fit learned, before it is judged.
+struct LearnedFit<S> {
+    trained: Trained<S>,
+    shot: Option<Fitted<S>>,
+    model: ModelFile<S>,
+}
+
+impl<S: Scalar> LearnedFit<S> {
+    /// The model first, then what is small; pictures come last: on a full disk nothing that comes after can lose these.
+    fn write(&self, output: &dyn Output, toml: &str) -> Result<(), PipelineError> {
+        write_model(output, &self.model)?;
+        output.write("config.toml", toml.as_bytes())?;
+        output.write("history.csv", history(&self.trained.history).as_bytes())?;
+        self.shot.as_ref().map_or(Ok(()), |shot| output.write("shooting.csv", history(&shot.history).as_bytes()))
+    }
+}
+
+impl<S: Scalar> Start<S> {
+    /// The states, and the network that a configuration asks for.
+    ///
+    /// # Errors
+    /// Configurations out of range, data that cannot be learned from, a model of another shape, too little memory.
+    fn new(prepared: &PreparedFit<'_>, fit_config: &FitConfig) -> Result<Self, PipelineError> {
+        let PreparedFit { measured, targets, .. } = prepared;
+        let (recording, config) = (&prepared.reading.recording, &fit_config.training);
+        let names = &recording.coordinates;
+        let mut data = prepared.datasets::<S>()?;
+        let faults = fit_config.faults(names.len());
+        if !faults.is_empty() {
+            return Err(PipelineError::Config(faults));
+        }
+        let (periodic, unscaled) = (recording.periodic.clone(), vec![1.0; names.len()]);
+        let shape = config.architecture_with(names.iter().map(String::as_str), periodic.clone(), unscaled)?;
+        let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
+        let (architecture, weights) = match &config.from {
+            Some(from) => {
+                StartModel::read(from)?.require(config, periodic)?;
+                weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?
+            }
+            None => (shaped(data.training[0].physical_scale()), None),
+        };
+        let architecture = match (targets, &config.from) {
+            (Targets::Forces, None) => {
+                let sizes = sizes(&data.training[0], &architecture.scale);
+                Architecture { form: Form { sizes: Some(sizes), ..architecture.form }, ..architecture }
+            }
+            _ => architecture,
+        };
+        architecture.validate()?;
+        let around: Vec<usize> = architecture.form.radial.first().map(|r| r.coordinates.clone()).unwrap_or_default();
+        let floor = config.data.acceleration_weighting;
+        data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
+        let ranges = data.training[0].ranges();
+        // Every phase learns from the same states.
+        data.training = vec![data.training.swap_remove(0); config.phases.len()];
+        memory::require("training", training_memory(config, &architecture))?;
+        Ok(Self { data, architecture, weights, ranges })
+    }
+
+    /// Trains by states, then through the motion.
+    ///
+    /// # Errors
+    /// Checkpoints that cannot be read or written, a training that learned nothing.
+    fn learn(
+        self,
+        (prepared, fit_config, toml): (&PreparedFit<'_>, &FitConfig, &str),
+        options: &RunOptions,
+        watch: &Watch,
+    ) -> Result<LearnedFit<S>, PipelineError> {
+        let Self { data, architecture, weights, ranges } = self;
+        let (config, measured, threads) = (&fit_config.training, &prepared.measured, options.threads);
+        let names = &prepared.reading.recording.coordinates;
+        let penalty = config.penalty.resolve(names.iter().map(String::as_str))?;
+        let judges = LossStates { validation: data.validation.clone(), test: data.test.clone() };
+        let sizes = (Layout::new(&architecture).parameters, data.training[0].len());
+        let opened = options.checkpoints.as_ref();
+        let opened = opened.map(|checkpoints| checkpoints.open::<S>(toml, checksums(measured, &data), sizes, watch));
+        let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
+        let shots = restored.clone().filter(Snapshot::is_shooting);
+        let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
+        let resumed = ResumeOptions { checkpoints: manager.clone(), start };
+        let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), resumed)?;
+        let mut shot = None;
+        if let (Targets::Motion, StopReason::Finished) = (prepared.targets, &trained.stop) {
+            let settings = fit_config.shooting.clone().unwrap_or_default();
+            let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
+            let noise = measured.noise();
+            let task = Task {
+                architecture: &architecture,
+                penalty,
+                weights: trained.weights.clone(),
+                training: &training,
+                validation: &validation,
+                noise: &noise,
+                constraints: prepared.constraints(),
+                seed: config.seed,
+            };
+            let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));
+            let resumed = ResumeOptions { checkpoints: manager, start };
+            let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), resumed)?;
+            trained.weights.clone_from(&fitted.weights);
+            trained.stop.clone_from(&fitted.stop);
+            judges.judge(&architecture, penalty, threads, &mut trained)?;
+            shot = Some(fitted);
+        }
+        let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
+        let header = config.header(architecture, columns, ranges, trained.validation_loss);
+        let constraints = prepared.constraints().map(|held| held.formulas().clone()).unwrap_or_default();
+        let header = Header { forces: named_forces(&fit_config.recording.force), constraints, ..header };
+        let model = ModelFile { header, weights: trained.weights.clone() };
+        Ok(LearnedFit { trained, shot, model })
+    }
+}
+
+/// What is said of a learned model.
+struct JudgedFit {
+    hold_out: HoldOut,
+    physics: Physics,
+    determined: Determined,
+}
+
+impl JudgedFit {
+    /// Judges by held-out motion, and reads physics off; a flag that was raised before does not end it.
+    ///
+    /// # Errors
+    /// [`PipelineError::Interrupted`].
+    fn new(
+        prepared: &PreparedFit<'_>,
+        config: &FitConfig,
+        (header, network): (&Header, &NetworkLagrangian<f64>),
+        (threads, watch, was_interrupted): (usize, &Watch, bool),
+    ) -> Result<Self, PipelineError> {
+        let hold_out = judge(prepared, config, (header, network), threads, watch)?;
+        let subject = Subject {
+            network,
+            trained: &trained_on(header),
+            system: None,
+            columns: header.columns.clone(),
+            labels: labels(&prepared.reading.recording),
+            motion: None,
+            recorded: Some(&prepared.measured.training.recording),
+            threads,
+        };
+        if prepared.constraints().is_some() {
+            let (physics, determined) = (Physics::under_constraints(&subject), Determined::under_constraints());
+            return Ok(Self { hold_out, physics, determined });
+        }
+        let is_ended = || watch.is_interrupted() && !was_interrupted;
+        let check = || if is_ended() { Err(PipelineError::Interrupted) } else { Ok(()) };
+        let physics = Physics::new(&subject, &check)?;
+        let determined = Determined::new(network, (&prepared.measured, prepared.targets), &hold_out, threads)?;
+        Ok(Self { hold_out, physics, determined })
+    }
+}
+
+/// The networks of a fit of several beside the one that is trained, and their reports; `unfinished` becomes what an interruption left out.
+fn others(
+    prepared: &PreparedFit<'_>,
+    config: &FitConfig,
+    (is_finished, trained): (bool, (&NetworkLagrangian<f64>, &HoldOut, Vec<ModelFile<f64>>)),
+    (options, output, watch): (&RunOptions, &dyn Output, &Watch),
+    unfinished: &mut Option<String>,
+) -> Result<(Option<Members>, Vec<FitReport>), PipelineError> {
+    if !is_finished {
+        return Ok((None, Vec::new()));
+    }
+    let (members, others) = Members::train(prepared, config, trained, (options, output, watch))?.unzip();
+    let others = others.unwrap_or_default();
+    let (done, wanted) = (1 + others.len(), config.members);
+    if watch.is_interrupted() && done < wanted {
+        *unfinished = Some(format!("{done} of {wanted} members are trained"));
+    }
+    Ok((members, others))
+}
+
+/// A formula of the recorded motion if the configuration asks for one, and what an interruption left out.
+fn formula(
+    prepared: &PreparedFit<'_>,
+    config: &FitConfig,
+    network: &NetworkLagrangian<f64>,
+    (threads, watch, was_interrupted): (usize, &Watch, bool),
+) -> (Option<FoundFormula>, Option<String>) {
+    if !config.formula {
+        return (None, None);
+    }
+    let options = FormulaOptions {
+        friction: network.architecture().has_friction(),
+        noise: config.noise.clone(),
+        units: config.recording.meaning().coordinate_units(),
+        seed: config.training.seed,
+        threads,
+        cancellation: if was_interrupted { Cancellation::default() } else { watch.cancellation() },
+        ..FormulaOptions::default()
+    };
+    match formula_of_motion(&prepared.measured.training.recording, &options) {
+        Ok(found) => (Some(found), None),
+        Err(FormulaError::Cancelled(_)) => (None, Some("before a formula was found".to_string())),
+        Err(error) => {
+            watch.say(Event::Note(&format!("no formula was looked for: {error}")));
+            (None, None)
+        }
+    }
 }
 
 /// What held-out motion says of a model.

@@ -9,3 +9,4 @@ mod fuzz_seeds;
 mod model_format;
 #[cfg(feature = "cli")]
 mod python;
+mod ratchets;
