@@ -18,7 +18,7 @@ use crate::pipeline::report_files::{
 use crate::pipeline::{MODEL, Output, PipelineError, SUMMARY, Unjudged, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
-use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resume, training_memory};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -203,44 +203,23 @@ fn train_in<S: Scalar>(
     watch: &Watch,
 ) -> Result<TrainReport, PipelineError> {
     let started = Instant::now();
-    let shape = config.architecture(system, vec![1.0; system.coordinates])?;
-    memory::require("training", training_memory(config, &shape))?;
-    let (data, scale) = sample_all_until::<S>(config, system, &watch.interrupt)?;
-    let penalty = config.penalty()?;
-    let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
-    let (architecture, before) = match &config.from {
-        Some(from) => start::weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?,
-        None => (shaped(scale), None),
-    };
-    let ranges = ranges(config, system, &data);
-    let fresh = data.test.cast::<f64>();
-    let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
     let toml = toml::to_string(config).map_err(PipelineError::format)?;
-    let parameters = Layout::new(&architecture).parameters;
-    let opened = options
-        .checkpoints
-        .as_ref()
-        .map(|checkpoints| checkpoints.open::<S>(&toml, data.checksums(), (parameters, config.data.training), watch));
-    let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
-    let start = restored.or_else(|| before.map(Snapshot::beginning_with));
-    let resumed = ResumeOptions { checkpoints: manager, start };
-    let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), resumed)?;
-
+    let LearnedRun { trained, model, fresh } = LearnedRun::<S>::new((config, &toml), system, options, watch)?;
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
-    let header = header(config, system, architecture.clone(), ranges, trained.validation_loss);
-    let model = ModelFile { header, weights: trained.weights.clone() };
     write_model(output, &model)?;
     output.write("config.toml", toml.as_bytes())?;
     output.write("history.csv", history(&trained.history).as_bytes())?;
 
-    let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
+    // Once the weights are known all numbers are doubles.
+    let ModelFile { header, weights } = model;
+    let network = NetworkLagrangian::new(header.architecture.clone(), weights)?.cast::<f64>();
     let test = system.system.trajectory(system.coordinates);
     let judging = EvaluationOptions {
         states: fresh,
         starts: options.starts,
         span: TrajectoryTest { t_end: test.t_end * options.span, ..test },
         rtol: RTOL,
-        trained: trained_on(&model.header),
+        trained: trained_on(&header),
         constraints: None,
         seed: config.seed,
         threads: options.threads,
@@ -248,35 +227,85 @@ fn train_in<S: Scalar>(
     let evaluation = match evaluate(system, &network, judging, watch) {
         Ok(evaluation) if evaluation.interrupted.is_none() => evaluation,
         Ok(_) | Err(PipelineError::Interrupted) => {
-            let (stop, history, header) = (trained.stop, trained.history, model.header);
+            let (stop, history) = (trained.stop, trained.history);
             return Err(PipelineError::Unjudged(Box::new(Unjudged { header, network, history, stop })));
         }
         Err(error) => return Err(error),
     };
-    let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
-    let instability = training_instability(&training_losses, &stretches(config));
-    let figures = TrainFigures {
-        system: config.system.clone(),
-        crate_version: env!("CARGO_PKG_VERSION"),
-        seed: config.seed,
-        precision: S::NAME,
-        threads: options.threads,
-        epochs: trained.history.len(),
-        weights: trained.weights.len(),
-        validation_loss: trained.validation_loss,
-        test_loss: trained.test.loss.to_f64(),
-        test_states_left_out: trained.test.left_out,
-        instability,
-        wall_seconds: started.elapsed().as_secs_f64(),
-        training_seconds: trained.seconds,
-        states_per_second: trained.states as f64 / trained.seconds,
-        ended: ended(&trained.stop),
-    };
+    let figures = TrainFigures::new(config, &trained, options.threads, started);
     let title = system.system.title.to_string();
-    let (stop, history, header) = (trained.stop, trained.history, model.header);
+    let (stop, history) = (trained.stop, trained.history);
     let report = TrainReport { stop, header, network, history, evaluation, figures, title };
     report.write(output, system, &toml)?;
     Ok(report)
+}
+
+/// What a training learned, before it is judged.
+struct LearnedRun<S> {
+    trained: Trained<S>,
+    model: ModelFile<S>,
+    /// Coordinates and velocities of states that nothing was learned from.
+    fresh: (Vec<f64>, Vec<f64>),
+}
+
+impl<S: Scalar> LearnedRun<S> {
+    /// Draws the states and trains the network that a configuration asks for.
+    ///
+    /// # Errors
+    /// Configurations out of range, a model of another shape, too little memory, checkpoints that cannot be read or written, a training that
+    /// learned nothing.
+    fn new(
+        (config, toml): (&Config, &str),
+        system: &SystemInstance<f64>,
+        options: &RunOptions,
+        watch: &Watch,
+    ) -> Result<Self, PipelineError> {
+        let shape = config.architecture(system, vec![1.0; system.coordinates])?;
+        memory::require("training", training_memory(config, &shape))?;
+        let (data, scale) = sample_all_until::<S>(config, system, &watch.interrupt)?;
+        let penalty = config.penalty()?;
+        let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
+        let (architecture, before) = match &config.from {
+            Some(from) => start::weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?,
+            None => (shaped(scale), None),
+        };
+        let ranges = ranges(config, system, &data);
+        let fresh = data.test.cast::<f64>();
+        let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
+        let sizes = (Layout::new(&architecture).parameters, config.data.training);
+        let opened = options.checkpoints.as_ref();
+        let opened = opened.map(|checkpoints| checkpoints.open::<S>(toml, data.checksums(), sizes, watch));
+        let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
+        let start = restored.or_else(|| before.map(Snapshot::beginning_with));
+        let resumed = ResumeOptions { checkpoints: manager, start };
+        let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), resumed)?;
+        let header = header(config, system, architecture, ranges, trained.validation_loss);
+        let model = ModelFile { header, weights: trained.weights.clone() };
+        Ok(Self { trained, model, fresh })
+    }
+}
+
+impl TrainFigures {
+    fn new<S: Scalar>(config: &Config, trained: &Trained<S>, threads: usize, started: Instant) -> Self {
+        let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
+        Self {
+            system: config.system.clone(),
+            crate_version: env!("CARGO_PKG_VERSION"),
+            seed: config.seed,
+            precision: S::NAME,
+            threads,
+            epochs: trained.history.len(),
+            weights: trained.weights.len(),
+            validation_loss: trained.validation_loss,
+            test_loss: trained.test.loss.to_f64(),
+            test_states_left_out: trained.test.left_out,
+            instability: training_instability(&training_losses, &stretches(config)),
+            wall_seconds: started.elapsed().as_secs_f64(),
+            training_seconds: trained.seconds,
+            states_per_second: trained.states as f64 / trained.seconds,
+            ended: ended(&trained.stop),
+        }
+    }
 }
 
 /// A number that a record can hold.
