@@ -13,7 +13,7 @@ use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
-use crate::rollout::{Driven, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
+use crate::rollout::{Driven, Ending, EnergyBalance, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
 use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -108,59 +108,82 @@ impl clap::ValueEnum for Integrator {
     }
 }
 
+impl Args {
+    /// What moves, under the constraints that are given.
+    fn source(&self) -> Result<MotionSource, CliError> {
+        let mut source = match &self.model {
+            Some(path) => MotionSource::model(path)?,
+            None => MotionSource::system(self.system.as_deref().unwrap_or_default(), &self.param)?,
+        };
+        let (expected, found) = (source.columns.len(), self.state.len());
+        if found != expected {
+            let names = source.columns.join(",");
+            return Err(CliError::usage(format_args!("--state: expected {expected} numbers ({names}), found {found}")));
+        }
+        if let Some(file) = &self.constraints {
+            source.model = constrained(source.model, &source.columns, file, self.state.split_at(expected / 2))?;
+        }
+        Ok(source)
+    }
+
+    fn options(&self, source: &MotionSource) -> Result<Options<f64>, CliError> {
+        if self.step.is_some() && !self.method.is_structure_preserving() {
+            return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
+        }
+        let options = Options {
+            t0: self.t_start,
+            method: self.method,
+            rtol: self.rtol,
+            atol: self.atol,
+            step: self.step,
+            domain: source.domain.clone().filter(|_| !self.beyond_range),
+            ..Options::new(self.t_end, self.dt)
+        };
+        options.check(source.columns.len() / 2).map_err(|e| refused(&e))?;
+        if let Some(step) = self.step.filter(|step| *step > self.dt) {
+            output::note(&format!("--step {step} is longer than --dt {}: one step per sample", self.dt));
+        }
+        Ok(options)
+    }
+
+    /// Refuses to write over what is there, or what is read.
+    fn require_room(&self, source: &MotionSource) -> Result<(), CliError> {
+        let files = self.forces.files().chain(self.tube.files());
+        let inputs: Vec<_> = files.chain(source.file.as_deref()).chain(self.constraints.as_deref()).collect();
+        if !input::is_standard(&self.out) {
+            require_free(&self.out, &inputs, self.overwrite)?;
+        }
+        let Some(plot) = &self.plot else { return Ok(()) };
+        if *plot == self.out {
+            return Err(CliError::usage("--plot: the trajectory goes into this file (--out)"));
+        }
+        OutputFile::claim(plot, &inputs, self.overwrite).map(|_| ())
+    }
+
+    /// Charges of the symmetries along a motion.
+    fn charges(&self, motion: &Trajectory<f64>) -> Result<Charges, CliError> {
+        let probe = match &self.model {
+            Some(path) => Probe::model(path)?,
+            None => Probe::system(self.system.as_deref().unwrap_or_default(), &self.param)?,
+        };
+        Charges::new(&probe, motion)
+    }
+}
+
 /// Integrates in double precision and writes the valid part of the trajectory.
 ///
 /// # Errors
 /// A usage error for a state of the wrong length; a data error for a bad model, a file that cannot be written, or a
 /// motion that ends before its time, the samples up to there being written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let mut source = match &args.model {
-        Some(path) => MotionSource::model(path)?,
-        None => MotionSource::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
-    };
-    let columns = source.columns.clone();
-    let columns = &columns;
-    if args.state.len() != columns.len() {
-        let (expected, found) = (columns.len(), args.state.len());
-        let names = columns.join(",");
-        return Err(CliError::usage(format_args!("--state: expected {expected} numbers ({names}), found {found}")));
-    }
-    let standard = input::is_standard(&args.out);
+    let source = args.source()?;
+    let (columns, standard) = (&source.columns, input::is_standard(&args.out));
     if args.json && standard {
         return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
     }
     let (q, v) = args.state.split_at(columns.len() / 2);
-    if let Some(file) = &args.constraints {
-        source.model = constrained(source.model, columns, file, (q, v))?;
-    }
-    let method = args.method;
-    if args.step.is_some() && !method.is_structure_preserving() {
-        return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
-    }
-    let options = Options {
-        t0: args.t_start,
-        method,
-        rtol: args.rtol,
-        atol: args.atol,
-        step: args.step,
-        domain: source.domain.clone().filter(|_| !args.beyond_range),
-        ..Options::new(args.t_end, args.dt)
-    };
-    options.check(q.len()).map_err(|e| refused(&e))?;
-    if let Some(step) = args.step.filter(|step| *step > args.dt) {
-        output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
-    }
-    let files = args.forces.files().chain(args.tube.files());
-    let inputs: Vec<_> = files.chain(source.file.as_deref()).chain(args.constraints.as_deref()).collect();
-    if !standard {
-        require_free(&args.out, &inputs, args.overwrite)?;
-    }
-    if let Some(plot) = &args.plot {
-        if *plot == args.out {
-            return Err(CliError::usage("--plot: the trajectory goes into this file (--out)"));
-        }
-        OutputFile::claim(plot, &inputs, args.overwrite)?;
-    }
+    let options = args.options(&source)?;
+    args.require_room(&source)?;
     let force = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
     if args.charges && force.is_some() {
         return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
@@ -189,11 +212,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             sampled.v.extend(&piece.v);
         }
         failed = target.append(&tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece))).err();
-        if failed.is_some() || stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        let is_over = failed.is_some() || stop.load(Ordering::Relaxed);
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let result = match &driven {
         Some(driven) => driven.rollout_in_pieces(q, v, &options, &mut take),
@@ -207,62 +227,71 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     if !standard {
         // Another program may have written it meanwhile.
-        require_free(&args.out, &inputs, args.overwrite)?;
+        args.require_room(&source)?;
     }
     target.finish()?;
-    let time_unit = source.time_unit.as_deref();
     if let Some(plot) = &args.plot {
-        watch.plot(plot, &format!("{}: roll-out", source.name), time_unit.unwrap_or_default(), tube.as_ref())?;
+        let (title, unit) = (format!("{}: roll-out", source.name), source.time_unit.as_deref().unwrap_or_default());
+        watch.plot(plot, &title, unit, tube.as_ref())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
     }
-    if let Some(stop) = result.stop {
-        let kept = pluralize(result.samples, "sample is", "samples are");
+    if let Some(stop) = &result.stop {
         let names = network.manifold().map_or(&[][..], |manifold| manifold.names());
-        let problem = format!("{} ({kept} in {})", ended(&stop, (columns, names), method), place(&args.out));
-        return Err(match stop {
+        return Err(args.ended_early(stop, result.samples, (columns, names)));
+    }
+    let charges = sampled.map(|motion| args.charges(&motion)).transpose()?;
+    args.say((&source, &watch), &result, driven.is_some(), (charges.as_ref(), tube.as_ref()))
+}
+
+impl Args {
+    /// The error of a motion that ended before its time.
+    fn ended_early(&self, stop: &RolloutError, samples: usize, names: (&[String], &[String])) -> CliError {
+        let kept = pluralize(samples, "sample is", "samples are");
+        let problem = format!("{} ({kept} in {})", ended(stop, names, self.method), place(&self.out));
+        match stop {
             RolloutError::Stopped { .. } => CliError::interrupted(problem),
             _ => CliError::data(problem),
-        });
-    }
-    let (statistics, balance) = (result.statistics, result.balance);
-    let charges = match &sampled {
-        Some(motion) => {
-            let probe = match &args.model {
-                Some(path) => Probe::model(path)?,
-                None => Probe::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
-            };
-            Some(Charges::new(&probe, motion)?)
         }
-        None => None,
-    };
-    let facts = Facts {
-        system: &source.name,
-        samples: result.samples,
-        t_end: args.t_end,
-        time_unit,
-        steps: statistics.accepted,
-        evaluations: statistics.evaluations,
-        iterations: method.is_structure_preserving().then_some(statistics.iterations),
-        energy_change: balance.map(|balance| balance.change),
-        work: balance.filter(|_| driven.is_some()).map(|balance| balance.work),
-        dissipated: balance.map(|balance| balance.dissipated),
-        energy_defect: balance.map(|balance| balance.defect()),
-        left_training_range: watch.leaving.as_ref(),
-        charges: charges.as_ref(),
-        tube: tube.as_ref().map(MotionTube::facts),
-        out: place(&args.out),
-    };
-    if args.json {
-        return output::print(&facts.json()?);
     }
-    let text = facts.text() + &tube.as_ref().map_or_else(String::new, MotionTube::text);
-    if standard {
-        text.lines().for_each(output::note);
-        return Ok(());
+
+    /// Prints what the motion was like.
+    fn say(
+        &self,
+        (source, watch): (&MotionSource, &Watch),
+        result: &Ending<f64>,
+        is_driven: bool,
+        (charges, tube): (Option<&Charges>, Option<&MotionTube>),
+    ) -> Result<(), CliError> {
+        let (statistics, balance) = (&result.statistics, result.balance.as_ref());
+        let facts = Facts {
+            system: &source.name,
+            samples: result.samples,
+            t_end: self.t_end,
+            time_unit: source.time_unit.as_deref(),
+            steps: statistics.accepted,
+            evaluations: statistics.evaluations,
+            iterations: self.method.is_structure_preserving().then_some(statistics.iterations),
+            energy_change: balance.map(|balance| balance.change),
+            work: balance.filter(|_| is_driven).map(|balance| balance.work),
+            dissipated: balance.map(|balance| balance.dissipated),
+            energy_defect: balance.map(EnergyBalance::defect),
+            left_training_range: watch.leaving.as_ref(),
+            charges,
+            tube: tube.map(MotionTube::facts),
+            out: place(&self.out),
+        };
+        if self.json {
+            return output::print(&facts.json()?);
+        }
+        let text = facts.text() + &tube.map_or_else(String::new, MotionTube::text);
+        if input::is_standard(&self.out) {
+            text.lines().for_each(output::note);
+            return Ok(());
+        }
+        output::print(&text)
     }
-    output::print(&text)
 }
 
 /// Says how much of the motion is a choice.
