@@ -165,6 +165,8 @@ mod learning;
 mod mechanics;
 mod numerics;
 mod physics;
+#[cfg(test)]
+mod properties;
 mod support;
 
 // Users need not know the floors.

@@ -7,5 +7,6 @@ mod examples;
 mod floors;
 mod fuzz_seeds;
 mod model_format;
+mod properties;
 #[cfg(feature = "cli")]
 mod python;
