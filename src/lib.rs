@@ -150,6 +150,7 @@
 // What only higher floors use is dead without them; the default features tell what is dead for everybody.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 #![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -165,6 +166,8 @@ mod learning;
 mod mechanics;
 mod numerics;
 mod physics;
+#[cfg(test)]
+mod properties;
 mod support;
 
 // Users need not know the floors.

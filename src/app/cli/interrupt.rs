@@ -1,11 +1,14 @@
 //! Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a terminal that is closed: work that keeps what it has finishes its step
 //! first, everything else ends at once.
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown, register_usize};
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
+
+/// A terminal that is closed, by its number: `signal_hook` has no name for it on Windows, where there is none.
+const SIGHUP: i32 = 1;
 
 /// Signals that end the program, with the exit code of each, 128 and its number.
 const SIGNALS: [(i32, u8); 3] = [(SIGINT, 130), (SIGTERM, 143), (SIGHUP, 129)];
@@ -27,7 +30,8 @@ pub fn watch() -> io::Result<()> {
     let flag = FLAG.get_or_init(|| Arc::new(AtomicBool::new(true)));
     for (signal, code) in SIGNALS {
         // What is ignored from the start, as SIGHUP is under nohup, stays ignored.
-        if signal == SIGHUP && !ends(signal, std::fs::read_to_string("/proc/self/status").ok().as_deref()) {
+        let status = || std::fs::read_to_string("/proc/self/status").ok();
+        if signal == SIGHUP && (cfg!(windows) || !ends(signal, status().as_deref())) {
             continue;
         }
         // In this order: the first signal finds the flag down.

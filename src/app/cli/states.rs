@@ -305,6 +305,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::properties::properties(256))]
+
         #[test]
         fn numbers_survive(values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 4)) {
             let fields: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();

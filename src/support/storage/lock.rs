@@ -1,7 +1,7 @@
 //! Locks of directories: one process at a time works in a directory, and the system frees the lock with the process.
 
 use std::fmt;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -14,11 +14,52 @@ const MAX_BYTES: u64 = 1024;
 /// Attempts to lock a file that other processes remove meanwhile.
 const ATTEMPTS: usize = 100;
 
+/// The file, open and locked; none if another process holds the lock.
+#[cfg(not(windows))]
+fn lock(path: &Path) -> io::Result<Option<File>> {
+    let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(fs::TryLockError::WouldBlock) => Ok(None),
+        Err(fs::TryLockError::Error(error)) => Err(error),
+    }
+}
+
+/// `true` if another process holds the lock.
+#[cfg(not(windows))]
+fn is_held(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
+}
+
+/// Error of Windows: another process has the file open and does not share it so.
+#[cfg(windows)]
+const SHARING_VIOLATION: i32 = 32;
+
+/// As elsewhere, but the open file is the lock: others may read it, and can neither write nor remove it. A lock of Windows would keep its text
+/// from all who ask for the holder.
+#[cfg(windows)]
+fn lock(path: &Path) -> io::Result<Option<File>> {
+    use std::os::windows::fs::OpenOptionsExt;
+    const SHARE_READ: u32 = 1;
+    let mut options = OpenOptions::new();
+    match options.read(true).write(true).create(true).truncate(false).share_mode(SHARE_READ).open(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.raw_os_error() == Some(SHARING_VIOLATION) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+#[cfg(windows)]
+fn is_held(path: &Path) -> bool {
+    let opened = OpenOptions::new().write(true).open(path);
+    opened.is_err_and(|error| error.raw_os_error() == Some(SHARING_VIOLATION))
+}
+
 /// The lock of a directory, held until it is dropped or the process ends.
 #[derive(Debug)]
 pub struct DirectoryLock {
     path: PathBuf,
-    _file: File,
+    file: Option<File>,
 }
 
 /// Outcome of [`DirectoryLock::acquire`].
@@ -38,13 +79,8 @@ impl DirectoryLock {
     pub fn acquire(directory: &Path) -> io::Result<Acquired> {
         let path = directory.join(LOCK);
         for _ in 0..ATTEMPTS {
-            let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path)?;
-            let before = text(&mut file);
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Ok(Acquired::Held(LockOwner::parse(&before))),
-                Err(TryLockError::Error(error)) => return Err(error),
-            }
+            let Some(mut file) = lock(&path)? else { return Ok(Acquired::Held(LockOwner::of(&path))) };
+            let before = LockOwner::parse(&text(&mut file));
             let own = LockOwner::this().text();
             file.set_len(0)?;
             io::Seek::rewind(&mut file)?;
@@ -53,7 +89,7 @@ impl DirectoryLock {
             // A holder that removed the file between opening and locking left a lock on a file without a name.
             match File::open(&path).map(|mut named| text(&mut named)) {
                 Ok(named) if named == own => {
-                    return Ok(Acquired::Lock(Self { path, _file: file }, LockOwner::parse(&before)));
+                    return Ok(Acquired::Lock(Self { path, file: Some(file) }, before));
                 }
                 Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::NotFound => {}
@@ -65,14 +101,18 @@ impl DirectoryLock {
 
     /// The process that holds the lock of a directory, if one does; the inner value is `None` if its file does not name it.
     pub fn holder(directory: &Path) -> Option<Option<LockOwner>> {
-        let mut file = File::open(directory.join(LOCK)).ok()?;
-        let owner = LockOwner::parse(&text(&mut file));
-        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)).then_some(owner)
+        let path = directory.join(LOCK);
+        let owner = LockOwner::of(&path);
+        is_held(&path).then_some(owner)
     }
 }
 
 impl Drop for DirectoryLock {
     fn drop(&mut self) {
+        // Windows removes no file that is open so; elsewhere another process could lock the file before it is removed.
+        if cfg!(windows) {
+            drop(self.file.take());
+        }
         // A file left behind does no harm: the lock is what counts.
         let _ = fs::remove_file(&self.path);
     }
@@ -104,6 +144,11 @@ impl LockOwner {
         let name: String = name.trim().chars().filter(|c| !c.is_control()).take(64).collect();
         let host = if name.is_empty() { "unknown".to_string() } else { name };
         Self { process: std::process::id(), host }
+    }
+
+    /// The process that a lock file names.
+    fn of(path: &Path) -> Option<Self> {
+        Self::parse(&text(&mut File::open(path).ok()?))
     }
 
     /// The text of the lock file.

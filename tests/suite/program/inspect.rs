@@ -3,8 +3,7 @@
 
 use crate::common::program::{Folder, HEADER, inspect, lnn, model, text};
 use serde_json::Value;
-use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
@@ -327,6 +326,7 @@ fn bad_states_are_data_errors() {
 #[cfg(unix)]
 #[test]
 fn devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line() {
+    use std::process::Stdio;
     let folder = Folder::new();
     inspect("double-pendulum", "/dev/zero", &[]).refused(1, &["/dev/zero: expected a regular file"]);
 
@@ -343,7 +343,7 @@ fn devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line() {
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0));
 
-    if let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") {
+    if let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") {
         let output = Command::new(env!("CARGO_BIN_EXE_lnn")).arg("systems").stdout(full).output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: standard output: "));

@@ -100,11 +100,11 @@ fn ended(child: Child, signal: &str) -> (Option<i32>, String, Duration) {
     (output.status.code(), String::from_utf8(output.stderr).unwrap(), began.elapsed())
 }
 
-/// `true` if the tests run under nohup: then the programs that they start ignore hangups too.
+/// `true` if the tests run under nohup: then the programs that they start ignore hangups too. Where the system does not tell, they leave hangups alone.
 fn hangups_are_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_none_or(|mask| mask & 1 == 1)
 }
 
 /// Steps between two samples, pixels of a picture, boxes of a proof: every loop looks at its flag.

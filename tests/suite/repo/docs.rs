@@ -25,8 +25,9 @@ fn read(path: &str) -> String {
 
 /// Every page by its path from the root.
 fn pages() -> BTreeMap<String, String> {
-    let mut pages: BTreeMap<String, String> =
-        ["README.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(|path| (path.to_string(), read(path))).into();
+    let mut pages: BTreeMap<String, String> = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"]
+        .map(|path| (path.to_string(), read(path)))
+        .into();
     for entry in fs::read_dir(root().join("docs")).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         if name.ends_with(".md") {
@@ -360,12 +361,33 @@ fn the_configuration_reference_is_that_of_the_types() {
     config.validate(2).unwrap();
 }
 
-/// Continuous integration runs what `.ci/run` runs, and the oldest compiler that the crate promises.
+/// Continuous integration runs what `.ci/run` runs, and the oldest compiler that the crate promises. What it takes from others is named by a
+/// commit, which nobody can change afterwards.
 #[test]
 fn continuous_integration_runs_every_check() {
     let workflow = read(".github/workflows/ci.yml");
     assert!(workflow.contains("run: .ci/run") && workflow.contains("rust-version"), "{workflow}");
+    let mut actions = Vec::new();
+    for entry in fs::read_dir(root().join(".github/workflows")).unwrap() {
+        let text = fs::read_to_string(entry.unwrap().path()).unwrap();
+        actions.extend(text.lines().filter_map(|line| line.split_once("uses: ")).map(|(_, action)| action.to_string()));
+    }
+    let pinned = |action: &&String| {
+        let (commit, version) =
+            action.split_once('@').and_then(|(_, rest)| rest.split_once(" # v")).unwrap_or_default();
+        commit.len() == 40 && commit.chars().all(|c| c.is_ascii_hexdigit()) && !version.is_empty()
+    };
+    let loose: Vec<&String> = actions.iter().filter(|action| !pinned(action)).collect();
+    assert!(actions.len() > 5 && loose.is_empty(), "{loose:?}");
+}
+
+/// One version in all files that state it.
+#[test]
+fn the_version_is_the_same_everywhere() {
     let version = env!("CARGO_PKG_VERSION");
+    for path in ["python/Cargo.toml", "python/pyproject.toml"] {
+        assert!(read(path).contains(&format!("\nversion = \"{version}\"\n")), "{path}");
+    }
     assert!(read("CITATION.cff").contains(&format!("\nversion: {version}\n")));
     assert!(read("CHANGELOG.md").contains(&format!("\n## {version}")));
 }

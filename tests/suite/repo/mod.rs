@@ -7,6 +7,7 @@ mod examples;
 mod floors;
 mod fuzz_seeds;
 mod model_format;
+mod properties;
 #[cfg(feature = "cli")]
 mod python;
 mod ratchets;

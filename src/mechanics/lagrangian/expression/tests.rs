@@ -155,7 +155,7 @@ fn same<S: Scalar>(a: S, b: S) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(crate::properties::properties(300))]
     #[test]
     fn printed_formulas_read_back_to_the_same_value(text in formulas(), x in -2.0f64..2.0) {
         let expression: Expression = text.parse().unwrap();

@@ -336,6 +336,8 @@ fn what_cannot_be_read_back_is_not_written() {
 }
 
 proptest! {
+    #![proptest_config(crate::properties::properties(256))]
+
     #[test]
     fn random_models_survive(
         hidden in prop::collection::vec(1usize..6, 1..4),

@@ -170,6 +170,8 @@ fn reads_exactly() {
 }
 
 proptest::proptest! {
+    #![proptest_config(crate::properties::properties(256))]
+
     #[test]
     fn text_reads_back(high: f64, low in -1.0..1.0_f64, gap in 53..400_i32) {
         let x = Dd::new(high, high * low * 2.0_f64.powi(-gap));
