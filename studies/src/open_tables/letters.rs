@@ -354,14 +354,21 @@ pub fn all(file: Option<&Path>, seeds: u64) {
     println!("{:.0} inverse dynamics a second on one thread", rate(&*learned(&states, 0, (2, 1))));
 }
 
-/// A made letter at its smallest; the arm itself is no error, and its controller draws what it is told.
-pub fn trial() {
-    let wave =
-        |phase: f64| (0..40).flat_map(|k| [(0.1 * k as f64 + phase).sin(), 0.3 * (0.2 * k as f64).cos()]).collect();
-    let letters = ["a", "e", "v", "q"].iter().enumerate().map(|(k, name)| (name.to_string(), wave(k as f64))).collect();
-    let (numbers, ..) = row(&letters, 0, (2, 1));
-    assert!(numbers.iter().all(|x| x.is_finite()), "{numbers:?}");
-    let (arm, letter) = (Mechanics::new(Arm, []), Motion::letter(letters["e"].clone()));
-    assert!(torque_errors(&arm, &letter).iter().all(|error| *error < 1e-24));
-    assert!(tracking_error(Some(&arm), &letter) < 1e-3 && tracking_error(None, &letter) > 1e-2);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A made letter at its smallest; the arm itself is no error, and its controller draws what it is told.
+    #[test]
+    fn letters_are_learned_and_drawn() {
+        let wave =
+            |phase: f64| (0..40).flat_map(|k| [(0.1 * k as f64 + phase).sin(), 0.3 * (0.2 * k as f64).cos()]).collect();
+        let letters =
+            ["a", "e", "v", "q"].iter().enumerate().map(|(k, name)| (name.to_string(), wave(k as f64))).collect();
+        let (numbers, ..) = row(&letters, 0, (2, 1));
+        assert!(numbers.iter().all(|x| x.is_finite()), "{numbers:?}");
+        let (arm, letter) = (Mechanics::new(Arm, []), Motion::letter(letters["e"].clone()));
+        assert!(torque_errors(&arm, &letter).iter().all(|error| *error < 1e-24));
+        assert!(tracking_error(Some(&arm), &letter) < 1e-3 && tracking_error(None, &letter) > 1e-2);
+    }
 }

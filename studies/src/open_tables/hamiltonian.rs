@@ -288,7 +288,13 @@ pub fn all(name: Option<&str>, seeds: u64, steps: usize) {
     table(&rows, seeds, 1.0, steps);
 }
 
-/// A row of either kind at its smallest.
-pub fn trial() {
-    table(&[&ROWS[0], &ROWS[2]], 1, 0.2, 4);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of either kind at its smallest.
+    #[test]
+    fn rows_of_either_kind_run() {
+        table(&[&ROWS[0], &ROWS[2]], 1, 0.2, 4);
+    }
 }

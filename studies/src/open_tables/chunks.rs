@@ -565,11 +565,6 @@ fn table(rows: &[&Row], seeds: u64, coordinates: &[bool], budget: &Budget) {
     }
 }
 
-/// One row at its smallest.
-pub fn trial() {
-    table(&[&ROWS[0]], 1, &[false, true], &Budget { chunks: 10, steps: 4, hidden: vec![4] });
-}
-
 /// Names of the rows.
 pub fn names() -> impl Iterator<Item = &'static str> {
     ROWS.iter().map(|row| row.name)
@@ -584,4 +579,15 @@ pub fn all(name: Option<&str>, seeds: u64, coordinates: Option<Coordinates>, chu
         None => &[false, true],
     };
     table(&rows, seeds, coordinates, &Budget { chunks, steps, hidden: vec![128; 3] });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One row at its smallest.
+    #[test]
+    fn a_row_runs() {
+        table(&[&ROWS[0]], 1, &[false, true], &Budget { chunks: 10, steps: 4, hidden: vec![4] });
+    }
 }

@@ -1,7 +1,7 @@
 //! How often a verdict is wrong: every word that judges is tried on systems drawn at random whose truth is known, and above all where the
 //! right answer is "no".
 //!
-//! `cargo bench --bench rates` prints one table; `--part identify`, `formula`, `constraints` or `readings` prints a part of it and `--seeds N`
+//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints` or `readings` prints a part of it and `--seeds N`
 //! gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
 mod constraints;
@@ -11,12 +11,11 @@ mod formula;
 mod identify;
 mod readings;
 
-use clap::{Parser, ValueEnum};
+use crate::Outcome;
+use clap::ValueEnum;
 use std::fmt::Write;
 use std::ops::RangeInclusive;
 use std::time::Instant;
-
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// How often something was said in a case.
 #[derive(Clone, Debug)]
@@ -76,30 +75,22 @@ impl Part {
     }
 }
 
-/// How often verdicts are wrong.
-#[derive(Parser)]
-struct Args {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     /// Run one part alone.
     #[arg(long)]
     part: Option<Part>,
     /// Systems of every case, seeds 0 to N - 1.
     #[arg(long, value_name = "N", default_value_t = 20)]
     seeds: u64,
-    /// Given by cargo.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
-/// Every part with one system a case.
-pub fn trial() {
-    for part in Part::ALL {
-        let rates = part.rates(1).expect("every system is judged");
-        assert!(rates.iter().all(|rate| rate.of > 0 && rate.said <= rate.of), "{rates:?}");
-    }
-}
-
-fn main() -> Outcome<()> {
-    let args = Args::parse();
+/// Prints the rates of the parts that are asked for.
+///
+/// # Errors
+/// A rate outside of its limits.
+pub fn run(args: Args) -> Outcome<()> {
     let parts = args.part.map_or(Part::ALL.to_vec(), |part| vec![part]);
     let mut outside = 0;
     for part in parts {
@@ -111,5 +102,19 @@ fn main() -> Outcome<()> {
     match outside {
         0 => Ok(()),
         _ => Err(format!("{outside} rates lie outside of their limits").into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every part with one system a case.
+    #[test]
+    fn every_part_runs() {
+        for part in Part::ALL {
+            let rates = part.rates(1).expect("every system is judged");
+            assert!(rates.iter().all(|rate| rate.of > 0 && rate.said <= rate.of), "{rates:?}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What is determined: values that are stated, from random starts.
 
-#[path = "../shared/forms.rs"]
+#[path = "../../../tests/suite/common/forms.rs"]
 mod forms;
 
 use super::{Outcome, Rate};

@@ -1,6 +1,6 @@
 //! Formulas found in made motion, of which the truth is known, and in real motion.
 //!
-//! `cargo bench --bench formula -- --part positions` records 100 runs of 5 s at 100 Hz of four systems, positions alone with independent
+//! `lnn-studies formula --part positions` records 100 runs of 5 s at 100 Hz of four systems, positions alone with independent
 //! noise, and looks for their formulas, for ten seeds each; a formula is right if it has these terms and no other. `--part half` is the same
 //! at half the noise, `--part tenth` with 10 runs at a third of the noise, `--part friction` with friction in the joints at half the noise,
 //! `--part forces` under known forces at 0.06, `--part clean` other systems without noise and with 1e-3, `--part cart-poles` a damped
@@ -9,11 +9,11 @@
 //! of networks that it trains by the preset `quick` as metrics, `L = v^T g(q) v/2`, or with `--black-box` as any function. Formulas
 //! of made motion are written to `target/formula/PART.csv` as well. Times are processor times.
 
-#[path = "formula/cases.rs"]
 mod cases;
 
+use crate::{ARMS, results};
 use cases::{CART_POLES, CLEAN, Case, FRICTION, METRICS, Metric, OUTSIDE, POSITIONS, Recorded};
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion};
 use lnn::lagrangian::configure;
 use lnn::network::Structure;
@@ -278,19 +278,9 @@ fn metric(case: &Metric, structure: Structure, seed: u64, show: bool) {
     }
 }
 
-/// Everything once, at its smallest.
-pub fn trial() {
-    let (case, _) = &POSITIONS[0];
-    let how = Recorded { runs: 6, seconds: 3.0, rate: 25.0, sigma: 1e-3, seed: 0, force: 0.0 };
-    assert!(line(case, how, 1, false, &mut String::new()));
-    assert_eq!(case.record(Recorded { force: 1.0, ..how }).tracks[0].force.len(), 76);
-    let options = FormulaOptions { threads: 1, ..case.options(0) };
-    assert!(formula_of_motion(&OUTSIDE[0].record(how), &options).is_ok());
-    assert_eq!(CLEAN.len() + FRICTION.len() + CART_POLES.coordinates.len(), 13);
-}
-
-#[derive(clap::Parser)]
-struct Arguments {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     /// What is measured; all parts if not given
     #[arg(long)]
     part: Option<Part>,
@@ -307,17 +297,14 @@ struct Arguments {
     #[arg(long)]
     black_box: bool,
     /// Folder of the recorded pendula
-    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/multi-arm-pendulum"))]
+    #[arg(long, default_value = ARMS)]
     arms: PathBuf,
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
-fn main() {
-    let Arguments { part, seeds, only, show, black_box, arms: folder_of_arms, .. } = Arguments::parse();
+/// Measures the parts that are asked for.
+pub fn run(Args { part, seeds, only, show, black_box, arms: folder_of_arms }: Args) {
     let structure = if black_box { Structure::BlackBox } else { Structure::Metric };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/formula");
-    std::fs::create_dir_all(&folder).expect("a folder for the results");
+    let folder = results("formula");
     for part in part.map_or(Part::value_variants().to_vec(), |part| vec![part]) {
         let name = part.to_possible_value().expect("no part is hidden").get_name().to_string();
         println!("{name}");
@@ -336,5 +323,22 @@ fn main() {
                 std::fs::write(folder.join(format!("{name}.csv")), csv).expect("room for the results");
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything once, at its smallest.
+    #[test]
+    fn everything_runs() {
+        let (case, _) = &POSITIONS[0];
+        let how = Recorded { runs: 6, seconds: 3.0, rate: 25.0, sigma: 1e-3, seed: 0, force: 0.0 };
+        assert!(line(case, how, 1, false, &mut String::new()));
+        assert_eq!(case.record(Recorded { force: 1.0, ..how }).tracks[0].force.len(), 76);
+        let options = FormulaOptions { threads: 1, ..case.options(0) };
+        assert!(formula_of_motion(&OUTSIDE[0].record(how), &options).is_ok());
+        assert_eq!(CLEAN.len() + FRICTION.len() + CART_POLES.coordinates.len(), 13);
     }
 }

@@ -1,15 +1,15 @@
 //! A watch over the figures that README and the pages state: which of them no longer hold, and how old the tables are.
 //!
-//! `cargo bench --bench watch` runs the command of every headline, reads its figure from what the command prints or writes, and prints
+//! `lnn-studies watch` runs the command of every headline, reads its figure from what the command prints or writes, and prints
 //! `holds` or `NO LONGER` beside the bound that the page's figure implies. It ends with an error if one does not hold. A headline whose
 //! recordings are missing has no figure, which is said and is no error. Times are those of two idle cores.
 //!
 //! Then, for README and every page, how many rows of tables state figures, the commit that the oldest row comes from, and how many commits
 //! have changed the numerics since. A row that was reworded without a measurement looks newer than it is.
 
-use clap::Parser;
+use crate::{Outcome, ROOT};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 use std::time::Instant;
 
 /// Where the figure of a command stands.
@@ -49,27 +49,31 @@ const HEADLINES: [Headline; 16] = [
     Headline { page: "docs/results.md", says: "double pendulum, preset best, seed 0", command: "lnn train double-pendulum --preset best --seed 0 --out OUT", figure: Figure::Summary("/validation_loss"), bound: 3e-4, minutes: 10 },
     Headline { page: "docs/structures.md", says: "separate kinetic and potential energy, loss", command: "lnn train double-pendulum --structure mechanical --seed 0 --out OUT", figure: Figure::Summary("/validation_loss"), bound: 1.6e-4, minutes: 1 },
     Headline { page: "docs/structures.md", says: "error of that mass matrix", command: "lnn train double-pendulum --structure mechanical --seed 0 --out OUT", figure: Figure::Summary("/mass_matrix/mean"), bound: 2e-5, minutes: 1 },
-    Headline { page: "docs/formula.md", says: "pendulum, constants within %", command: "cargo bench --bench formula -- --part positions --only pendulum --seeds 2", figure: Figure::Largest("constants within ", 0), bound: 2.0, minutes: 2 },
-    Headline { page: "docs/identify.md", says: "ranges of 90 % that hold the truth, of 100", command: "cargo bench --bench identify -- --part coverage", figure: Figure::Smallest(": ", 0), bound: 85.0, minutes: 5 },
-    Headline { page: "docs/identify.md", says: "seven-joint arm by its rows, farthest sum, standard errors", command: "cargo bench --bench measured -- --part links", figure: Figure::Largest("the farthest", 0), bound: 6.0, minutes: 1 },
-    Headline { page: "docs/results.md", says: "1-pendulum from chunks, constraints found", command: "cargo bench --bench open_tables -- --table chunks --row 1-pendulum --in cartesian --seeds 1", figure: Figure::Largest("cartesian", 1), bound: 1e-5, minutes: 2 },
-    Headline { page: "docs/results.md", says: "gyroscope from chunks, constraints found (constrained networks: 3.2e-5)", command: "cargo bench --bench open_tables -- --table chunks --row gyroscope --in cartesian --seeds 1", figure: Figure::Largest("cartesian", 1), bound: 1e-4, minutes: 9 },
-    Headline { page: "docs/results.md", says: "spring, error of the energy (Hamiltonian networks: 3.8e-4)", command: "cargo bench --bench open_tables -- --table hamiltonian --row spring --seeds 1", figure: Figure::Largest("spring", 1), bound: 3e-4, minutes: 1 },
-    Headline { page: "docs/results.md", says: "rotor from chunks (Hamiltonian networks: 0.28)", command: "cargo bench --bench open_tables -- --table chunks --row rotor --in generalized --seeds 1", figure: Figure::Largest("generalized", 1), bound: 0.28, minutes: 2 },
-    Headline { page: "docs/results.md", says: "3-body, error of the energy", command: "cargo bench --bench open_tables -- --table hamiltonian --row 3-body --seeds 1", figure: Figure::Largest("3-body", 1), bound: 1e-3, minutes: 4 },
-    Headline { page: "docs/recorded-motion.md", says: "films with friction, 0.5 s ahead, rad", command: "cargo bench --bench measured -- --part films", figure: Figure::Largest("friction, through the motion", 3), bound: 0.09, minutes: 10 },
-    Headline { page: "docs/constraints.md", says: "double pendulum with constraints found, loss", command: "cargo bench --bench constraints -- --part learned --system cartesian-chain-2 --seeds 1", figure: Figure::Largest("mechanical", 1), bound: 2e-6, minutes: 5 },
+    Headline { page: "docs/formula.md", says: "pendulum, constants within %", command: "lnn-studies formula --part positions --only pendulum --seeds 2", figure: Figure::Largest("constants within ", 0), bound: 2.0, minutes: 2 },
+    Headline { page: "docs/identify.md", says: "ranges of 90 % that hold the truth, of 100", command: "lnn-studies identify --part coverage", figure: Figure::Smallest(": ", 0), bound: 85.0, minutes: 5 },
+    Headline { page: "docs/identify.md", says: "seven-joint arm by its rows, farthest sum, standard errors", command: "lnn-studies measured --part links", figure: Figure::Largest("the farthest", 0), bound: 6.0, minutes: 1 },
+    Headline { page: "docs/results.md", says: "1-pendulum from chunks, constraints found", command: "lnn-studies open-tables --table chunks --row 1-pendulum --in cartesian --seeds 1", figure: Figure::Largest("cartesian", 1), bound: 1e-5, minutes: 2 },
+    Headline { page: "docs/results.md", says: "gyroscope from chunks, constraints found (constrained networks: 3.2e-5)", command: "lnn-studies open-tables --table chunks --row gyroscope --in cartesian --seeds 1", figure: Figure::Largest("cartesian", 1), bound: 1e-4, minutes: 9 },
+    Headline { page: "docs/results.md", says: "spring, error of the energy (Hamiltonian networks: 3.8e-4)", command: "lnn-studies open-tables --table hamiltonian --row spring --seeds 1", figure: Figure::Largest("spring", 1), bound: 3e-4, minutes: 1 },
+    Headline { page: "docs/results.md", says: "rotor from chunks (Hamiltonian networks: 0.28)", command: "lnn-studies open-tables --table chunks --row rotor --in generalized --seeds 1", figure: Figure::Largest("generalized", 1), bound: 0.28, minutes: 2 },
+    Headline { page: "docs/results.md", says: "3-body, error of the energy", command: "lnn-studies open-tables --table hamiltonian --row 3-body --seeds 1", figure: Figure::Largest("3-body", 1), bound: 1e-3, minutes: 4 },
+    Headline { page: "docs/recorded-motion.md", says: "films with friction, 0.5 s ahead, rad", command: "lnn-studies measured --part films", figure: Figure::Largest("friction, through the motion", 3), bound: 0.09, minutes: 10 },
+    Headline { page: "docs/constraints.md", says: "double pendulum with constraints found, loss", command: "lnn-studies constraints --part learned --system cartesian-chain-2 --seeds 1", figure: Figure::Largest("mechanical", 1), bound: 2e-6, minutes: 5 },
 ];
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(ROOT)
 }
 
 /// The output of a command, printed and written; an error in words if it cannot be run or fails.
-fn run(command: &str, out: &Path) -> Result<String, String> {
+fn output_of(command: &str, out: &Path) -> Result<String, String> {
     let mut words = command.split_whitespace();
     let program = words.next().unwrap_or_default();
-    let program = if program == "lnn" { root().join("target/release/lnn") } else { PathBuf::from(program) };
+    let program = match program {
+        "lnn" => root().join("target/release/lnn"),
+        "lnn-studies" => std::env::current_exe().map_err(|error| format!("lnn-studies: {error}"))?,
+        other => PathBuf::from(other),
+    };
     let words = words.map(|word| if word == "OUT" { out.as_os_str().to_owned() } else { word.into() });
     let done = Command::new(&program).args(words).current_dir(root()).output();
     let done = done.map_err(|error| format!("{}: {error}", program.display()))?;
@@ -111,7 +115,7 @@ fn watch(headlines: &[&Headline]) -> bool {
             Some((command, printed)) if command == headline.command => printed,
             _ => {
                 drop(std::fs::remove_dir_all(&out));
-                run(headline.command, &out)
+                output_of(headline.command, &out)
             }
         };
         let found = printed.as_ref().ok().and_then(|printed| figure(headline, printed, &out));
@@ -172,23 +176,9 @@ fn ages() {
     }
 }
 
-/// Figures are found in what is printed, and bounds are bounds.
-pub fn trial() {
-    let printed = "a row\n  loss 2.5e-7, 3 s\n  loss 4e-7\nloss none";
-    let of = |figure| Headline { page: "", says: "", command: "", figure, bound: 3e-7, minutes: 0 };
-    let largest = of(Figure::Largest("loss ", 0));
-    assert_eq!(figure(&largest, printed, Path::new("")), Some(4e-7));
-    assert!(!largest.holds(4e-7));
-    let smallest = of(Figure::Smallest("loss ", 0));
-    assert_eq!(figure(&smallest, printed, Path::new("")), Some(2.5e-7));
-    assert!(!smallest.holds(2.5e-7) && smallest.holds(3e-7));
-    assert_eq!(figure(&of(Figure::Largest("loss ", 1)), printed, Path::new("")), Some(3.0));
-    assert_eq!(figure(&of(Figure::Summary("/loss")), printed, Path::new("no such folder")), None);
-    assert!(HEADLINES.iter().all(|headline| root().join(headline.page).exists()));
-}
-
-#[derive(clap::Parser)]
-struct Arguments {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     /// Leave out headlines that take longer, in minutes
     #[arg(long, default_value_t = 10)]
     minutes: u32,
@@ -198,12 +188,13 @@ struct Arguments {
     /// List the headlines without running them
     #[arg(long)]
     list: bool,
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
-fn main() -> ExitCode {
-    let Arguments { minutes, only, list, .. } = Arguments::parse();
+/// Runs or lists the headlines; then the ages of all tables.
+///
+/// # Errors
+/// A figure that no longer holds.
+pub fn run(Args { minutes, only, list }: Args) -> Outcome<()> {
     let asked = |headline: &&Headline| {
         headline.minutes <= minutes && (headline.page.contains(&only) || headline.says.contains(&only))
     };
@@ -213,9 +204,30 @@ fn main() -> ExitCode {
         headlines.iter().for_each(|h| println!("{:>3} min  {}: {}\n         {}", h.minutes, h.page, h.says, h.command));
     } else {
         println!("{}", git(&["describe", "--always", "--dirty"]).unwrap_or_else(|| "no history".to_string()));
-        run("cargo build --release --locked --quiet", Path::new("")).expect("the program builds");
+        output_of("cargo build --release --locked --quiet", Path::new(""))?;
         all = watch(&headlines);
     }
     ages();
-    if all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if all { Ok(()) } else { Err("a figure no longer holds".into()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Figures are found in what is printed, and bounds are bounds.
+    #[test]
+    fn figures_are_found_and_bounds_are_bounds() {
+        let printed = "a row\n  loss 2.5e-7, 3 s\n  loss 4e-7\nloss none";
+        let of = |figure| Headline { page: "", says: "", command: "", figure, bound: 3e-7, minutes: 0 };
+        let largest = of(Figure::Largest("loss ", 0));
+        assert_eq!(figure(&largest, printed, Path::new("")), Some(4e-7));
+        assert!(!largest.holds(4e-7));
+        let smallest = of(Figure::Smallest("loss ", 0));
+        assert_eq!(figure(&smallest, printed, Path::new("")), Some(2.5e-7));
+        assert!(!smallest.holds(2.5e-7) && smallest.holds(3e-7));
+        assert_eq!(figure(&of(Figure::Largest("loss ", 1)), printed, Path::new("")), Some(3.0));
+        assert_eq!(figure(&of(Figure::Summary("/loss")), printed, Path::new("no such folder")), None);
+        assert!(HEADLINES.iter().all(|headline| root().join(headline.page).exists()));
+    }
 }

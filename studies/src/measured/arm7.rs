@@ -144,7 +144,7 @@ pub fn links(seeds: std::ops::Range<u64>, seconds: f64, folder: &Path, states: u
         let [coords, force] = ["q", "tau"].map(names);
         let columns = Columns { coords, force, time: Some("t".to_string()), ..Columns::default() };
         let reading = read_recording(&[file], &columns).expect("a log");
-        let system = parse_system(include_str!("../../examples/systems/seven_joints.toml")).expect("a system");
+        let system = parse_system(include_str!("../../../examples/systems/seven_joints.toml")).expect("a system");
         let arm = configure_system::<f64>(Cow::Owned(system.clone()), &[]).expect("defaults");
         let start = Instant::now();
         let found = identify(&arm, &reading.recording, &IdentifyOptions::default()).expect("forces");

@@ -1,13 +1,12 @@
 //! Tables that others published, by their protocols, learned here.
 //!
-//! `cargo bench --bench open_tables` runs all of them; `--table chunks` is of Finzi, Wang and Wilson, `--table hamiltonian` of Greydanus,
+//! `lnn-studies open-tables` runs all of them; `--table chunks` is of Finzi, Wang and Wilson, `--table hamiltonian` of Greydanus,
 //! Dzamba and Yosinski, `--table letters --letters FILE.csv` of Lutter, Ritter and Peters.
 
 mod chunks;
 mod hamiltonian;
 mod letters;
 
-use clap::Parser;
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 
@@ -24,8 +23,9 @@ enum Coordinates {
     Cartesian,
 }
 
-#[derive(clap::Parser)]
-struct Arguments {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     /// One table; all if not given
     #[arg(long)]
     table: Option<Table>,
@@ -47,19 +47,10 @@ struct Arguments {
     /// Recorded letters, a file that `benches/peers/letters.py` makes
     #[arg(long)]
     letters: Option<PathBuf>,
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
-/// Rows of every table at their smallest.
-pub fn trial() {
-    chunks::trial();
-    hamiltonian::trial();
-    letters::trial();
-}
-
-fn main() {
-    let arguments = Arguments::parse();
+/// Measures the tables that are asked for.
+pub fn run(arguments: Args) {
     let (row, seeds, steps) = (arguments.row.as_deref(), arguments.seeds, arguments.steps);
     let asked = |table: Table| arguments.table.is_none_or(|asked| asked == table);
     if asked(Table::Chunks) {

@@ -1,15 +1,14 @@
 //! The search for constants from starts that are far off: it arrives at the truth or says that it did not.
 
 use super::{Outcome, Rate};
-use lnn::cli::parse_system;
+use crate::setups::configured;
 use lnn::identification::{Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::lagrangian::SystemInstance;
 use lnn::prelude::*;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use std::borrow::Cow;
 
 /// Starts are off by a factor of up to so much, either way.
 const FAR: f64 = 20.0;
@@ -78,9 +77,7 @@ const CASES: [Case; 4] = [
 
 impl Case {
     fn system(&self, given: &[(&str, f64)]) -> Outcome<SystemInstance<f64>> {
-        let system = parse_system(self.text).map_err(|(line, problem)| format!("{line}: {problem}"))?;
-        let given: Vec<(String, String)> = given.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-        Ok(configure_system(Cow::Owned(system), &given)?)
+        configured(self.text, given)
     }
 
     /// Motion of 8 s at 50 Hz with 2 permille of noise, identified from a far start; the truth.

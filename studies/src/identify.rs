@@ -1,16 +1,16 @@
 //! Constants of known forms from made motion, of which the truth is known, and from real motion.
 //!
-//! `cargo bench --bench identify -- --part coverage` records double pendula with noise and counts how often the stated 90 % ranges hold the
+//! `lnn-studies identify --part coverage` records double pendula with noise and counts how often the stated 90 % ranges hold the
 //! truth, seeds 0 to 99; `--part duffing` identifies an oscillator from eight samples a period under a force that is held between the samples;
 //! `--part arms` identifies recorded pendula of two and three arms (DynamicsLab, University of Washington) and predicts runs that were not
 //! identified from, if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files.
 
 #[allow(dead_code)]
-#[path = "../examples/arms.rs"]
+#[path = "../../examples/arms.rs"]
 mod arms;
 
-use clap::Parser;
-use lnn::cli::parse_system;
+use crate::setups::configured;
+use crate::{ARMS, Outcome, ROOT};
 use lnn::identification::{Between, Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure};
 use lnn::prelude::*;
@@ -18,19 +18,12 @@ use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Driven, Motion, Options, SampledForce};
 use rand_distr::{Distribution, StandardNormal};
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
-
 /// A system of the folder `examples/systems` with values of its parameters.
 fn system(file: &str, given: &[(&str, f64)]) -> Outcome<SystemInstance<f64>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/systems").join(file);
-    let system =
-        parse_system(&std::fs::read_to_string(path)?).map_err(|(line, problem)| format!("{line}: {problem}"))?;
-    let given: Vec<(String, String)> = given.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    Ok(lnn::lagrangian::configure_system(Cow::Owned(system), &given)?)
+    configured(&std::fs::read_to_string(Path::new(ROOT).join("examples/systems").join(file))?, given)
 }
 
 fn options(constants: &[&str]) -> IdentifyOptions {
@@ -192,12 +185,6 @@ fn recorded_arms(folder: &Path) -> Outcome<()> {
     Ok(())
 }
 
-/// The smallest of everything.
-pub fn trial() {
-    coverage(1).expect("a pendulum is identified");
-    duffing(400).expect("an oscillator is identified");
-}
-
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Part {
     Coverage,
@@ -205,25 +192,36 @@ enum Part {
     Arms,
 }
 
-#[derive(clap::Parser)]
-struct Arguments {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     #[arg(long, default_value = "coverage")]
     part: Part,
     /// Recordings of `coverage`, of seeds from 0 on
     #[arg(long, default_value_t = 100)]
     seeds: u64,
     /// Folder of the recorded pendula
-    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/multi-arm-pendulum"))]
+    #[arg(long, default_value = ARMS)]
     arms: PathBuf,
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
-fn main() -> Outcome<()> {
-    let arguments = Arguments::parse();
+/// Measures the part that is asked for.
+pub fn run(arguments: Args) -> Outcome<()> {
     match arguments.part {
         Part::Coverage => coverage(arguments.seeds),
         Part::Duffing => duffing(40_000),
         Part::Arms => recorded_arms(&arguments.arms),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The smallest of everything.
+    #[test]
+    fn everything_runs() {
+        coverage(1).expect("a pendulum is identified");
+        duffing(400).expect("an oscillator is identified");
     }
 }

@@ -1,15 +1,14 @@
 //! Constraints: found in recorded motion, kept over long times, learned under, and what they cost.
 //!
-//! `cargo bench --bench constraints -- --part found` records every system under constraints, 100 motions of 5 s at 100 Hz with noise of 0,
+//! `lnn-studies constraints --part found` records every system under constraints, 100 motions of 5 s at 100 Hz with noise of 0,
 //! 0.001 and 0.01 of the size of each column, seed 0, and at 0.001 seeds 0 to 9, and looks for its constraints. `--part none` does the
 //! same with ten systems without. `--part drift` integrates 10,000 swings; `--part learned` learns Lagrangians in Cartesian coordinates
 //! under constraints that were found, not given; `--part cost` times evaluations, roll-outs and training steps beside those of free
 //! coordinates. Without `--part` all.
 
-#[path = "shared/networks.rs"]
+#[path = "../../benches/shared/networks.rs"]
 mod networks;
 
-use clap::Parser;
 use lnn::analysis::mass_matrix_error_within;
 use lnn::configuration::Penalty;
 use lnn::constraints::{ConstraintSearch, FoundConstraints, MotionSamples, find_constraints};
@@ -501,14 +500,6 @@ fn cost(rounds: usize, count: usize) {
     println!("{:<28} {free:>9.0} {constrained:>12.0}  ({:.2})", "training step, n = 4, m = 2", constrained / free);
 }
 
-/// Every part once, at its smallest.
-pub fn trial() {
-    row("cartesian-chain-1", 1, 2, 0.001, 0, (8, 1.0));
-    row("harmonic-oscillator", 0, 2, 0.001, 0, (8, 1.0));
-    drift(2.0);
-    cost(1, 128);
-}
-
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Part {
     Found,
@@ -518,8 +509,9 @@ enum Part {
     Learned,
 }
 
-#[derive(clap::Parser)]
-struct Arguments {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     /// What is measured; all parts if not given
     #[arg(long)]
     part: Option<Part>,
@@ -535,12 +527,10 @@ struct Arguments {
     /// Noise of the motions in which `learned` finds its constraints
     #[arg(long, default_value_t = 0.0)]
     noise: f64,
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
-fn main() {
-    let arguments = Arguments::parse();
+/// Measures the parts that are asked for.
+pub fn run(arguments: Args) {
     let only = |name: &str| arguments.system.as_deref().is_none_or(|system| system == name);
     let asked = |part: Part| arguments.part.is_none_or(|asked| asked == part);
     if asked(Part::Found) {
@@ -557,5 +547,19 @@ fn main() {
     }
     if asked(Part::Learned) {
         learned(arguments.seeds.min(5), (60_000, arguments.epochs, arguments.noise), &only);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every part once, at its smallest.
+    #[test]
+    fn every_part_runs() {
+        row("cartesian-chain-1", 1, 2, 0.001, 0, (8, 1.0));
+        row("harmonic-oscillator", 0, 2, 0.001, 0, (8, 1.0));
+        drift(2.0);
+        cost(1, 128);
     }
 }

@@ -280,7 +280,7 @@ pub fn learn(
 /// The learned constants of two pendula beside a small network, with the truth.
 fn grey_box(runs: usize, seconds: f64, seed: u64, epochs: Option<usize>) -> Told {
     let case = CASES.iter().find(|case| case.name == "two pendula").expect("a case of this name");
-    let known = include_str!("../../examples/systems/grey_pendula.toml");
+    let known = include_str!("../../../examples/systems/grey_pendula.toml");
     let (measured, model, remark) = learn(&case.recording(runs, seconds, seed), (seed, epochs), |config| {
         config.network.known = Some(Known::Description(Box::new(toml::from_str(known).expect("a system file"))));
         config.network.alpha = 0.0;

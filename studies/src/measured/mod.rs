@@ -17,42 +17,32 @@
 //!
 //! And a made recording with lost rows and a clock that jitters.
 //!
-//! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
+//! `lnn-studies measured --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
-//! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
-//! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour, `-- --part arm7` the arm, some minutes, `-- --part links` the arm by its rows, `-- --part tubes` the tubes, some minutes, `-- --part lost` the lost rows, some minutes;
+//! rest is predicted, 0.5 s at a time. `--part noise` is the made motion, `--part rows` reads and surveys ten million
+//! rows and says what that took, `--part textbook` the films without what has to be trained, `--part determination` the
+//! small systems, some minutes, `--part orbits` orbits around a hole, a quarter of an hour, `--part arm7` the arm, some minutes, `--part links` the arm by its rows, `--part tubes` the tubes, some minutes, `--part lost` the lost rows, some minutes;
 //! without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv`, `orbits.csv`, `arm7.csv`, `links.csv`, `tubes.csv` and `lost.csv` into `target/measured`.
 
 #[allow(dead_code)]
-#[path = "shared/arm.rs"]
+#[path = "../../../tests/suite/common/arm.rs"]
 pub mod arm;
-#[path = "measured/arm7.rs"]
 mod arm7;
-#[path = "measured/determination.rs"]
 mod determination;
-#[path = "measured/lost.rs"]
 mod lost;
-#[path = "measured/noise.rs"]
 mod noise;
-#[path = "measured/orbits.rs"]
 mod orbits;
-#[path = "measured/plain.rs"]
 mod plain;
-#[path = "measured/recorded_orbits.rs"]
 mod recorded_orbits;
-#[path = "measured/rows.rs"]
 mod rows;
-#[path = "measured/textbook.rs"]
 mod textbook;
-#[path = "measured/tubes.rs"]
 mod tubes;
 #[allow(dead_code)]
-#[path = "../examples/pendulum_video.rs"]
+#[path = "../../../examples/pendulum_video.rs"]
 mod video;
 
-use clap::Parser;
+use crate::{ROOT, results};
 use lnn::analysis::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
@@ -93,15 +83,14 @@ enum Part {
     Lost,
 }
 
-#[derive(clap::Parser)]
-struct Arguments {
+/// Arguments.
+#[derive(clap::Args)]
+pub struct Args {
     /// What is measured; all parts if not given
     #[arg(long)]
     part: Option<Part>,
     /// Films of `films` and `textbook`: `x_red,y_red,x_green,y_green,x_blue,y_blue`
     films: Vec<PathBuf>,
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// Seeds of the small systems: those before them served to choose.
@@ -128,15 +117,6 @@ fn recording(path: &Path, text: &str) -> Result<Recording, String> {
     let track = RecordedTrajectory { name, times, q, v: vec![], a: vec![], force: vec![] };
     let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
     Ok(Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] })
-}
-
-/// A swing of two uncoupled, damped oscillators, for the trial run.
-fn made() -> Recording {
-    let times: Vec<f64> = (0..1200).map(|k| k as f64 / RATE).collect();
-    let q = times.iter().flat_map(|t| [(3.0 * t).cos() * (-0.1 * t).exp(), 0.5 * (5.0 * t).sin()]).collect();
-    let track = RecordedTrajectory { name: "made".into(), times, q, v: vec![], a: vec![], force: vec![] };
-    let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
-    Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] }
 }
 
 /// A recording smoothed and divided as `lnn fit` does.
@@ -247,29 +227,10 @@ fn lines(
     lines
 }
 
-/// Everything once, on little motion.
-pub fn trial() {
-    let scale = Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 };
-    let measured = measured(&made());
-    assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
-    assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
-    assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5 + 3);
-    assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
-    let place = tempfile::tempdir().expect("a folder");
-    assert_eq!(arm7::compare(0..1, 8.0, place.path(), (Some(1), 1)).len(), 2 * 7);
-    assert_eq!(arm7::links(0..1, 4.0, place.path(), 64).len(), 7);
-    let few = tubes::Motions { counts: [4, 20, 3], seconds: 2.0, ahead: 0.1 };
-    assert_eq!(tubes::compare(few, scale).len(), 3 * 2);
-    assert_eq!(lost::compare(0..1, (6, 4.0), Some(scale)).len(), 3);
-    let found = rows::time(&place.path().join("rows.csv"), 2000);
-    assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
-}
-
-fn main() {
-    let Arguments { part, films, .. } = Arguments::parse();
+/// Measures what is asked for, and writes it.
+pub fn run(Args { part, films }: Args) {
     let asked = |name: Part| part.is_none_or(|part| part == name);
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/measured");
-    std::fs::create_dir_all(&folder).expect("a folder for the results");
+    let folder = results("measured");
     let scale = Scale { epochs: None, hidden: [128; 3], shooting_epochs: Shooting::default().epochs };
     // First, while the process is small.
     if asked(Part::Rows) {
@@ -325,7 +286,7 @@ fn main() {
 /// Compares the predictors on every film; the table as CSV.
 fn filmed(mut films: Vec<PathBuf>, scale: Option<Scale>) -> String {
     if films.is_empty() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ibm-double-pendulum");
+        let folder = Path::new(ROOT).join("../shared/data/ibm-double-pendulum");
         films = (0..3).map(|k| folder.join(format!("{k}.csv"))).filter(|path| path.exists()).collect();
     }
     if films.is_empty() {
@@ -353,4 +314,37 @@ fn filmed(mut films: Vec<PathBuf>, scale: Option<Scale>) -> String {
         }
     }
     csv
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A swing of two uncoupled, damped oscillators, for the trial run.
+    fn made() -> Recording {
+        let times: Vec<f64> = (0..1200).map(|k| k as f64 / RATE).collect();
+        let q = times.iter().flat_map(|t| [(3.0 * t).cos() * (-0.1 * t).exp(), 0.5 * (5.0 * t).sin()]).collect();
+        let track = RecordedTrajectory { name: "made".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
+        Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] }
+    }
+
+    /// Everything once, on little motion.
+    #[test]
+    fn everything_runs() {
+        let scale = Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 };
+        let measured = measured(&made());
+        assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
+        assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
+        assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5 + 3);
+        assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
+        let place = tempfile::tempdir().expect("a folder");
+        assert_eq!(arm7::compare(0..1, 8.0, place.path(), (Some(1), 1)).len(), 2 * 7);
+        assert_eq!(arm7::links(0..1, 4.0, place.path(), 64).len(), 7);
+        let few = tubes::Motions { counts: [4, 20, 3], seconds: 2.0, ahead: 0.1 };
+        assert_eq!(tubes::compare(few, scale).len(), 3 * 2);
+        assert_eq!(lost::compare(0..1, (6, 4.0), Some(scale)).len(), 3);
+        let found = rows::time(&place.path().join("rows.csv"), 2000);
+        assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
+    }
 }
