@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod constraints;
+mod experiment;
 mod formula;
 mod identify;
 mod measured;
@@ -30,7 +31,7 @@ fn results(name: &str) -> PathBuf {
     folder
 }
 
-/// Studies of recorded motion, of tables that others published, and of how often verdicts are wrong.
+/// Studies of the paper, of recorded motion, of tables that others published, and of how often verdicts are wrong.
 #[derive(clap::Parser)]
 #[command(name = "lnn-studies", version)]
 struct Program {
@@ -42,6 +43,8 @@ struct Program {
 enum Study {
     /// Constraints: found in motion, kept, learned under, and what they cost.
     Constraints(constraints::Args),
+    /// Tables and figures of the paper, whole or in shares; without a name, their list.
+    Experiment(Box<experiment::Args>),
     /// Formulas found in simulated and in recorded motion.
     Formula(formula::Args),
     /// Constants of known forms from simulated and recorded motion.
@@ -57,11 +60,16 @@ enum Study {
 }
 
 fn main() -> ExitCode {
-    match Program::parse().study {
+    let program = match Program::try_parse() {
+        Ok(program) => program,
+        Err(error) => return lnn::cli::answer(&error),
+    };
+    match program.study {
         Study::Constraints(args) => constraints::run(args),
         Study::Formula(args) => formula::run(args),
         Study::Measured(args) => measured::run(args),
         Study::OpenTables(args) => open_tables::run(args),
+        Study::Experiment(args) => return lnn::cli::ended(|| experiment::run(&args)),
         Study::Identify(args) => return ended(identify::run(args)),
         Study::Rates(args) => return ended(rates::run(args)),
         Study::Watch(args) => return ended(watch::run(args)),
@@ -77,5 +85,46 @@ fn ended(outcome: Outcome<()>) -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::FAILURE
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// Commands of this program on a page: in lines of shell blocks and in code spans.
+    fn commands(page: &str) -> Vec<String> {
+        let pieces = page.split(['`', '\n']).flat_map(|piece| {
+            ["cargo run --release -p lnn-studies -- ", "lnn-studies "].map(|name| piece.strip_prefix(name))
+        });
+        pieces.flatten().map(|rest| rest.split(" #").next().unwrap_or_default().trim().to_string()).collect()
+    }
+
+    /// A word that stands for something, replaced by what it may stand for.
+    fn example(word: &str) -> &str {
+        match word {
+            "NAME" => "quick",
+            "N" => "1",
+            "PART" => "positions",
+            other => other,
+        }
+    }
+
+    #[test]
+    fn every_command_of_the_pages_is_understood() {
+        let pages = fs::read_dir(Path::new(ROOT).join("docs")).unwrap().map(|entry| entry.unwrap().path());
+        let pages = pages.filter(|path| path.extension().is_some_and(|end| end == "md"));
+        let (mut count, mut faults) = (0, Vec::new());
+        for page in pages.chain([Path::new(ROOT).join("README.md")]) {
+            for line in commands(&fs::read_to_string(&page).unwrap()) {
+                count += 1;
+                let words = ["lnn-studies"].into_iter().chain(line.split_whitespace().map(example));
+                if let Err(error) = Program::try_parse_from(words) {
+                    faults.push(format!("{}: {line}: {error}", page.display()));
+                }
+            }
+        }
+        assert!(count > 60 && faults.is_empty(), "{count} commands\n{}", faults.join("\n"));
     }
 }

@@ -214,6 +214,7 @@ pub fn run(Args { minutes, only, list }: Args) -> Outcome<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::Parser;
 
     /// Figures are found in what is printed, and bounds are bounds.
     #[test]
@@ -229,5 +230,17 @@ mod tests {
         assert_eq!(figure(&of(Figure::Largest("loss ", 1)), printed, Path::new("")), Some(3.0));
         assert_eq!(figure(&of(Figure::Summary("/loss")), printed, Path::new("no such folder")), None);
         assert!(HEADLINES.iter().all(|headline| root().join(headline.page).exists()));
+    }
+
+    #[test]
+    fn every_command_is_understood() {
+        for Headline { command, .. } in &HEADLINES {
+            let words = command.split_whitespace();
+            if command.starts_with("lnn-studies ") {
+                crate::Program::try_parse_from(words).unwrap_or_else(|error| panic!("{command}: {error}"));
+            } else {
+                lnn::cli::check_arguments(words.map(Into::into)).unwrap_or_else(|error| panic!("{command}: {error}"));
+            }
+        }
     }
 }

@@ -10,10 +10,8 @@ mod plot;
 mod table;
 
 pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};
-pub use experiment::Curve;
-pub(crate) use experiment::{
-    REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
-};
+pub use experiment::groups;
+pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
 pub(crate) use formula::formula_text;
 pub use grids::{Fit, GridComparison, grid_figures};
 pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
@@ -24,7 +22,6 @@ pub use plot::{
     trace_plot,
 };
 pub use table::{DataTable, text_table};
-pub(crate) use table::{READING_HEADER, reading_table};
 
 /// One picture of a report.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +37,7 @@ pub struct Figure {
 }
 
 /// A figure of what was drawn, under a heading; none where there was nothing to show.
-pub(crate) fn figure(
+pub fn figure(
     file: &str,
     heading: impl Into<String>,
     drawn: Result<Picture, PlotError>,

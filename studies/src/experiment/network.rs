@@ -1,10 +1,12 @@
 //! The paper's network experiments, all on the double pendulum (its appendix "Training details of network experiments").
 
+use super::experiments::{Experiment, Picture};
 use super::physical::config_of;
-use super::{Experiment, Picture, Quantity, Reduction, Reported, Run, slug};
-use crate::configuration::{Config, Precision, Regularizer, Scaling};
-use crate::network::{ActivationChoice, Initialization, InputLayer};
-use crate::presets::Preset;
+use super::reductions::{Quantity, Reduction};
+use lnn::configuration::{Config, Precision, Regularizer, Scaling};
+use lnn::experiments::{Reported, Run, slug};
+use lnn::network::{ActivationChoice, Initialization, InputLayer};
+use lnn::presets::Preset;
 use std::f64::consts::PI;
 
 /// Angle bounds of a training.
@@ -46,7 +48,13 @@ const fn reduction(quantity: Quantity, group: &'static str, against: &'static st
     Reduction { quantity, group, against, paper }
 }
 
-impl Run {
+/// A run with a seed and with figures of the paper.
+trait With {
+    fn seed(self, seed: u64) -> Self;
+    fn reported(self, loss: f64, instability: f64) -> Self;
+}
+
+impl With for Run {
     fn seed(mut self, seed: u64) -> Self {
         self.config.seed = seed;
         self

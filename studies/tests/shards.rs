@@ -1,6 +1,6 @@
 //! Processes with a share of an experiment each, killed at random moments and started again: the tables that are merged, and the
 //! models, are those of a single process, to the last byte.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +20,7 @@ const KILLS: usize = 50;
 
 /// A command about the runs in a directory.
 fn experiment(before: &[&str], out: &Path, after: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lnn-studies"));
     command
         .arg("experiment")
         .args(before)

@@ -1,10 +1,11 @@
 //! Holes learned from free fall, and read.
 
-use super::{Experiment, Picture, Reported, Run, slug};
-use crate::configuration::Config;
-use crate::lagrangian::{SystemInstance, configure};
-use crate::network::Structure;
-use crate::presets::Preset;
+use super::experiments::{Experiment, Picture};
+use lnn::configuration::Config;
+use lnn::experiments::{Reported, Run, slug};
+use lnn::lagrangian::{SystemInstance, configure};
+use lnn::network::Structure;
+use lnn::presets::Preset;
 use std::collections::BTreeMap;
 
 /// Holes in coordinates that pass through the horizon.

@@ -1,11 +1,12 @@
 //! The paper's physical experiments, one training each, judged by its trajectory test; this crate's presets against them,
 //! and how soon each gets where.
 
-use super::{Experiment, Picture, Reported, Run};
-use crate::configuration::Config;
-use crate::lagrangian::{configure, find};
-use crate::optimizers::Method;
-use crate::presets::Preset;
+use super::experiments::{Experiment, Picture};
+use lnn::configuration::Config;
+use lnn::experiments::{Reported, Run};
+use lnn::lagrangian::{configure, find};
+use lnn::optimizers::Method;
+use lnn::presets::Preset;
 
 /// Everything an evaluation draws.
 const ALL: &[Picture] = &[Picture::Evaluation(&[""])];

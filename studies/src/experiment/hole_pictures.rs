@@ -1,9 +1,7 @@
 //! Pictures of a learned black hole beside the exact one: orbits, shadow and sky.
 
-use crate::relativity::{
-    Camera, CentralCoordinates, Image, LearnedHole, Sky, Tracing, difference_image, orbits, shadow,
-};
-use crate::report::{OrbitPlot, Picture, Series, orbit_picture, png};
+use lnn::relativity::{Camera, CentralCoordinates, Image, LearnedHole, Sky, Tracing, difference_image, orbits, shadow};
+use lnn::report::{OrbitPlot, Picture, Series, orbit_picture, png};
 
 /// Distance of the camera over the mass, and its angle from the axis.
 const CAMERA: (f64, f64) = (20.0, 1.4);
@@ -11,32 +9,35 @@ const CAMERA: (f64, f64) = (20.0, 1.4);
 const GAP: usize = 8;
 
 /// Orbits of the exact metric, wide, and of the learned one over them; none where there is nothing to show.
-pub(crate) fn orbit_figure(pair: &LearnedHole<'_>, mass: f64) -> Option<Picture> {
+pub fn orbit_figure(pair: &LearnedHole<'_>, mass: f64) -> Option<Picture> {
     let origin = pair.around.origin();
     let range = (1.2 * mass, 20.0 * mass);
     let hole = pair.around.equator(pair.exact, &origin).horizon(range).ok().flatten();
     let inner = pair.range.0.max(1.2 * mass);
     let found = orbits(pair.exact, pair.around, mass, inner).ok()?;
-    let panel = |orbit: &crate::relativity::Orbit| {
-        let series = |name: &str, points, over| Series { name: name.to_string(), points, over };
+    let series = |name: &str, points, over| Series { name: name.to_string(), points, over };
+    let panels = found.iter().map(|orbit| {
         let exact = series("exact", orbit.path(pair.exact, pair.around), false);
         let learned = series("learned", orbit.path(pair.learned, pair.around), true);
         (orbit.title.to_string(), vec![exact, learned])
-    };
+    });
     let coordinates = pair.system.system.coordinates(pair.system.coordinates);
     // The radius, or a coordinate of space.
-    let along_x = pair.around.place(1.0, [1.0, 0.0, 0.0]);
-    let distance = along_x.iter().zip(&coordinates).find(|(x, _)| **x == 1.0);
-    let unit = distance.map_or_else(String::new, |(_, coordinate)| format!(" [{}]", coordinate.unit));
+    let distance = match pair.around {
+        CentralCoordinates::Cartesian(chart) => Some(chart.space[0]),
+        CentralCoordinates::Spherical { radius, .. } => Some(radius),
+        _ => None,
+    };
+    let unit = distance.map_or_else(String::new, |at| format!(" [{}]", coordinates[at].unit));
     let [x_label, y_label] = ["x", "y"].map(|axis| format!("{axis}{unit}"));
-    let plot = OrbitPlot { x_label, y_label, hole, panels: found.iter().map(panel).collect() };
+    let plot = OrbitPlot { x_label, y_label, hole, panels: panels.collect() };
     orbit_picture(&plot).ok()
 }
 
 /// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG of so many pixels along
 /// an edge; `None` for coordinates that are not Cartesian, where nothing rests at the place of the camera, and when
 /// `interrupted` says so.
-pub(crate) fn sky_picture(
+pub fn sky_picture(
     pair: &LearnedHole<'_>,
     mass: f64,
     (pixels, threads): (usize, usize),

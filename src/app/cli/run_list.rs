@@ -1,4 +1,4 @@
-//! The runs of an experiment with their states: finished, in progress, open.
+//! Runs with their states: finished, in progress, open.
 
 use crate::cli::CliError;
 use crate::cli::resume::has_checkpoint;
@@ -12,7 +12,6 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct Listed {
     number: usize,
-    experiment: &'static str,
     run: Run,
     state: State,
 }
@@ -32,14 +31,14 @@ enum State {
     Open(bool),
 }
 
-/// The numbered runs of the experiment in a directory with their present states.
+/// The numbered runs in a directory with their present states.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.
-pub fn list(directory: &Path, experiment: &'static str, runs: Vec<(usize, Run)>) -> Result<Vec<Listed>, CliError> {
+pub fn list(directory: &Path, runs: Vec<(usize, Run)>) -> Result<Vec<Listed>, CliError> {
     let listed = |(number, run): (usize, Run)| {
         let state = state(directory, &run)?;
-        Ok(Listed { number, experiment, run, state })
+        Ok(Listed { number, run, state })
     };
     runs.into_iter().map(listed).collect()
 }
@@ -59,8 +58,8 @@ fn state(directory: &Path, run: &Run) -> Result<State, CliError> {
 }
 
 impl Listed {
-    /// Cells of a table.
-    pub fn row(&self) -> Vec<String> {
+    /// Cells of a table, with the name of the experiment.
+    pub fn row(&self, experiment: &str) -> Vec<String> {
         let state = match &self.state {
             State::Finished => "finished".to_string(),
             State::OtherConfiguration => "finished, of another configuration".to_string(),
@@ -70,11 +69,11 @@ impl Listed {
             State::Open(false) => "open".to_string(),
             State::Open(true) => "open, with a checkpoint".to_string(),
         };
-        vec![self.number.to_string(), self.experiment.to_string(), self.run.name.clone(), state]
+        vec![self.number.to_string(), experiment.to_string(), self.run.name.clone(), state]
     }
 
     /// The same as an object.
-    pub fn json(&self, scale: Option<&str>) -> Value {
+    pub fn json(&self, experiment: &str, scale: Option<&str>) -> Value {
         let (state, owner) = match &self.state {
             State::Finished => ("finished", None),
             State::OtherConfiguration => ("other-configuration", None),
@@ -84,7 +83,7 @@ impl Listed {
         };
         json!({
             "number": self.number,
-            "experiment": self.experiment,
+            "experiment": experiment,
             "scale": scale,
             "run": self.run.name,
             "row": self.run.label,

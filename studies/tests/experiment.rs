@@ -1,13 +1,41 @@
-//! `lnn experiment` from outside: everything runs, nothing finished runs twice.
-#![cfg(feature = "cli")]
+//! `lnn-studies experiment` from outside: everything runs, nothing finished runs twice.
 
-use crate::common::program::{joined, lead, said_by};
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
 fn lnn(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lnn")).arg("experiment").args(arguments).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_lnn-studies"))
+        .arg("experiment")
+        .args(arguments)
+        .env_remove("LNN_LOG")
+        .output()
+        .unwrap()
+}
+
+/// What a program printed that said nothing on standard error but how far it is.
+fn said_by(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.lines().all(|line| line.starts_with("progress: ")), "{said}");
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// One object a line.
+fn objects(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// A text in one line.
+fn joined(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Sentence that a report begins with.
+fn lead(report: &str) -> String {
+    let (_, rest) = report.split_once("class=\"lead\">").unwrap();
+    rest.split_once("</p>").unwrap().0.replace("&#39;", "'")
 }
 
 fn smoke(name: &str, out: &Path, threads: &str) -> String {
@@ -20,46 +48,49 @@ fn every_experiment_of_the_paper_runs() {
     let out = tempfile::tempdir().unwrap();
     let arguments = ["--scale", "smoke", "--out", out.path().to_str().unwrap()];
     let all = said_by(&lnn(&[&["all", "--list"], &arguments[..]].concat()));
-    for experiment in lnn::experiments::experiments() {
-        assert!(listed.contains(experiment.name) && listed.contains(experiment.paper));
+    // The page of the paper's tables lists what the program lists.
+    let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/paper.md")).unwrap();
+    let experiments = objects(&said_by(&lnn(&["--json"])));
+    assert!(experiments.len() > 10);
+    for experiment in experiments {
+        let [name, title, paper] = ["name", "title", "paper"].map(|key| experiment[key].as_str().unwrap());
+        assert!(listed.contains(name) && listed.contains(paper));
+        assert!(page.contains(&format!("| `{name}` | {paper} |")), "{name}");
         // Of the experiments that take longest, some rows; the next test reads a hole in Cartesian coordinates.
-        let only = match experiment.name {
+        let only = match name {
             "black-holes" => "spherical",
             "boundary" => "the paper's choices",
             _ => "",
         };
-        let printed = said_by(&lnn(&[&[experiment.name, "--threads", "2", "--only", only], &arguments[..]].concat()));
-        assert!(printed.contains(experiment.title));
-        let folder = out.path().join(format!("{}-smoke", experiment.name));
+        let printed = said_by(&lnn(&[&[name, "--threads", "2", "--only", only], &arguments[..]].concat()));
+        assert!(printed.contains(title));
+        let folder = out.path().join(format!("{name}-smoke"));
         let table = fs::read_to_string(folder.join("table.csv")).unwrap();
-        let mut runs = experiment.runs(lnn::experiments::Scale::Smoke, 1);
-        assert!(runs.iter().all(|run| all.contains(&run.name)));
-        runs.retain(|run| run.label.starts_with(only));
-        for run in &runs {
-            assert!(table.contains(&format!("\"{}\"", run.label)), "{table}");
+        let runs = objects(&said_by(&lnn(&[&[name, "--list", "--json"], &arguments[..]].concat())));
+        let runs: Vec<[&str; 2]> =
+            runs.iter().map(|run| ["run", "row"].map(|key| run[key].as_str().unwrap())).collect();
+        assert!(runs.iter().all(|[run, _]| all.contains(run)));
+        let runs: Vec<[&str; 2]> = runs.into_iter().filter(|[_, row]| row.starts_with(only)).collect();
+        for [run, row] in &runs {
+            assert!(table.contains(&format!("\"{row}\"")), "{table}");
             for file in ["record.json", "model.safetensors", "config.toml", "report.html"] {
-                assert!(folder.join(&run.name).join(file).is_file(), "{}: no {file}", run.name);
+                assert!(folder.join(run).join(file).is_file(), "{run}: no {file}");
             }
         }
         let report = fs::read_to_string(folder.join("report.html")).unwrap();
-        assert!(report.contains(experiment.title) && report.matches("<figure").count() >= 2);
+        assert!(report.contains(title) && report.matches("<figure").count() >= 2);
         // The report and the screen say the same.
         let sentence = lead(&report);
         assert!(sentence.starts_with("Lowest loss ") && joined(&printed).contains(&sentence), "{sentence}");
-        assert!(report.len() < 2_000_000, "{}: {}", experiment.name, report.len());
-        if experiment.name == "black-holes" {
+        assert!(report.len() < 2_000_000, "{name}: {}", report.len());
+        if name == "black-holes" {
             assert!(fs::read_to_string(folder.join("readings.csv")).unwrap().contains("innermost stable orbit"));
         }
         // Relativistic runs are held to their signature, not to positive eigenvalues.
-        if experiment.name == "ads4-geodesic" {
-            let config = fs::read_to_string(folder.join(&runs[0].name).join("config.toml")).unwrap();
+        if name == "ads4-geodesic" {
+            let config = fs::read_to_string(folder.join(runs[0][0]).join("config.toml")).unwrap();
             assert!(config.contains("kind = \"lorentzian-sylvester\"") && config.contains("time = \"t\""), "{config}");
         }
-    }
-    // The page of the paper's tables lists what the program lists.
-    let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/paper.md")).unwrap();
-    for experiment in lnn::experiments::experiments() {
-        assert!(page.contains(&format!("| `{}` | {} |", experiment.name, experiment.paper)), "{}", experiment.name);
     }
 }
 
@@ -189,6 +220,9 @@ fn wrong_names_and_directories_are_refused() {
         (["activation", "--scale", "smoke"], 2, "activations"),
         (["scaling", "--scale", "tiny"], 2, "tiny"),
         (["scaling", "--seeds", "0"], 2, "--seeds"),
+        (["scaling", "--seeds", "-1"], 2, "10000"),
+        (["scaling", "--seeds", "1.5"], 2, "--seeds"),
+        (["scaling", "--threads", "0"], 2, "256"),
         (["scaling", "--seeds", "18446744073709551615"], 2, "10000"),
         (["scaling", "--out", "/dev/null/x"], 1, "/dev/null"),
     ] {
@@ -210,10 +244,8 @@ fn shares_together_make_what_one_process_makes() {
     let temporary = tempfile::tempdir().unwrap();
     let [alone, shared] = ["alone", "shared"].map(|name| temporary.path().join(name));
     smoke("scaling", &alone, "1");
-    let list = || -> Vec<serde_json::Value> {
-        let listed =
-            said_by(&lnn(&["scaling", "--scale", "smoke", "--list", "--json", "--out", shared.to_str().unwrap()]));
-        listed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    let list = || {
+        objects(&said_by(&lnn(&["scaling", "--scale", "smoke", "--list", "--json", "--out", shared.to_str().unwrap()])))
     };
     let states = || list().iter().map(|run| run["state"].as_str().unwrap().to_string()).collect::<Vec<_>>();
     let merge = || lnn(&["merge", "scaling", "--scale", "smoke", "--out", shared.to_str().unwrap()]);
@@ -225,7 +257,9 @@ fn shares_together_make_what_one_process_makes() {
     assert!(refused.status.code() == Some(1) && stderr.contains("none of 3 runs is finished"), "{stderr}");
 
     let printed = share(&shared, "1/2");
-    assert!(printed.contains("share 1/2 is finished, 2 runs") && printed.contains("lnn experiment merge scaling"));
+    assert!(
+        printed.contains("share 1/2 is finished, 2 runs") && printed.contains("lnn-studies experiment merge scaling")
+    );
     assert_eq!(states(), ["finished", "open", "finished"]);
     let folder = shared.join("scaling-smoke");
     assert!(!folder.join("table.csv").exists());
@@ -274,7 +308,7 @@ fn shares_together_make_what_one_process_makes() {
 fn arrays_of_slurm_are_shares() {
     let out = tempfile::tempdir().unwrap();
     let task = |variables: &[(&str, &str)], arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lnn-studies"));
         variables.iter().for_each(|(part, value)| _ = command.env(format!("SLURM_ARRAY_TASK_{part}"), value));
         let out = ["--scale", "smoke", "--out", out.path().to_str().unwrap()];
         command.args(["experiment", "scaling"]).args(out).args(arguments).output().unwrap()
@@ -295,4 +329,23 @@ fn arrays_of_slurm_are_shares() {
     let output = task(&gap, &["--shard", "1/3"]);
     assert!(output.status.success() && output.stderr.is_empty());
     assert_eq!(["physical-scaling-seed0", "no-scaling-seed0", "dyt-seed0"].map(made), [true, false, true]);
+}
+
+/// A metric that expands; with the name of its time.
+#[test]
+fn metrics_that_depend_on_their_time_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "name = \"expanding\"\n".to_string();
+    for name in ["t", "x", "y", "z"] {
+        let kind = if name == "t" { "time_like = true" } else { "velocity_bounds = [-1, 1]" };
+        text += &format!("[[coordinates]]\nname = \"{name}\"\nbounds = [-1, 1]\n{kind}\n");
+    }
+    text += "[metric]\n\"t,t\" = \"-1\"\n";
+    ["x", "y", "z"].iter().for_each(|name| text += &format!("\"{name},{name}\" = \"exp(0.1*t)\"\n"));
+    let [file, out] = ["metric.toml", "x"].map(|name| folder.path().join(name).to_str().unwrap().to_string());
+    fs::write(&file, text).unwrap();
+    let refused = lnn(&["black-holes", "--system", &file, "--list", "--out", &out]);
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{told}");
+    assert!(told.contains("--system") && told.contains("time t"), "{told}");
 }

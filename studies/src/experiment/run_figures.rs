@@ -1,12 +1,14 @@
 //! Pictures that the report of an experiment takes over from its runs.
 
-use crate::experiments::{Experiment, Picture, Record, Run};
-use crate::names::pluralize;
-use crate::pipeline::CAPTIONS;
-use crate::pipeline::experiment_directory::ExperimentDirectory;
-use crate::pipeline::report_files::Caption;
-use crate::report::Report;
-use std::collections::BTreeMap;
+use super::experiments::{Experiment, Picture};
+use lnn::experiments::{Record, Run};
+use lnn::names::pluralize;
+use lnn::pipeline::ExperimentDirectory;
+use lnn::report::Report;
+use serde_json::Value;
+
+/// Name of the file in which a run says what its pictures show.
+const CAPTIONS: &str = "captions.json";
 
 /// Beginnings of the names of pictures in the order of a report; training and whatever else come last.
 const ORDER: [&str; 9] = [
@@ -30,14 +32,14 @@ fn place_in_report(file: &str) -> usize {
 const TAKEN: usize = 1 << 20;
 
 /// A picture that a run drew.
-pub(crate) struct RunPicture {
+pub struct RunPicture {
     svg: Vec<u8>,
     heading: String,
     caption: String,
 }
 
 /// The report with as many pictures of runs as [`TAKEN`] allows, and where the others are.
-pub(crate) fn within(taken: Vec<RunPicture>, report: Report) -> Report {
+pub fn within(taken: Vec<RunPicture>, report: Report) -> Report {
     let (mut room, mut left) = (TAKEN, 0);
     let mut report = report;
     for RunPicture { svg, heading, caption } in taken {
@@ -64,7 +66,7 @@ fn pictures_of(store: &ExperimentDirectory, run: &str, prefix: &str) -> Vec<Stri
 }
 
 /// Pictures that the experiment takes over from the evaluations of its runs, as far as they are there.
-pub(crate) fn pictures_of_runs(
+pub fn pictures_of_runs(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
     store: &ExperimentDirectory,
@@ -76,11 +78,12 @@ pub(crate) fn pictures_of_runs(
     }) {
         for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
             let read = |file: &str| store.read(&run.name, file);
-            let captions: BTreeMap<String, Caption> =
+            let captions: Value =
                 read(CAPTIONS).and_then(|json| serde_json::from_slice(&json).ok()).unwrap_or_default();
             for file in pictures_of(store, &run.name, prefix) {
                 let Some(svg) = read(&file) else { continue };
-                let Caption { heading, caption } = captions.get(&file).cloned().unwrap_or_default();
+                let text = |key: &str| captions[&file][key].as_str().unwrap_or_default().to_string();
+                let (heading, caption) = (text("heading"), text("caption"));
                 let heading = if heading.is_empty() { run.label.clone() } else { format!("{}: {heading}", run.label) };
                 figures.push(RunPicture { svg, heading, caption });
             }
@@ -91,8 +94,9 @@ pub(crate) fn pictures_of_runs(
 
 #[cfg(test)]
 mod tests {
+    use super::super::experiments::{Scale, find};
     use super::*;
-    use crate::experiments::{Outcome, Scale, find};
+    use lnn::experiments::Outcome;
 
     #[test]
     fn pictures_come_in_the_order_of_a_report() {
