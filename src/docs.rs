@@ -84,6 +84,7 @@ macro_rules! page {
             "[small-matrices]: crate::docs::performance#small-symmetric-matrices\n",
             "[architecture]: crate::docs::architecture\n",
             "[building]: crate::docs::building\n",
+            "[studies]: crate::docs::building#studies\n",
             "\n",
             include_str!(concat!("../docs/", $file))
         )

@@ -43,7 +43,7 @@
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | end a long search, or see how far it is | [`cancellation::Cancellation`] |
-//! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
+//! | train, fit, evaluate, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! [`prelude`] holds the names that most programs need. Internally, the modules are arranged on six floors, `numerics`, `support`,
 //! `mechanics`, `learning`, `physics` and `app`, each of which imports only from those before it.
@@ -208,7 +208,8 @@ pub use physics::{relativity, symmetry};
 #[cfg(feature = "std")]
 pub use support::cancellation;
 pub use support::findings;
-pub(crate) use support::names;
+#[doc(hidden)]
+pub use support::names;
 #[cfg(feature = "std")]
 #[doc(hidden)]
 pub use support::storage;

@@ -1,4 +1,4 @@
-"""A training step under constraints by JAX: what `cargo bench --bench constraints -- --part cost` times, in the two ways that users have.
+"""A training step under constraints by JAX: what `lnn-studies constraints --part cost` times, in the two ways that users have.
 
     python constrained.py [--states 1024] [--rounds 20]
 

@@ -5,7 +5,7 @@
 PROGRAM is the built benchmark `peers`, which writes the states and initial weights of `lnn train double-pendulum --preset
 paper`. Three hidden layers of 500, GELU, nested reverse mode, pseudo-inverse, eigenvalue penalty, RAdam with gradient clipping, one phase
 after the other with cosine annealing. The curve has a row whenever a minute of training has passed and at every end of an epoch;
-time in validation does not count. Draw it with `lnn experiment time-to-accuracy --beside "PyTorch=FILE.csv"`.
+time in validation does not count. Draw it with `lnn-studies experiment time-to-accuracy --beside "PyTorch=FILE.csv"`.
 """
 
 import argparse

@@ -1,8 +1,8 @@
-//! Whole runs: experiments, pages, pipelines from configuration to report, and the command line.
+//! Whole runs: pages, pipelines from configuration to report, and the command line.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`experiments`] | the paper's tables and our own as data |
+//! | [`experiments`] | sets of runs as data: records, rows of tables, sweeps |
 //! | [`report`] | plots in SVG, tables, HTML |
 //! | [`pipeline`] | trainings, fits, evaluations and experiments from configuration to report |
 //! | [`cli`] | arguments to calls of the library |

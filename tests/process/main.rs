@@ -4,7 +4,6 @@ mod allocation;
 mod counting;
 mod kills;
 mod memory;
-mod shards;
 mod streams;
 mod threads;
 mod training_allocation;

@@ -149,7 +149,7 @@ mod tests {
             ("lnn train x --seed", &["--seed", "value"]),
             ("lnn evaluate m --rtol 1e-30", &["--rtol", "1e-30", "2e-15"]),
             ("lnn check data.csv", &["--coords"]),
-            ("lnn experiment merge quick --seds 3", &["--seds", "--seeds"]),
+            ("lnn sweep small.toml --seds 3", &["--seds", "--seeds"]),
             ("lnn check d --coords x --rate 5 --time t", &["--rate", "--time"]),
         ] {
             let found = argument_error(&Cli::try_parse_from(line.split(' ')).unwrap_err()).to_string();

@@ -13,8 +13,6 @@ mod constraints;
 mod differences;
 mod error;
 mod evaluate;
-mod experiment;
-mod experiment_list;
 mod files;
 mod fit;
 mod fit_config;
@@ -49,6 +47,8 @@ mod results;
 mod resume;
 mod rollout;
 mod run_args;
+mod run_list;
+mod runs;
 mod shadow;
 mod shadow_facts;
 mod shard;
@@ -69,6 +69,9 @@ mod watch;
 pub use config::parse as parse_config;
 use error::argument_error;
 pub use error::{CliError, Kind};
+pub use output::print;
+pub use runs::{Orders, Work, merge, perform, print_list};
+pub use shard::Shard;
 pub use states::{States, StatesError, parse_states};
 pub use system_arg::parse_system;
 
@@ -115,8 +118,6 @@ enum Command {
     Rollout(rollout::Args),
     /// Compare a model with the system it learned.
     Evaluate(evaluate::Args),
-    /// Regenerate a table or figure of the paper, or list them.
-    Experiment(experiment::Args),
     /// Train with several values of some keys of a configuration and collect the runs in tables.
     Sweep(sweep::Args),
     /// Print the Euler-Lagrange terms of states in full precision.
@@ -151,7 +152,14 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return answer(&error),
     };
-    match watch_log().and_then(|()| run(cli.command)) {
+    ended(|| run(cli.command))
+}
+
+/// Does the work of a program, whose signals and warnings are those of this one: a failure is one line on standard error, and an exit code.
+pub fn ended(work: impl FnOnce() -> Result<(), CliError>) -> ExitCode {
+    // A command that has something to keep asks for the flag before it begins its work.
+    let ready = watch_log().and_then(|()| interrupt::watch().map_err(CliError::signals));
+    match ready.and_then(|()| work()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if error.kind() != Kind::ClosedPipe {
@@ -175,8 +183,6 @@ pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<
 
 /// Runs a command.
 fn run(command: Command) -> Result<(), CliError> {
-    // A command that has something to keep asks for the flag before it begins its work.
-    interrupt::watch().map_err(CliError::signals)?;
     match command {
         Command::Systems(args) => systems::run(&args),
         Command::Check(args) => check::run(&args),
@@ -184,7 +190,6 @@ fn run(command: Command) -> Result<(), CliError> {
         Command::Fit(args) => fit::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
-        Command::Experiment(args) => experiment::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Constraints(args) => constraints::run(&args),
@@ -202,7 +207,7 @@ fn run(command: Command) -> Result<(), CliError> {
 }
 
 /// Help and version go where they are asked for; a wrong argument is one line like any other error.
-fn answer(error: &clap::Error) -> ExitCode {
+pub fn answer(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
         DisplayHelp | DisplayVersion => match output::print(&wrap_text(&error.to_string(), WIDTH)) {

@@ -1,13 +1,14 @@
 //! `lnn sweep`: trainings over the values of some keys of a configuration, whole or in shares; finished runs are not run again.
 
 use crate::cli::error::argument_error;
-use crate::cli::experiment::{Orders, Work, merge, perform, print_list, share};
 use crate::cli::number::{thread_count, whole};
+use crate::cli::runs::{Orders, Work, merge, perform, print_list};
 use crate::cli::shard::Shard;
 use crate::cli::{CliError, train_config};
 use crate::configuration::Config;
-use crate::experiments::{Choice, SWEEP, Scale, Variation, combinations, sweep_runs};
+use crate::experiments::{Choice, Variation, combinations, sweep_runs};
 use crate::names::pluralize;
+use crate::pipeline::Experiment;
 use clap::Parser;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -51,6 +52,19 @@ pub struct Args {
     json: bool,
 }
 
+/// An experiment whose runs the user chooses.
+struct Sweep;
+
+impl Experiment for Sweep {
+    fn name(&self) -> &str {
+        "sweep"
+    }
+
+    fn title(&self) -> &str {
+        "Sweep over configurations"
+    }
+}
+
 /// Trains every combination, or a share of them, lists them, or makes tables of what is finished.
 ///
 /// # Errors
@@ -58,13 +72,13 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let work = vec![args.work()?];
     if args.list {
-        return print_list(share(work, args.shard), args.json);
+        return print_list(work, args.shard, args.json);
     }
     if args.merge {
-        return merge(work, &[], args.json);
+        return merge(work, args.json);
     }
     let Args { threads, shard, overwrite, json, .. } = *args;
-    perform(work, &Orders { threads, shard, overwrite, beside: &[], json })
+    perform(work, &Orders { threads, shard, overwrite, json })
 }
 
 /// Refuses values that come to one configuration, as `0.1` and `0.10` do: it would be trained twice.
@@ -117,7 +131,7 @@ impl Args {
         let runs = (0..).zip(sweep_runs(configurations, self.seeds)).collect();
         let words = self.words();
         let (merge, list) = (format!("{words} --merge"), format!("{words} --list"));
-        Ok(Work { experiment: &SWEEP, scale: Scale::Paper, path: self.out.clone(), runs, merge, list })
+        Ok(Work { experiment: Box::new(Sweep), path: self.out.clone(), runs, merge, list, inputs: Vec::new() })
     }
 
     /// The command with the options that say which runs there are.

@@ -1,10 +1,7 @@
-//! Records of runs, the rows of an experiment's table, and remarks for its comparison with the paper's: conventions, and
-//! the reductions that the paper states.
+//! Records of runs, and the rows of an experiment's table.
 
-use super::{Experiment, Reported, Run};
+use super::{Reported, Run};
 use crate::analysis::REGULAR;
-use crate::configuration::Regularizer;
-use crate::optimizers::Method;
 use serde::{Deserialize, Serialize};
 
 /// Figures of a learned model.
@@ -124,17 +121,15 @@ pub struct Row {
     pub reported: Reported,
 }
 
-impl Experiment {
-    /// The table: one row per label in the order of first appearance, from runs and their records (if finished).
-    pub fn rows(&self, results: &[(Run, Option<Record>)]) -> Vec<Row> {
-        let mut labels: Vec<&str> = Vec::new();
-        for (run, _) in results {
-            if !labels.contains(&run.label.as_str()) {
-                labels.push(&run.label);
-            }
+/// The table: one row per label in the order of first appearance, from runs and their records (if finished).
+pub fn rows(results: &[(Run, Option<Record>)]) -> Vec<Row> {
+    let mut labels: Vec<&str> = Vec::new();
+    for (run, _) in results {
+        if !labels.contains(&run.label.as_str()) {
+            labels.push(&run.label);
         }
-        labels.into_iter().map(|label| row(label, results)).collect()
     }
+    labels.into_iter().map(|label| row(label, results)).collect()
 }
 
 fn row(label: &str, results: &[(Run, Option<Record>)]) -> Row {
@@ -166,102 +161,11 @@ fn row(label: &str, results: &[(Run, Option<Record>)]) -> Row {
     }
 }
 
-/// A quantity of which the paper states by how much it is lower in one group of runs than in another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Validation loss, paper convention.
-    Loss,
-    /// Training instability, paper convention.
-    Instability,
-    /// Loss in physical units.
-    PhysicalLoss,
-    /// Instability in physical units.
-    PhysicalInstability,
-}
-
-impl Quantity {
-    /// Name in a table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Loss => "loss",
-            Self::Instability => "instability",
-            Self::PhysicalLoss => "physical loss",
-            Self::PhysicalInstability => "physical instability",
-        }
-    }
-}
-
-/// A reduction that the paper states: the mean of a group of runs below that of another.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reduction {
-    /// Of what.
-    pub quantity: Quantity,
-    /// Group of the runs that are better.
-    pub group: &'static str,
-    /// Group they are compared with.
-    pub against: &'static str,
-    /// The paper's figure, a fraction.
-    pub paper: f64,
-}
-
-impl Experiment {
-    /// The reductions of the paper beside those of these runs, `1 - mean / mean`; `None` where a group has no finished run.
-    pub fn reductions(&self, results: &[(Run, Option<Record>)]) -> Vec<(Reduction, Option<f64>)> {
-        self.reductions.iter().map(|reduction| (*reduction, reduction.found(results))).collect()
-    }
-
-    /// Differences between these runs and the paper, or its authors' code where that is not its text, in sentences.
-    pub fn remarks(&self, runs: &[&Run]) -> Vec<String> {
-        let any = |test: fn(&Run) -> bool| runs.iter().any(|run| test(run));
-        let mut remarks = Vec::new();
-        if any(|run| run.config.optimizer.method == Method::Radam) {
-            remarks.push("Optimiser: RAdam, which the authors' code runs; the paper's text calls it Adam.".to_string());
-        }
-        if self.paper != "-" && any(|run| run.config.penalty == Regularizer::Eigenvalue { lambda: 5.0 }) {
-            let text = "Penalty: eigenvalues with lambda = 5 where a row says nothing else; for its network experiments the \
-                        paper names none.";
-            remarks.push(text.to_string());
-        }
-        let seeds: std::collections::BTreeSet<u64> = runs.iter().map(|run| run.config.seed).collect();
-        if seeds.len() > 1 {
-            let text = "Seeds: each draws states, weights and order of its own; repeated runs of the paper differ in their \
-                        weights alone.";
-            remarks.push(text.to_string());
-        }
-        remarks.push("Instability: of the training loss without the penalty.".to_string());
-        if any(|run| run.reported.regular_energy.is_some()) {
-            let text = "Energy errors: a start is regular if the Lyapunov time of its exact motion is above a fifth of the \
-                        test's time span, chaotic if not; the paper's figures are of one motion each.";
-            remarks.push(text.to_string());
-        }
-        remarks
-    }
-}
-
-impl Reduction {
-    fn found(&self, results: &[(Run, Option<Record>)]) -> Option<f64> {
-        let value = |record: &Record| match &record.outcome {
-            Outcome::Learned(learned) => match self.quantity {
-                Quantity::Loss => Some(learned.validation_loss),
-                Quantity::Instability => learned.instability,
-                Quantity::PhysicalLoss => Some(learned.validation_loss * learned.scale),
-                Quantity::PhysicalInstability => learned.instability.map(|i| i * learned.scale),
-            },
-            Outcome::Nothing { .. } => None,
-        };
-        let mean = |group: &str| {
-            let of_group = results.iter().filter(|(run, _)| run.group == group);
-            let values: Vec<f64> = of_group.filter_map(|(_, record)| value(record.as_ref()?)).collect();
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
-        Some(1.0 - mean(self.group)? / mean(self.against)?)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::{Learned, Scale, find};
+    use crate::experiments::Learned;
+    use crate::presets::Preset;
 
     fn learned(loss: f64, energy_errors: Vec<Option<f64>>) -> Option<Record> {
         let integrated = energy_errors.iter().flatten().count();
@@ -280,8 +184,16 @@ mod tests {
 
     #[test]
     fn rows_gather_runs_of_one_label_and_count_failures() {
-        let experiment = find("activations").unwrap();
-        let runs = experiment.runs(Scale::Smoke, 1);
+        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let run = |label: &str| Run {
+            name: label.to_string(),
+            label: label.to_string(),
+            abscissa: None,
+            group: String::new(),
+            config: Preset::Quick.config(&system).unwrap(),
+            reported: Reported { loss: Some(0.00738), ..Reported::NOTHING },
+        };
+        let runs = ["GELU", "GELU", "x tanh(kx)", "x tanh(kx)", "softplus"].map(run).to_vec();
         let nothing = Some(Record {
             run: String::new(),
             outcome: Outcome::Nothing { reason: "NaN".into() },
@@ -293,7 +205,7 @@ mod tests {
             vec![learned(0.1, vec![Some(0.5), None]), learned(0.3, vec![Some(0.1), Some(0.6)]), nothing, None];
         records.resize(runs.len(), None);
         let results: Vec<(Run, Option<Record>)> = runs.into_iter().zip(records).collect();
-        let rows = experiment.rows(&results);
+        let rows = rows(&results);
         assert_eq!(rows.iter().map(|r| r.label.as_str()).collect::<Vec<_>>()[..2], ["GELU", "x tanh(kx)"]);
         let gelu = &rows[0];
         assert_eq!((gelu.runs, gelu.failed, gelu.integrated), (2, 0, (3, 4)));
@@ -318,88 +230,5 @@ mod tests {
             let text = serde_json::to_string(&record).unwrap();
             assert_eq!(serde_json::from_str::<Option<Record>>(&text).unwrap(), record);
         }
-    }
-
-    #[test]
-    fn reductions_are_recomputed_from_the_means_of_the_groups() {
-        let experiment = find("regularization").unwrap();
-        let runs = experiment.runs(Scale::Paper, 1);
-        let record = |run: &Run| {
-            let learned = Learned {
-                validation_loss: match run.group.as_str() {
-                    "none" => 0.5,
-                    "eigenvalue" => 0.1,
-                    _ => 0.2,
-                },
-                instability: (run.group != "Sylvester").then_some(if run.group == "none" { 0.4 } else { 0.3 }),
-                scale: 10.0,
-                wrong_signature: 0.0,
-                energy_errors: vec![],
-                stretching: vec![],
-                integrated: 0,
-            };
-            Record {
-                run: String::new(),
-                outcome: Outcome::Learned(learned),
-                losses: vec![],
-                times: vec![],
-                seconds: 1.0,
-            }
-        };
-        let mut results: Vec<(Run, Option<Record>)> = runs
-            .into_iter()
-            .map(|run| {
-                let record = record(&run);
-                (run, Some(record))
-            })
-            .collect();
-        // One of the runs learned nothing, one has not run yet.
-        let nothing = Outcome::Nothing { reason: String::new() };
-        results[0].1 =
-            Some(Record { run: String::new(), outcome: nothing, losses: vec![], times: vec![], seconds: 1.0 });
-        results[4].1 = None;
-        let found = experiment.reductions(&results);
-        let of = |quantity, group| {
-            let (reduction, found) =
-                found.iter().find(|(r, _)| r.quantity == quantity && r.group == group).copied().unwrap();
-            (reduction.paper, found)
-        };
-        let close = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
-        let (paper, own) = of(Quantity::Loss, "eigenvalue");
-        assert!(paper == 0.966 && close(own, 0.8));
-        let (paper, own) = of(Quantity::Instability, "eigenvalue");
-        assert!(paper == 0.9068 && close(own, 0.25));
-        let (paper, own) = of(Quantity::Loss, "Sylvester");
-        assert!(paper == 0.964 && close(own, 0.6));
-        assert_eq!(of(Quantity::Instability, "Sylvester"), (0.7162, None));
-    }
-
-    #[test]
-    fn every_group_of_a_reduction_exists() {
-        let mut seen = 0;
-        for experiment in crate::experiments::experiments() {
-            let runs = experiment.runs(Scale::Paper, 1);
-            for reduction in experiment.reductions {
-                assert!([reduction.group, reduction.against].iter().all(|g| runs.iter().any(|r| r.group == *g)));
-                seen += 1;
-            }
-        }
-        assert_eq!(seen, 6);
-    }
-
-    #[test]
-    fn remarks_say_what_differs_from_the_papers_text() {
-        let remarks = |name: &str, seeds| {
-            let experiment = find(name).unwrap();
-            let runs = experiment.runs(Scale::Paper, seeds);
-            experiment.remarks(&runs.iter().collect::<Vec<_>>()).join(" ")
-        };
-        let scaling = remarks("scaling", 1);
-        assert!(scaling.contains("RAdam") && scaling.contains("lambda = 5") && scaling.contains("without the penalty"));
-        assert!(!scaling.contains("Seeds") && remarks("scaling", 2).contains("Seeds"));
-        assert!(!remarks("regularization", 1).contains("lambda = 5") && remarks("regularization", 1).contains("Seeds"));
-        assert!(remarks("triple-pendulum", 1).contains("Lyapunov time"));
-        let quick = remarks("quick", 1);
-        assert!(!quick.contains("RAdam") && !quick.contains("lambda = 5") && quick.contains("Lyapunov time"));
     }
 }

@@ -1,20 +1,9 @@
 //! Sweeps: runs over the values of some keys of a configuration.
 
-use super::{Experiment, Reported, Run, slug};
+use super::{Reported, Run, slug};
 use crate::configuration::Config;
 use std::collections::BTreeMap;
 use std::str::FromStr;
-
-/// An experiment whose runs the user chooses.
-pub static SWEEP: Experiment = Experiment {
-    name: "sweep",
-    title: "Sweep over configurations",
-    paper: "-",
-    finding: "",
-    pictures: &[],
-    reductions: &[],
-    runs: Vec::new,
-};
 
 /// Longest part of a directory's name that is made of the choices.
 const MOST_LETTERS: usize = 100;
@@ -101,7 +90,7 @@ pub fn sweep_runs(configurations: Vec<(Choice, Config)>, seeds: usize) -> Vec<Ru
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::{Scale, find};
+    use crate::presets::Preset;
 
     #[test]
     fn values_are_parted_at_commas_outside_of_brackets() {
@@ -121,7 +110,8 @@ mod tests {
         let choices = combinations(&variations);
         assert_eq!((choices.len(), choices[1][1].1.as_str()), (6, "y"));
         assert_eq!(combinations(&[]), [Vec::new()]);
-        let config = find("quick").unwrap().runs(Scale::Smoke, 1).remove(0).config;
+        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let config = Preset::Quick.config(&system).unwrap();
         let pairs = |choices: Vec<Choice>| choices.into_iter().map(|choice| (choice, config.clone())).collect();
         let runs = sweep_runs(pairs(choices), 2);
         assert_eq!((runs.len(), runs[0].label.as_str(), runs[0].name.as_str()), (12, "a = 1, b = x", "a-1-b-x-seed0"));

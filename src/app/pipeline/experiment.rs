@@ -2,37 +2,104 @@
 
 use crate::configuration::Config;
 use crate::data::SamplingError;
-use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
+use crate::experiments::{Outcome, Record, Run};
+use crate::network::NetworkLagrangian;
 use crate::pipeline::checkpoints::Begin;
+use crate::pipeline::evaluation::STARTS;
 use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory};
-use crate::pipeline::experiment_report::{ExperimentReport, Results, conclude};
-use crate::pipeline::readings::{READINGS, read_hole};
+use crate::pipeline::experiment_report::{Additions, ExperimentReport, Results, conclude};
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch, from_table};
-use crate::report::Curve;
 use crate::storage::container::text_checksum;
 use crate::storage::in_order;
 use crate::training::{StopReason, TrainingError};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
+/// A set of trainings with one table: what it is called, and what it adds to its runs and to their report.
+pub trait Experiment: Sync {
+    /// Name in lists and messages.
+    fn name(&self) -> &str;
+
+    /// Title of its report.
+    fn title(&self) -> &str;
+
+    /// Name of the size that its runs have, if it has several.
+    fn scale(&self) -> Option<&str> {
+        None
+    }
+
+    /// `true` if the time of its runs matters: they then run one after the other, each on all threads.
+    fn is_timed(&self) -> bool {
+        false
+    }
+
+    /// Starts of the trajectory test of a run, and the fraction of the system's time span that it covers.
+    fn trajectories(&self) -> (usize, f64) {
+        (STARTS, 1.0)
+    }
+
+    /// Names of the tables that it writes beside those of all experiments.
+    fn tables(&self) -> &[&str] {
+        &[]
+    }
+
+    /// Names of the files that [`look_at`](Self::look_at) writes; those of an earlier run are removed before a new one begins.
+    fn files(&self) -> &[&str] {
+        &[]
+    }
+
+    /// Looks at the model that a run has learned, on so many threads, and writes what it finds into the directory of the run.
+    ///
+    /// # Errors
+    /// Whatever ends the work on all runs.
+    fn look_at(
+        &self,
+        _run: &Run,
+        _learned: &NetworkLagrangian<f64>,
+        _threads: usize,
+        _output: &dyn Output,
+        _watch: &Watch,
+    ) -> Result<(), PipelineError> {
+        Ok(())
+    }
+
+    /// Sentences below the table.
+    fn remarks(&self, _runs: &[&Run]) -> Vec<String> {
+        vec!["Instability: of the training loss without the penalty.".to_string()]
+    }
+
+    /// What its report has beside the headline, the loss curves and the table of all experiments; its own tables are written here.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    fn additions(
+        &self,
+        _results: &Results,
+        _store: &ExperimentDirectory,
+        _output: &dyn Output,
+        _watch: &Watch,
+    ) -> Result<Additions, PipelineError> {
+        Ok(Additions::default())
+    }
+}
+
 /// Runs an experiment, `runs` of it, on so many threads, and writes table, pictures and report; runs whose records are in the
-/// directory and are of the same configuration are not run again. `beside` are curves of loss against time from elsewhere.
+/// directory and are of the same configuration are not run again.
 ///
 /// # Errors
 /// Files that cannot be written, [`PipelineError::InterruptedRuns`], [`PipelineError::HeldRuns`] if another process works on some of
 /// the runs; runs that are finished stay finished.
 pub fn run_experiment(
-    (experiment, scale): (&Experiment, Scale),
+    experiment: &dyn Experiment,
     runs: Vec<Run>,
     threads: usize,
-    beside: &[Curve],
     store: &ExperimentDirectory,
     watch: &Watch,
 ) -> Result<ExperimentReport, PipelineError> {
     let started = Instant::now();
-    let results = finish_runs((experiment, scale), runs, threads, store, watch)?;
-    conclude((experiment, scale), results, beside, store, watch, Some(started))
+    let results = finish_runs(experiment, runs, threads, store, watch)?;
+    conclude(experiment, results, store, watch, Some(started))
 }
 
 /// Writes table, pictures and report from the records that are in a directory, and from nothing else; nothing is run. The same records
@@ -41,9 +108,8 @@ pub fn run_experiment(
 /// # Errors
 /// [`PipelineError::NothingFinished`]; files that cannot be written.
 pub fn merge_experiment(
-    (experiment, scale): (&Experiment, Scale),
+    experiment: &dyn Experiment,
     runs: Vec<Run>,
-    beside: &[Curve],
     store: &ExperimentDirectory,
     watch: &Watch,
 ) -> Result<ExperimentReport, PipelineError> {
@@ -52,7 +118,7 @@ pub fn merge_experiment(
     if results.iter().all(|(_, record)| record.is_none()) {
         return Err(PipelineError::NothingFinished { total: results.len() });
     }
-    conclude((experiment, scale), results, beside, store, watch, None)
+    conclude(experiment, results, store, watch, None)
 }
 
 /// Runs `runs` of an experiment, so many side by side; no tables are written. A run that another process works on is left to it.
@@ -60,7 +126,7 @@ pub fn merge_experiment(
 /// # Errors
 /// As of [`run_experiment`].
 pub fn finish_runs(
-    (experiment, scale): (&Experiment, Scale),
+    experiment: &dyn Experiment,
     runs: Vec<Run>,
     threads: usize,
     store: &ExperimentDirectory,
@@ -74,7 +140,7 @@ pub fn finish_runs(
         if failed.load(Ordering::SeqCst) || watch.is_interrupted() {
             return Ok(None);
         }
-        let result = one(run, (experiment, scale), (threads / abreast).max(1), store, watch);
+        let result = one(run, experiment, (threads / abreast).max(1), store, watch);
         match &result {
             Ok(Some(_)) => watch.say(Event::Runs { done: 1 + done.fetch_add(1, Ordering::SeqCst), total }),
             Ok(None) | Err(PipelineError::Held { .. }) => {}
@@ -108,7 +174,7 @@ pub fn finish_runs(
 /// The record of a run: the one that is there if it was made from the same configuration, or a new one; `None` if it was interrupted.
 fn one(
     run: &Run,
-    of: (&Experiment, Scale),
+    of: &dyn Experiment,
     threads: usize,
     store: &ExperimentDirectory,
     watch: &Watch,
@@ -127,7 +193,7 @@ fn one(
 /// Makes the record of a run; `None` if it was interrupted.
 fn make(
     run: &Run,
-    (experiment, scale): (&Experiment, Scale),
+    experiment: &dyn Experiment,
     threads: usize,
     output: &LockedDirectory,
     watch: &Watch,
@@ -135,9 +201,9 @@ fn make(
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
     // That of another configuration must not be found beside the new one.
     output.remove(RECORD)?;
-    output.remove(READINGS)?;
+    experiment.files().iter().try_for_each(|name| output.remove(name))?;
     let system = run.config.system()?;
-    let (starts, span) = scale.trajectories();
+    let (starts, span) = experiment.trajectories();
     let began = Instant::now();
     // A run that was stopped goes on from its checkpoint.
     let checkpoints = Some(output.checkpoints().beginning(Begin::Either));
@@ -158,9 +224,7 @@ fn make(
             if let StopReason::Failed(error) = &trained.stop {
                 tracing::warn!("{}: training stopped early: {error}", run.name);
             }
-            if experiment.reads_holes() {
-                read_hole(run, &trained.network, (scale, threads), output, &watch)?;
-            }
+            experiment.look_at(run, &trained.network, threads, output, &watch)?;
             trained.record(text_checksum(&toml), system.system.trajectory(system.coordinates).t_end * span)
         }
         Err(PipelineError::Training(error @ TrainingError::NothingLearned(_))) => Record {
@@ -181,7 +245,7 @@ fn make(
 
 /// Record of a run in a directory, or the reason why there is none.
 #[derive(Debug)]
-pub(crate) enum KeptRecord {
+pub enum KeptRecord {
     /// Nothing: the run is not finished.
     Nothing,
     /// A record that was made from its configuration.
@@ -207,7 +271,7 @@ fn finished_record(store: &ExperimentDirectory, run: &Run) -> Result<Option<Reco
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.
-pub(crate) fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<KeptRecord, PipelineError> {
+pub fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<KeptRecord, PipelineError> {
     const CONFIG: &str = "config.toml";
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
     let is_there = |file: &str| store.names(&run.name).iter().any(|name| name == file);
@@ -237,13 +301,22 @@ pub(crate) fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<Kept
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::find;
+    use crate::experiments::Reported;
+    use crate::presets::Preset;
 
     #[test]
     fn damaged_runs_are_told_from_those_of_another_configuration() {
         let directory = tempfile::tempdir().unwrap();
         let store = ExperimentDirectory::new(directory.path());
-        let run = &find("quick").unwrap().runs(Scale::Smoke, 1)[0];
+        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let run = &Run {
+            name: "run".into(),
+            label: "row".into(),
+            abscissa: None,
+            group: String::new(),
+            config: Preset::Quick.config(&system).unwrap(),
+            reported: Reported::NOTHING,
+        };
         let folder = directory.path().join(&run.name);
         std::fs::create_dir(&folder).unwrap();
         let outcome = Outcome::Nothing { reason: String::new() };

@@ -29,12 +29,12 @@ impl ExperimentDirectory {
     }
 
     /// The bytes of a file of a run, if it is there.
-    pub(crate) fn read(&self, run: &str, name: &str) -> Option<Vec<u8>> {
+    pub fn read(&self, run: &str, name: &str) -> Option<Vec<u8>> {
         read_regular(&self.run(run).join(name), MAX_BYTES).ok()
     }
 
     /// Names of the files of a run.
-    pub(crate) fn names(&self, run: &str) -> Vec<String> {
+    pub fn names(&self, run: &str) -> Vec<String> {
         let entries = std::fs::read_dir(self.run(run)).into_iter().flatten();
         entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect()
     }

@@ -64,7 +64,6 @@ mod fit_summary;
 mod force_errors;
 mod headline;
 mod hold_out;
-mod hole_pictures;
 mod judging;
 mod learned_functions;
 mod losses;
@@ -76,9 +75,7 @@ mod physics;
 mod physics_report;
 mod prediction;
 mod prepared_fit;
-mod readings;
 mod report_files;
-mod run_figures;
 mod run_table;
 mod start;
 mod tables;
@@ -98,13 +95,14 @@ pub use error::PipelineError;
 pub use evaluation::{Evaluation, EvaluationOptions, evaluate};
 #[doc(hidden)]
 pub use evaluation::{Motion, RTOL};
-pub(crate) use experiment::{KeptRecord, kept_record};
 #[doc(hidden)]
-pub use experiment::{finish_runs, merge_experiment, run_experiment};
+pub use experiment::Experiment;
+pub(crate) use experiment::{KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment};
 #[doc(hidden)]
 pub use experiment_directory::{ExperimentDirectory, LockedDirectory};
+pub(crate) use experiment_report::ExperimentReport;
 #[doc(hidden)]
-pub use experiment_report::{ExperimentReport, Results};
+pub use experiment_report::{Additions, Results};
 #[doc(hidden)]
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, LEARNED, PLAY, RECORD, SUMMARY};

@@ -95,13 +95,22 @@ fn choices(run: &Run) -> Result<BTreeMap<String, Value>, PipelineError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::{Scale, find};
+    use crate::experiments::Reported;
+    use crate::network::Initialization;
+    use crate::presets::Preset;
 
     #[test]
     fn every_run_has_a_line_with_the_choices_in_which_it_differs() {
         let directory = tempfile::tempdir().unwrap();
         let store = ExperimentDirectory::new(directory.path());
-        let runs = find("old-tricks").unwrap().runs(Scale::Smoke, 2);
+        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let run = |(name, initialization, seed): (&str, Initialization, u64)| {
+            let mut config = Preset::Quick.config(&system).unwrap();
+            (config.network.initialization, config.seed) = (initialization, seed);
+            let (name, label, reported) = (name.to_string(), String::new(), Reported::NOTHING);
+            Run { name, label, abscissa: None, group: String::new(), config, reported }
+        };
+        let runs = [("a", Initialization::Default, 0), ("b", Initialization::VariancePreserving, 1)].map(run);
         let nothing = Outcome::Nothing { reason: String::new() };
         let record =
             Record { run: String::new(), outcome: nothing, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };

@@ -1,7 +1,7 @@
-//! Tables and pictures of an experiment: the paper's figures beside ours.
+//! The table of an experiment, with the figures of others beside ours, and its loss curves.
 
-use super::{DataTable, Figure, Level, LinePlot, Series, figure, line_plot};
-use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, RunSpread};
+use super::{DataTable, Figure, LinePlot, Series, figure, line_plot};
+use crate::experiments::{Record, Row, Run, RunSpread};
 use crate::names::rounded;
 use serde_json::json;
 
@@ -61,21 +61,6 @@ const VIEW_HEADER: [&str; 16] = [
     "physical instability [SI]",
 ];
 
-/// Header of [`reduction_table`].
-pub const REDUCTION_HEADER: [&str; 5] = ["reduction of", "by", "against", "here [%]", "paper [%]"];
-
-/// The reductions that the paper states beside those of these runs, below [`REDUCTION_HEADER`].
-pub fn reduction_table(reductions: &[(Reduction, Option<f64>)]) -> Vec<Vec<String>> {
-    // Adding 0 turns -0 into 0.
-    let percent = |x: f64| format!("{:.1}", (1e3 * x).round() / 10.0 + 0.0);
-    let row = |(reduction, found): &(Reduction, Option<f64>)| {
-        let Reduction { quantity, group, against, paper } = reduction;
-        let found = found.map_or_else(|| "-".to_string(), percent);
-        vec![quantity.name().to_string(), group.to_string(), against.to_string(), found, percent(*paper)]
-    };
-    reductions.iter().map(row).collect()
-}
-
 /// Stands where there is no figure.
 const NONE: &str = "-";
 
@@ -125,131 +110,27 @@ pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
     (shown.iter().map(|&k| VIEW_HEADER[k]).collect(), all.iter().map(pick).collect())
 }
 
-/// Validation loss against seconds of training.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
-    /// Name of the curve.
-    pub label: String,
-    /// Seconds and loss, paper convention.
-    pub points: Vec<(f64, f64)>,
-}
-
-/// The curve of every finished run.
-pub fn experiment_curves(results: &[(Run, Option<Record>)]) -> Vec<Curve> {
-    let of = |(run, record): &(Run, Option<Record>)| {
-        let record = record.as_ref()?;
-        let losses = record.losses.iter().map(|[_, validation]| *validation);
-        let points = record.times.iter().zip(losses).filter_map(|(&time, loss)| Some((time, loss?))).collect();
-        Some(Curve { label: run.label.clone(), points })
-    };
-    results.iter().filter_map(of).collect()
-}
-
-/// The lowest loss so far against the logarithm of the time.
-fn reached(curves: &[Curve]) -> Vec<Series> {
-    let series = |curve: &Curve| {
-        let mut lowest = f64::INFINITY;
-        let point = |&(time, loss): &(f64, f64)| {
-            lowest = lowest.min(loss);
-            (time.log10(), lowest)
+/// Loss curves of an experiment from its finished runs; what has nothing to show is left out.
+pub fn loss_figures(title: &str, results: &[(Run, Option<Record>)]) -> Vec<Figure> {
+    let of = |(part, word): (usize, &str)| {
+        let plot = LinePlot {
+            title: format!("{title}: {word} loss"),
+            x_label: "epoch".into(),
+            y_label: "loss".into(),
+            log_y: true,
+            series: loss_curves(results, part),
+            turn: None,
+            level: None,
         };
-        Series { name: curve.label.clone(), points: curve.points.iter().map(point).collect(), over: false }
+        let heading = format!("How the {word} loss falls from epoch to epoch");
+        let caption = format!("Geometric mean of the {word} losses of each group of runs, paper convention.");
+        figure(&format!("{word}_loss.svg"), heading, line_plot(&plot), caption)
     };
-    curves.iter().map(series).collect()
-}
-
-/// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
-pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curves: &[Curve]) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    let mut add = |file: &str, heading: &str, caption: String, plot: LinePlot| {
-        figures.extend(figure(&format!("{file}.svg"), heading, line_plot(&plot), caption));
-    };
-    for (part, word) in [(0, "training"), (1, "validation")] {
-        add(
-            &format!("{word}_loss"),
-            &format!("How the {word} loss falls from epoch to epoch"),
-            format!("Geometric mean of the {word} losses of each group of runs, paper convention."),
-            LinePlot {
-                title: format!("{}: {word} loss", experiment.title),
-                x_label: "epoch".into(),
-                y_label: "loss".into(),
-                log_y: true,
-                series: loss_curves(results, part),
-                turn: None,
-                level: None,
-            },
-        );
-    }
-    for picture in experiment.pictures {
-        match picture {
-            Picture::Scan { abscissa } => add(
-                "scan",
-                &format!("Which {abscissa} gives the lowest loss"),
-                format!(
-                    "Lowest validation loss of each run against {abscissa}; runs without {abscissa} as a level line."
-                ),
-                LinePlot {
-                    title: format!("{}: lowest loss", experiment.title),
-                    x_label: format!("log10 {abscissa}"),
-                    y_label: "lowest validation loss".into(),
-                    log_y: true,
-                    series: scan(results),
-                    turn: None,
-                    level: None,
-                },
-            ),
-            Picture::Gain { abscissa } => add(
-                "gain",
-                "How many times lower the penalty makes the loss",
-                format!(
-                    "Lowest validation loss without the penalty over that with it, medians over seeds, against {abscissa}, 1 in the paper."
-                ),
-                LinePlot {
-                    title: "Loss without the penalty over loss with it".into(),
-                    x_label: format!("log2 of {abscissa} over the paper's"),
-                    y_label: "ratio of the lowest losses".into(),
-                    log_y: true,
-                    series: gain(results),
-                    turn: None,
-                    level: Some(Level { value: 1.0, name: "penalty without effect".into() }),
-                },
-            ),
-            Picture::TradeOff => add(
-                "trade_off",
-                "Accuracy against stability of the training",
-                "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
-                LinePlot {
-                    title: format!("{}: loss against instability", experiment.title),
-                    x_label: "log10 instability".into(),
-                    y_label: "lowest validation loss".into(),
-                    log_y: true,
-                    series: trade_off(results),
-                    turn: None,
-                    level: None,
-                },
-            ),
-            Picture::Clock => add(
-                "time_to_accuracy",
-                "Which accuracy is reached after which time",
-                "Lowest validation loss so far against seconds of training, paper convention.".into(),
-                LinePlot {
-                    title: experiment.title.into(),
-                    x_label: "log10 of the time of training [s]".into(),
-                    y_label: "lowest validation loss".into(),
-                    log_y: true,
-                    series: reached(curves),
-                    turn: None,
-                    level: None,
-                },
-            ),
-            Picture::Evaluation(_) | Picture::BlackHole => {}
-        }
-    }
-    figures
+    [(0, "training"), (1, "validation")].into_iter().filter_map(of).collect()
 }
 
 /// Groups in the order of first appearance with their records.
-fn groups(results: &[(Run, Option<Record>)], of: fn(&Run) -> &str) -> Vec<(&str, Vec<(&Run, &Record)>)> {
+pub fn groups(results: &[(Run, Option<Record>)], of: fn(&Run) -> &str) -> Vec<(&str, Vec<(&Run, &Record)>)> {
     let mut groups: Vec<(&str, Vec<(&Run, &Record)>)> = Vec::new();
     for (run, record) in results {
         let Some(record) = record else { continue };
@@ -279,69 +160,6 @@ fn loss_curves(results: &[(Run, Option<Record>)], part: usize) -> Vec<Series> {
     lines
         .iter()
         .map(|(name, members)| Series { name: (*name).to_string(), points: curve(members), over: false })
-        .collect()
-}
-
-fn lowest(record: &Record) -> f64 {
-    match &record.outcome {
-        Outcome::Learned(learned) => learned.validation_loss,
-        Outcome::Nothing { .. } => f64::NAN,
-    }
-}
-
-fn scan(results: &[(Run, Option<Record>)]) -> Vec<Series> {
-    let abscissae = || results.iter().filter_map(|(run, _)| run.abscissa).map(f64::log10);
-    let ends = [abscissae().fold(f64::INFINITY, f64::min), abscissae().fold(f64::NEG_INFINITY, f64::max)];
-    groups(results, |run| &run.group)
-        .into_iter()
-        .map(|(name, members)| {
-            let at = |(run, record): &(&Run, &Record)| run.abscissa.map(|x| (x.log10(), lowest(record)));
-            let mut points: Vec<(f64, f64)> = members.iter().filter_map(at).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            if points.is_empty() {
-                let losses: Vec<f64> = members.iter().map(|(_, r)| lowest(r)).filter(|x| x.is_finite()).collect();
-                let mean = losses.iter().sum::<f64>() / losses.len() as f64;
-                points = ends.map(|x| (x, mean)).to_vec();
-            }
-            Series { name: name.to_string(), points, over: false }
-        })
-        .collect()
-}
-
-/// A line per group: median loss of the runs without a penalty over that of the runs with one.
-fn gain(results: &[(Run, Option<Record>)]) -> Vec<Series> {
-    let line = |(name, members): (&str, Vec<(&Run, &Record)>)| {
-        let mut abscissae: Vec<f64> = members.iter().filter_map(|(run, _)| run.abscissa).collect();
-        abscissae.sort_by(f64::total_cmp);
-        abscissae.dedup();
-        let median = |x: f64, penalised: bool| {
-            let here = |run: &Run| run.abscissa == Some(x) && (run.config.penalty.lambda() > 0.0) == penalised;
-            let losses = members.iter().filter(|(run, _)| here(run)).map(|(_, record)| lowest(record));
-            RunSpread::of(losses).map_or(f64::NAN, |spread| spread.median)
-        };
-        let points = abscissae.into_iter().map(|x| (x.log2(), median(x, false) / median(x, true)));
-        Series { name: name.to_string(), points: points.collect(), over: false }
-    };
-    groups(results, |run| &run.group).into_iter().map(line).collect()
-}
-
-/// A label or group per colour; gaps between the points keep them apart.
-fn trade_off(results: &[(Run, Option<Record>)]) -> Vec<Series> {
-    let labels = groups(results, |run| &run.label);
-    // More labels than colours: groups.
-    let chosen = if labels.len() <= 7 { labels } else { groups(results, |run| &run.group) };
-    chosen
-        .into_iter()
-        .map(|(name, members)| {
-            let points = members.iter().flat_map(|(_, record)| {
-                let instability = match &record.outcome {
-                    Outcome::Learned(learned) => learned.instability.map_or(f64::NAN, f64::log10),
-                    Outcome::Nothing { .. } => f64::NAN,
-                };
-                [(instability, lowest(record)), (f64::NAN, f64::NAN)]
-            });
-            Series { name: name.to_string(), points: points.collect(), over: false }
-        })
         .collect()
 }
 

@@ -9,10 +9,8 @@ mod plot;
 mod table;
 
 pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};
-pub use experiment::Curve;
-pub(crate) use experiment::{
-    REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
-};
+pub use experiment::groups;
+pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
 pub use grids::{Fit, GridComparison, grid_figures};
 pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
@@ -22,7 +20,6 @@ pub use plot::{
     trace_plot,
 };
 pub use table::DataTable;
-pub(crate) use table::{READING_HEADER, reading_table};
 
 /// One picture of a report.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +35,7 @@ pub struct Figure {
 }
 
 /// A figure of what was drawn, under a heading; none where there was nothing to show.
-pub(crate) fn figure(
+pub fn figure(
     file: &str,
     heading: impl Into<String>,
     drawn: Result<Picture, PlotError>,

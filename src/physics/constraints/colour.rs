@@ -19,7 +19,7 @@ const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const PRODUCTS: [f64; 5] = [70.0, -56.0, 28.0, -8.0, 1.0];
 /// Largest autocorrelation of neighbours that is noise; beyond it nothing distinguishes noise from slow motion.
 const MOST: f64 = 0.97;
-/// The misfit, in units of its scatter, has to fall by so much for noise to count as coloured (`cargo bench --bench rates -- --part
+/// The misfit, in units of its scatter, has to fall by so much for noise to count as coloured (`lnn-studies rates --part
 /// constraints`: white noise is called coloured in none of a hundred).
 const PLAIN: f64 = 12.0;
 /// Misfits up to this above the least one are allowed. The differences at neighbouring distances share samples, so that their misfit scatters by

@@ -22,7 +22,7 @@ use crate::recording::{deviation, quantile, rms};
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.01;
 /// Parts of a smoothing window over which, to either side and twice, equations are averaged: two thirds of a window in all, with which ranges of
-/// constants hold (`cargo bench --bench rates -- --part identify`).
+/// constants hold (`lnn-studies rates --part identify`).
 const AVERAGED: usize = 6;
 /// Residual over the spread of a force that is taken at least.
 const LEAST: f64 = 1e-9;

@@ -28,7 +28,7 @@ pub(super) const FAR: f64 = 5.5;
 /// Samples that stand out, listed at most.
 const MOST_LISTED: usize = 100;
 /// Lags of the test of independence. A missing term is correlated over many samples, and a sum over as many lags shows it best; more than these
-/// find no more (`cargo bench --bench rates -- --part identify`).
+/// find no more (`lnn-studies rates --part identify`).
 const LAGS: usize = 20;
 
 /// Probability that a variable of the F distribution with these degrees of freedom is larger: Paulson's normal approximation of its cube root

@@ -320,7 +320,7 @@ const ROUNDING: f64 = 1e-9;
 ///
 /// # Errors
 /// What the model refuses other than single states, which are passed over.
-pub(crate) fn depends_on_time(
+pub fn depends_on_time(
     model: &dyn EulerLagrange<f64>,
     time: usize,
     points: &[f64],

@@ -38,10 +38,10 @@ pub use camera::{MOST_PIXELS, Tetrad};
 #[doc(hidden)]
 pub use coordinates::CentralCoordinates;
 pub use coordinates::Chart;
-pub(crate) use coordinates::depends_on_time;
 #[doc(hidden)]
-pub use coordinates::time_moves_alone;
-pub(crate) use orbits::{Orbit, orbits};
+pub use coordinates::{depends_on_time, time_moves_alone};
+#[doc(hidden)]
+pub use orbits::orbits;
 pub use rays::{Ray, RayOutcome};
 #[doc(hidden)]
 pub use rays::{TOLERANCES, Tracing, trace};

@@ -77,7 +77,7 @@ impl LearnedHole<'_> {
     ///
     /// # Errors
     /// Those of the exact metric.
-    pub(crate) fn mass(&self) -> Result<f64, GeometryError> {
+    pub fn mass(&self) -> Result<f64, GeometryError> {
         let origin = self.around.origin();
         let metric = self.around.equator(self.exact, &origin).at(FAR)?;
         Ok(-0.5 * metric.first[0] * FAR * FAR)

@@ -18,7 +18,7 @@ pub struct Image {
 
 impl Image {
     /// Pictures side by side, with white columns between them; what is not as high as the highest is white below.
-    pub(crate) fn beside(images: &[Self], gap: usize) -> Self {
+    pub fn beside(images: &[Self], gap: usize) -> Self {
         let white = [255; 3];
         let height = images.iter().map(|image| image.height).max().unwrap_or(0);
         let mut pixels = Vec::new();

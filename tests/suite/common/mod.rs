@@ -3,11 +3,9 @@
 
 pub mod accuracy;
 #[cfg(feature = "cli")]
-#[path = "../../../benches/shared/arm.rs"]
 pub mod arm;
 pub mod damped;
 #[cfg(feature = "cli")]
-#[path = "../../../benches/shared/forms.rs"]
 pub mod forms;
 #[cfg(feature = "cli")]
 pub mod kinds;

@@ -354,9 +354,7 @@ fn numbers_of_the_command_line_have_ranges() {
     for bad in ["-1", "0", "1.5", "18446744073709551616"] {
         lnn(&["evaluate", &model, "--starts", bad]).refused(2, &["--starts", "1000000"]);
         lnn(&["evaluate", &model, "--threads", bad]).refused(2, &["--threads", "256"]);
-        lnn(&["experiment", "scaling", "--seeds", bad]).refused(2, &["--seeds", "10000"]);
     }
-    lnn(&["experiment", "scalnig"]).refused(2, &["scalnig", "scaling"]);
     assert_eq!(folder.names(), ["m"]);
 }
 

@@ -6,7 +6,6 @@ mod configuration;
 mod constraints;
 mod conveniences;
 mod dissipation;
-mod experiment;
 mod fit;
 mod fit_resume;
 mod forces;

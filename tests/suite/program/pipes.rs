@@ -39,7 +39,6 @@ fn a_reader_may_go_after_the_first_line() {
         &["systems", "--json"],
         &["--help"],
         &["train", "--help"],
-        &["experiment"],
         &["inspect", "--system", "double-pendulum", "--states", &states],
         &["inspect", "--system", "double-pendulum", "--states", &states, "--format", "table"],
         &["train", "--config", &config, "--out", &out],

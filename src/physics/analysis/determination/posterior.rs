@@ -213,7 +213,7 @@ const OPEN: f64 = 0.5;
 const LEAST: usize = 5;
 /// Share of an acceleration up to which the influence of another coordinate may be an error of the network: small networks of motion without
 /// any coupling that miss 7 to 29 % of held-out accelerations show influences of 0.05 to 0.23, below twice what they miss, and networks of
-/// coupled motion that miss 4 to 11 % show 0.18 to 0.32 (as in `cargo bench --bench rates -- --part readings`).
+/// coupled motion that miss 4 to 11 % show 0.18 to 0.32 (as in `lnn-studies rates --part readings`).
 const COUPLED: f64 = 0.1;
 /// States at which couplings are looked for, at most.
 const SHOWN: usize = 500;
