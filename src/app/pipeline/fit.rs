@@ -132,10 +132,12 @@ fn fit_in<S: Scalar>(
     })?;
     judged.determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
     let (formula, mut unfinished) = formula(prepared, config, &network, (options.threads, watch, was_interrupted));
-    let trained_alone = (trained.stop == StopReason::Finished, (&network, &judged.hold_out, kept));
-    let (members, others) = match unfinished {
-        None => others(prepared, config, trained_alone, (options, output, watch), &mut unfinished)?,
-        Some(_) => (None, Vec::new()),
+    let (members, others) = match (&trained.stop, &unfinished) {
+        (StopReason::Finished, None) => {
+            let first = (&network, &judged.hold_out, kept);
+            others(prepared, config, first, (options, output, watch), &mut unfinished)?
+        }
+        _ => (None, Vec::new()),
     };
     if unfinished.is_some() {
         trained.stop = StopReason::Interrupted;
@@ -328,14 +330,11 @@ impl JudgedFit {
 fn others(
     prepared: &PreparedFit<'_>,
     config: &FitConfig,
-    (is_finished, trained): (bool, (&NetworkLagrangian<f64>, &HoldOut, Vec<ModelFile<f64>>)),
+    first: (&NetworkLagrangian<f64>, &HoldOut, Vec<ModelFile<f64>>),
     (options, output, watch): (&RunOptions, &dyn Output, &Watch),
     unfinished: &mut Option<String>,
 ) -> Result<(Option<Members>, Vec<FitReport>), PipelineError> {
-    if !is_finished {
-        return Ok((None, Vec::new()));
-    }
-    let (members, others) = Members::train(prepared, config, trained, (options, output, watch))?.unzip();
+    let (members, others) = Members::train(prepared, config, first, (options, output, watch))?.unzip();
     let others = others.unwrap_or_default();
     let (done, wanted) = (1 + others.len(), config.members);
     if watch.is_interrupted() && done < wanted {
