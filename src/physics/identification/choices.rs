@@ -26,7 +26,7 @@ pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result
     Ok(())
 }
 
-/// What is met.
+/// What the constants are fitted to.
 pub(super) fn met(
     instance: &SystemInstance<f64>,
     recording: &Recording,
@@ -46,11 +46,10 @@ pub(super) fn met(
     };
     match options.targets {
         Some(Targets::Motion) => Ok(Met::Accelerations),
-        Some(Targets::Forces) if !pushed => refused("motion, of a recording without known forces", "forces"),
-        Some(Targets::Forces) if follows => refused(
-            "motion, beside unknown constants of sensors, errors of positions or a length of segments",
-            "forces",
-        ),
+        Some(Targets::Forces) if !pushed => refused("motion, because the recording has no known forces", "forces"),
+        Some(Targets::Forces) if follows => {
+            refused("motion, because sensor constants, position errors or a segment length are given", "forces")
+        }
         Some(Targets::Forces) => Ok(Met::Forces),
         Some(Targets::Measured) => refused("motion or forces", "measured"),
         Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),

@@ -26,7 +26,7 @@ const POSITION: usize = 0;
 const VELOCITY: usize = 1;
 const DRIVE: usize = 2;
 
-const MORE: &str = "more motion of this kind, or less noise";
+const MORE: &str = "record more motion of this kind, or reduce the noise";
 
 /// Looks for motion that would tell open directions.
 pub(super) struct Examiner<'a> {
@@ -193,7 +193,7 @@ impl Examiner<'_> {
     /// What would determine a group of open directions.
     pub fn cure(&self, x: &[f64], group: &Group<'_>) -> String {
         if group.inside.iter().any(|k| *k >= self.problem.chosen.len()) {
-            return "a sensor that is calibrated: its constants and those of the system do the same to this motion"
+            return "calibrate the sensor: its constants and those of the system have the same effect on this motion"
                 .into();
         }
         let own = Place { x, changes: group.columns.iter().map(|column| column.change.clone()).collect() };
@@ -220,7 +220,7 @@ impl Examiner<'_> {
         if by_force > 0 {
             cures.push(match forced {
                 true => MORE.to_string(),
-                false => "motion under a known force (--force), without which nothing depends on it".to_string(),
+                false => "record motion under a known force (--force), or fix one of the constants".to_string(),
             });
         }
         if !by_motion.is_empty() {
@@ -230,10 +230,10 @@ impl Examiner<'_> {
         match (never, cures.is_empty()) {
             (0, _) => {}
             (_, true) => {
-                return "no motion, the equations contain these combinations alone; fix one of the constants".into();
+                return "fix one of the constants: no motion separates them, the equations contain only their combinations".into();
             }
-            (1, _) => cures.push("the value of one of them, which no motion determines".to_string()),
-            (never, _) => cures.push(format!("the values of {never} of them, which no motion determines")),
+            (1, _) => cures.push("fix one of the constants in any case: no motion determines it".to_string()),
+            (never, _) => cures.push(format!("fix {never} of the constants in any case: no motion determines them")),
         }
         cures.dedup();
         cures.join("; ")
@@ -256,11 +256,14 @@ impl Examiner<'_> {
             let mut far = recorded.clone();
             spread((&mut far.q, n), (i, POSITION), wide_q[i].1);
             let (now, then) = (range(wide_q[i].0), range(wide_q[i].1));
-            let farther = (far, format!("motion in which {name} goes farther, over {then}, not {now}"));
+            let farther = (far, format!("record motion in which {name} goes farther, over {then} instead of {now}"));
             let mut fast = recorded.clone();
             spread((&mut fast.v, n), (i, VELOCITY), wide_v[i].1);
             let (now, then) = (range(wide_v[i].0), range(wide_v[i].1));
-            let faster = (fast, format!("motion in which {name} is faster, with {name}_dot over {then}, not {now}"));
+            let faster = (
+                fast,
+                format!("record motion in which {name} is faster, with {name}_dot over {then} instead of {now}"),
+            );
             for (probe, text) in [farther, faster] {
                 let effect = tells(&probe);
                 if effect > best.0 {

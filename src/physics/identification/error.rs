@@ -1,4 +1,4 @@
-//! Why nothing is identified.
+//! Errors of identification.
 
 use crate::cancellation::Cancelled;
 use crate::names::unknown;
@@ -6,7 +6,7 @@ use crate::recording::TrajectoryError;
 use crate::recording::smooth::SmoothError;
 use crate::tape::TapeError;
 
-/// Why constants cannot be identified.
+/// Why constants could not be identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
@@ -23,7 +23,7 @@ pub enum IdentifyError {
     #[error(transparent)]
     Lagrangian(#[from] TapeError),
     /// A system under constraints.
-    #[error("{system} is under constraints; a system without them, in coordinates that are free, can be identified")]
+    #[error("{system} has constraints; identification needs a system without them, in independent coordinates")]
     Constrained {
         /// The system.
         system: String,
@@ -63,7 +63,7 @@ pub enum IdentifyError {
         known: Vec<String>,
     },
     /// Nothing is unknown.
-    #[error("{system} has no constants")]
+    #[error("{system} has no constants to identify")]
     Nothing {
         /// The system.
         system: String,
@@ -89,7 +89,7 @@ pub enum IdentifyError {
         found: String,
     },
     /// Too few samples.
-    #[error("the trajectories of three samples or more have {found} samples, at least {needed} are needed")]
+    #[error("expected at least {needed} samples in trajectories of three or more, found {found}")]
     Short {
         /// Samples of the trajectories that have three or more.
         found: usize,
@@ -103,7 +103,7 @@ pub enum IdentifyError {
     Singular,
     /// The motion cannot be followed.
     #[error(
-        "no part of the recorded motion can be followed with the constants found so far: are the columns those of the coordinates?"
+        "the model follows no part of the recorded motion with the constants found so far: check that the columns are those of the coordinates"
     )]
     Lost,
 }

@@ -184,7 +184,7 @@ pub struct Identified {
     pub converged: bool,
     /// The decrease of the sum of squares that was left to gain at the end, over the variance of the noise: the Newton decrement.
     pub decrement: f64,
-    /// Whether the form explains what was measured, and if not, why; in JSON also in words, as `says`.
+    /// Whether the model fits the recording, and if not, why; in JSON also in words, as `says`.
     #[serde(serialize_with = "in_words")]
     pub verdict: Verdict,
     /// `true` if it does: [`Verdict::explains`].

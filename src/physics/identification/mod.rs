@@ -80,7 +80,7 @@ pub struct IdentifyOptions {
     pub offsets: Vec<String>,
     /// Coordinates whose sensor has an unknown gain.
     pub gains: Vec<String>,
-    /// Coordinates whose sensor is late by an unknown time.
+    /// Coordinates whose sensor has an unknown delay.
     pub delays: Vec<String>,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,

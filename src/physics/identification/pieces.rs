@@ -107,8 +107,9 @@ impl<'a> Pieces<'a> {
         let noise_of = (0..recording.tracks.len()).map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
         let still = smoothing.as_ref().map_or_else(Vec::new, |smoothing| stillness(&long, smoothing));
         let still = still.into_iter().filter(|(_, how)| !matches!(how, Stillness::Copy(_)));
-        let still =
-            still.map(|(i, how)| format!("{} {how}; nothing can be learned of it", recording.coordinates[i])).collect();
+        let still = still
+            .map(|(i, how)| format!("{} {how}; nothing can be learned about it", recording.coordinates[i]))
+            .collect();
         let smooth =
             |track: &RecordedTrajectory| smoothing.as_ref().map(|smoothing| smoothing.apply(track)).transpose();
         let mut smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;

@@ -8,7 +8,7 @@ use super::verdict::Verdict;
 use crate::recording::robust_deviation;
 use crate::scalar::Real;
 
-/// Size of residuals over the noise up to which a form explains what was measured.
+/// Largest ratio of residuals to noise at which a model fits.
 pub(super) const EXPLAINED: f64 = 1.3;
 /// Probability below which independent residuals of the right form are not believed to be as correlated as those that were found. Of right
 /// forms this test and that of [`DIFFERENT`] refuse one and a half in a hundred.

@@ -1,4 +1,4 @@
-//! What is said of identified constants.
+//! Report of identified constants.
 
 use super::found::{Bodies, Combination, Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
 use crate::findings::Findings;
@@ -16,7 +16,7 @@ impl Identified {
         findings.lines(&self.obstacles);
         self.say_constants(&mut findings);
         for Undetermined { text, cure, .. } in &self.undetermined {
-            findings.gap().line(text).line(format!("  what would determine it: {cure}"));
+            findings.gap().line(text).line(format!("  advice: {cure}"));
         }
         if let Some(text) = self.bodies.as_ref().and_then(Bodies::text) {
             findings.gap().line(text);
@@ -26,7 +26,10 @@ impl Identified {
         let headers = [what, "residual", "noise", "spread", "autocorrelation", ""];
         findings.gap().table(&headers, self.residuals.iter().map(Residual::row)).line(self.verdict.to_string());
         if !self.converged {
-            findings.line(format!("{} times the variance of the noise is left to gain", number(self.decrement)));
+            findings.line(format!(
+                "the next step would still reduce the sum of squares by {} times the variance of the noise",
+                number(self.decrement)
+            ));
         }
         findings.line(self.extent());
         self.say_outliers(&mut findings);
@@ -77,7 +80,7 @@ impl Identified {
         }
         if !self.force_noise.is_empty() {
             let sizes: Vec<String> = self.force_noise.iter().map(|size| rounded(*size, 2)).collect();
-            text += &format!(", noise of forces {}", sizes.join(", "));
+            text += &format!(", force noise {}", sizes.join(", "));
         }
         text
     }
@@ -90,7 +93,7 @@ impl Identified {
         let samples = pluralize(self.outlier_count, "sample", "samples");
         let headers = ["trajectory", "row", "t", "coordinate", "residual / typical"];
         let rows = self.outliers.iter().take(SHOWN).map(Outlier::line);
-        findings.gap().line(format!("{samples} far from the motion{advice}")).table(&headers, rows);
+        findings.gap().line(format!("{samples} far from the fitted motion{advice}")).table(&headers, rows);
     }
 }
 
@@ -144,12 +147,12 @@ impl Bodies {
         let change = rounded(*largest_change, 2);
         match (moved.is_empty(), exist) {
             (true, true) => None,
-            (true, false) => Some("no bodies have the constants that are given".to_string()),
+            (true, false) => Some("no physical bodies have the given constants".to_string()),
             (false, false) => Some(format!(
-                "no bodies have these sums within their errors: the nearest ones are {change} standard errors away; is the form complete?"
+                "no physical bodies have these combinations within their errors: the nearest ones differ by {change} standard errors; is the model complete?"
             )),
             (false, true) => Some(format!(
-                "the constants of links {links} are the nearest to the start that bodies have; known sums change by {change} standard errors at most"
+                "the constants of links {links} are the physically possible ones nearest to the start; determined combinations change by at most {change} standard errors"
             )),
         }
     }

@@ -32,7 +32,7 @@ pub(super) struct States {
     pub share: Vec<f64>,
 }
 
-/// What is met.
+/// What the constants are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Met {
     Accelerations,

@@ -242,7 +242,7 @@ fn repeated(filled: &Filled) -> Vec<String> {
     let recording = &filled.recording;
     let of = |(i, name): (usize, &String)| {
         let (held, samples) = (filled.count(i), recording.samples());
-        let says = "readings repeat the one before while the motion goes on; they are filled in from those around them";
+        let says = "readings repeat the previous one during motion; they were interpolated from their neighbours";
         (held > 0).then(|| format!("{name}: {held} of {samples} {says}"))
     };
     recording.coordinates.iter().enumerate().filter_map(of).collect()

@@ -191,13 +191,13 @@ fn described(
     };
     let text = match (group.inside.len(), known.is_empty(), group.is_named()) {
         (1, ..) => format!("{all} is not determined{error}"),
-        (_, false, true) => format!("{all} are not determined apart{error}, only {}", known_names.join(", ")),
+        (_, false, true) => format!("{all} cannot be separated{error}; determined: {}", known_names.join(", ")),
         (_, true, _) => format!(
-            "{all} are not determined apart{error}: in parts of their size, they may change together, {}",
+            "{all} cannot be separated{error}; relative to their sizes, they can change together: {}",
             numbers()
         ),
         (_, false, false) => format!(
-            "{all} are not determined apart{error}; known are {}: in parts of their size, they may change together, {}",
+            "{all} cannot be separated{error}; determined: {}; relative to their sizes, they can change together: {}",
             known_names.join(", "),
             numbers()
         ),
@@ -208,11 +208,11 @@ fn described(
 /// What sums alone tell of constants, in words.
 fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undetermined> {
     let here = match still {
-        [] => "motion that goes farther, faster, or by other joints".to_string(),
-        [single] => format!("motion of {single}, which stands still; else motion that goes farther or faster"),
-        many => format!("motion of {}, which stand still; else motion that goes farther or faster", listed(many)),
+        [] => "record motion that goes farther or faster, or that moves other joints".to_string(),
+        [single] => format!("record motion of {single}, which stands still, or motion that goes farther or faster"),
+        many => format!("record motion of {}, which stand still, or motion that goes farther or faster", listed(many)),
     };
-    let always = "no motion, the forces depend on their sums alone".to_string();
+    let always = "no motion can separate them: the forces depend only on their sums".to_string();
     let told = |(changes, text, cure): (&Vec<Vec<f64>>, &str, String)| {
         let inside = |k: &usize| changes.iter().any(|change| change[*k] != 0.0);
         let constants = names.of(&(0..names.all.len()).filter(inside).collect::<Vec<_>>());
@@ -223,9 +223,9 @@ fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undeter
         (
             &open.silent,
             "have no effect on the forces, whatever the motion",
-            "no motion, nothing depends on it".to_string(),
+            "fix them: no motion depends on them".to_string(),
         ),
-        (&open.always, "appear in the equations in sums alone", always),
+        (&open.always, "appear in the equations only in sums", always),
         (&open.here, "cannot be separated by this motion", here),
     ];
     all.into_iter().filter(|(changes, ..)| !changes.is_empty()).map(told).collect()

@@ -69,9 +69,9 @@ impl Rivals {
         }
         if !doubled.is_empty() {
             let (ways, names) = (self.names.join(", "), doubled.join(", "));
-            found
-                .obstacles
-                .push(format!("forces between the samples may be {ways}: the error of {names} is what that changes"));
+            found.obstacles.push(format!(
+                "forces between the samples may be {ways}: the standard errors of {names} include the difference"
+            ));
         }
     }
 }
