@@ -13,7 +13,7 @@ pub enum IdentifyError {
     /// The search was ended from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-    /// Arrays that do not make a trajectory.
+    /// Arrays that do not form a trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
     /// Motion that cannot be smoothed.
@@ -28,7 +28,7 @@ pub enum IdentifyError {
         /// The system.
         system: String,
     },
-    /// Another number of coordinates than the system has.
+    /// The number of coordinates differs from that of the system.
     #[error("expected {expected} coordinates, found {found}")]
     Coordinates {
         /// Coordinates of the system.
@@ -62,7 +62,7 @@ pub enum IdentifyError {
         /// Coordinates there are.
         known: Vec<String>,
     },
-    /// Nothing is unknown.
+    /// The system has no constants.
     #[error("{system} has no constants to identify")]
     Nothing {
         /// The system.
@@ -78,7 +78,7 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
-    /// A standard deviation of a position that is none, or another number of them than of positions.
+    /// A standard deviation of a position that is not a finite number above 0, or the wrong number of standard deviations.
     #[error("errors of {track}: expected a finite number above 0 for each of {expected} positions, found {found}")]
     Errors {
         /// The trajectory.
@@ -101,7 +101,7 @@ pub enum IdentifyError {
         "the equations of motion cannot be solved at any recorded state with the given constants: the mass matrix is singular, or a term is not finite"
     )]
     Singular,
-    /// The motion cannot be followed.
+    /// The model cannot follow the motion.
     #[error(
         "the model follows no part of the recorded motion with the constants found so far: check that the columns are those of the coordinates"
     )]

@@ -4,13 +4,13 @@ use super::found::{Bodies, Combination, Constant, Identified, Outlier, Residual,
 use crate::findings::Findings;
 use crate::names::{number, pluralize, rounded};
 
-/// Outliers and correlations that are listed.
+/// Largest number of outliers and correlations that are listed.
 const SHOWN: usize = 10;
-/// Correlations of errors that are listed.
+/// Smallest correlation of errors that is listed.
 const CORRELATED: f64 = 0.9;
 
 impl Identified {
-    /// The constants, what is not determined, the residuals and the verdict, in tables and sentences.
+    /// The constants, the undetermined combinations, the residuals and the verdict, as tables and sentences.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.lines(&self.obstacles);
@@ -37,7 +37,7 @@ impl Identified {
     }
 
     fn say_constants(&self, findings: &mut Findings) {
-        // Where sums are known, constants that they alone tell have no row of their own.
+        // Where sums are determined, constants that are known only within sums have no row of their own.
         let alone = |c: &&Constant| self.combinations.is_empty() || c.standard_error.is_some();
         let constants = self.constants.iter().filter(alone).map(Constant::row);
         let headers = ["constant", "value", "standard error", "unit", "start"];
@@ -67,7 +67,7 @@ impl Identified {
         }
     }
 
-    /// How much was followed, and how forces were taken.
+    /// How much motion was used, and how forces were interpolated.
     fn extent(&self) -> String {
         let mut text = pluralize(self.samples, "sample", "samples");
         if self.segments > 0 {
@@ -97,7 +97,7 @@ impl Identified {
     }
 }
 
-/// A value with the digits that its error leaves it, and the error.
+/// A value with the digits that its standard error justifies, and the error.
 fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
     let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
         return [rounded(value, 4), "-".to_string()];
@@ -140,7 +140,7 @@ impl Outlier {
 }
 
 impl Bodies {
-    /// What became of the inertias of links; nothing where they already were those of bodies.
+    /// How the inertias of links were made physical; nothing if they already were.
     fn text(&self) -> Option<String> {
         let Self { moved, largest_change, exist } = self;
         let links = moved.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");

@@ -7,16 +7,15 @@ use std::fmt::{Display, Formatter, Result};
 /// Whether the model fits the recording, and if not, why.
 ///
 /// A model fits a recording if all of the following holds; the verdict names the first condition that fails:
-/// the search has converged; residuals are below half of the motion; they are as large as the noise; at most one sample in a hundred lies far
-/// from the motion; residuals do not follow from the earlier ones; segments of the motion agree about the constants, and every second one can start
-/// where the one before it ends.
+/// the search has converged; residuals are below half of the motion and as large as the noise; at most one sample in a hundred is an outlier;
+/// residuals are not correlated over time; segments agree about the constants, and every second segment can start where the one before it ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Verdict {
     /// Residuals are consistent with the noise.
     Explained,
-    /// Residuals are as small as integration and rounding let them be.
+    /// Residuals are as small as integration and rounding allow.
     Exact,
     /// The search ended before the best constants were reached.
     #[default]
@@ -58,9 +57,9 @@ pub enum Verdict {
     },
     /// Segments do not continue each other.
     Discontinuous {
-        /// Probability that noise makes their ends and starts differ as much.
+        /// Probability that noise causes discontinuities as large.
         probability: f64,
-        /// Their usual length in s.
+        /// Their typical length in s.
         seconds: f64,
     },
 }
