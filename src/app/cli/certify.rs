@@ -1,4 +1,4 @@
-//! `lnn certify`: where the mass matrix is proven to have its signature.
+//! `lnn certify`: a proof of where the mass matrix has its signature.
 
 use crate::certificate::{Certificate, CertificateError, Options, Signature, certify_network, certify_system};
 use crate::cli::format::TableOrJson;
@@ -31,13 +31,13 @@ pub struct Args {
     /// Numbers of positive and of negative eigenvalues [default: all positive, but for one if a coordinate is a time].
     #[arg(long, value_name = "P,N", value_parser = signature)]
     signature: Option<Signature>,
-    /// Time after which no further box is evaluated, in seconds.
+    /// Time limit of the search, in seconds.
     #[arg(long, value_name = "T", default_value = "10", allow_hyphen_values = true, value_parser = seconds)]
     seconds: f64,
-    /// Boxes after which no further one is evaluated; a search that ends by them is the same every time.
+    /// Limit of evaluated boxes; a search that ends at this limit always gives the same result.
     #[arg(long, value_name = "N", default_value = "10000000", allow_hyphen_values = true, value_parser = whole(1, 100_000_000))]
     boxes: usize,
-    /// Threads; those of a search that ends by --boxes do not change it [default: all].
+    /// Threads; they do not change the result of a search that --boxes ends [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Text, or one JSON object.

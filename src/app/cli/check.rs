@@ -1,4 +1,4 @@
-//! `lnn check`: what recorded motion is good for, before anything is learned from it.
+//! `lnn check`: whether a fit can learn from recorded motion, and how.
 
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
@@ -26,7 +26,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Reads the data, looks at them and says what it found.
+/// Reads the data, examines them and prints a report.
 ///
 /// # Errors
 /// A usage error for contradicting arguments, a data error for files that cannot be used.

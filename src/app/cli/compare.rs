@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut second = Probe::either(&args.second, &args.param_b)?;
     if first.model.coordinates() != second.model.coordinates() {
         let [a, b] = [&first, &second].map(|probe| probe.coordinates().join(","));
-        return Err(CliError::usage(format_args!("expected Lagrangians of the same coordinates, found {a} and {b}")));
+        return Err(CliError::usage(format_args!("expected Lagrangians with the same coordinates, found {a} and {b}")));
     }
     first.meet(&mut second)?;
     first.narrow(&args.region)?;
@@ -107,12 +107,12 @@ impl Compared<'_> {
         if !found.group_factors.is_empty() {
             let factors = found.group_factors.iter().map(|factor| rounded(*factor, 6)).collect::<Vec<_>>().join(", ");
             text += &format!(
-                "coordinates that do not act on each other have factors of their own, which no motion determines: {factors} were taken into B first\n"
+                "decoupled coordinates have factors of their own, which no motion determines: B was first multiplied by {factors}\n"
             );
         }
         if found.motionless_states > 0 {
             text += &format!(
-                "one of the two is degenerate: at {} states its mass matrix is singular and determines no accelerations\n",
+                "one of the two is degenerate: at {} states its mass matrix is singular and does not determine the accelerations\n",
                 found.motionless_states
             );
         }

@@ -1,4 +1,4 @@
-//! `lnn constraints`: what the coordinates of recorded motion obey, and what a Lagrangian leaves open.
+//! `lnn constraints`: constraints of recorded motion, or constraints and degenerate directions of a Lagrangian.
 
 use crate::cli::files::OutputFile;
 use crate::cli::number::whole;
@@ -23,13 +23,13 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
-    /// Largest total degree of the functions of the coordinates that are tried; angles take part by sine and cosine.
+    /// Largest total degree of the functions of the coordinates; angles enter by sine and cosine.
     #[arg(long, value_name = "N", default_value = "2", value_parser = whole(1, MOST_DEGREE))]
     degree: usize,
-    /// The same of the factors of velocities.
+    /// Largest total degree of the coefficients of the velocities.
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole(0, MOST_DEGREE))]
     velocity_degree: usize,
-    /// A file for the table [constraints], which a system file takes as it is, and the option of this name of `lnn rollout`.
+    /// Write the table [constraints] to this file, for a system file or `lnn rollout --constraints`.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Replace the file.
@@ -44,8 +44,8 @@ pub struct Args {
 fn optional(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.value_name("DATA|MODEL|SYSTEM").help(
-            "Files of recorded motion, with --coords as of lnn check; or without it one trained model, or a system by name or file, \
-             whose constraints and open directions are named",
+            "Files of recorded motion, with --coords as for lnn check; or, without --coords, one trained model or system (name or file), \
+             to list its constraints and degenerate directions",
         ),
         "coords" => argument.required(false),
         _ => argument,
@@ -62,7 +62,7 @@ struct Table {
     constraints: BTreeMap<String, String>,
 }
 
-/// Looks and says what it found.
+/// Finds constraints and prints them.
 ///
 /// # Errors
 /// A usage error for arguments, a data error for data or a model that cannot be used, or a file that cannot be written.
@@ -104,9 +104,7 @@ fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), Cli
 /// What a system or a model says of its constraints and of its degeneracy.
 fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if args.out.is_some() {
-        return Err(CliError::usage(
-            "--out: the constraints of a system stand in its own file; expected recorded motion",
-        ));
+        return Err(CliError::usage("--out needs recorded motion; a system already lists its constraints in its file"));
     }
     let probe = Probe::with_constraints(name)?;
     let (q, v) = probe.states(EXAMINED_STATES, 0)?;
@@ -114,10 +112,7 @@ fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     let about = (probe.name.as_str(), &probe.columns[..n]);
     let examined = examine(about, probe.model.as_ref(), &probe.constraints, (&q, &v));
     if examined.states == 0 {
-        return Err(CliError::data(format_args!(
-            "{}: the mass matrix is finite at none of the states of interest",
-            probe.name
-        )));
+        return Err(CliError::data(format_args!("{}: the mass matrix is not finite at any sampled state", probe.name)));
     }
     output::print(&output::shown(&examined, args.json, ExaminedLagrangian::findings)?)
 }

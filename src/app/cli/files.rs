@@ -37,7 +37,7 @@ pub fn holds_something(path: &Path) -> bool {
 pub fn require_free(path: &Path, inputs: &[&Path], overwrite: bool) -> Result<(), CliError> {
     if let Some(input) = inputs.iter().find(|input| same_file(path, input)) {
         let same = if *path == **input { String::new() } else { format!(", which is {}", input.display()) };
-        return Err(CliError::file(path, format_args!("this command reads it{same}: it is never overwritten")));
+        return Err(CliError::file(path, format_args!("this command reads it{same} and never overwrites it")));
     }
     if !overwrite && holds_something(path) {
         return Err(CliError::file(path, "there is a file already; --overwrite replaces it"));

@@ -41,7 +41,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     prepared.survey()?.warnings.iter().for_each(|warning| output::note(warning));
     let forced = reading.recording.tracks.iter().any(|track| !track.force.is_empty());
     if plan.config.training.network.dissipation.is_some() && reading.recording.n() == 1 && !forced {
-        let motion = "every motion of one coordinate has a Lagrangian";
+        let motion = "every motion of a single coordinate has a Lagrangian";
         output::note(&format!("{motion}: without known forces (--force) L and the friction cannot be separated"));
     }
     let config = plan.configure(&prepared)?;

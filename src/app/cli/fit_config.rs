@@ -148,7 +148,7 @@ impl<'a> Plan<'a> {
         let FitColumns { files, coords, .. } = &config.recording;
         for (key, list) in [("recording.files", files), ("recording.coords", coords)] {
             if list.is_empty() {
-                plan.layers.check(vec![Mistake::new(key, "neither here nor an argument")])?;
+                plan.layers.check(vec![Mistake::new(key, "expected it here or as an argument")])?;
             }
         }
         Ok(Self { config, ..plan })

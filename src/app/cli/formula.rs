@@ -20,34 +20,34 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
-    /// Functions that terms are made of, by family and total degree: polynomial, trigonometric (of sums and differences of
-    /// angles too), radial, reciprocal [default: of motion larger and larger ones until one explains it, of a model
+    /// Functions in the terms, by family and total degree: polynomial, trigonometric (of sums and differences of
+    /// angles too), radial, reciprocal [default: for motion, larger and larger bases until one fits; for a model
     /// polynomial:2,trigonometric:2].
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = families)]
     basis: Option<Families>,
-    /// A function of the coordinates beside them, such as exp(-x); may be repeated.
+    /// An additional function of the coordinates, such as exp(-x); may be repeated.
     #[arg(long, value_name = "FORMULA", allow_hyphen_values = true)]
     function: Vec<String>,
-    /// Leave terms out that are linear in the velocities, those of magnetic fields and turning frames.
+    /// Leave out terms that are linear in the velocities, as in magnetic fields and rotating frames.
     #[arg(long)]
     no_gyroscopic: bool,
-    /// Look for a Rayleigh dissipation function of the velocities beside L.
+    /// Also look for a Rayleigh dissipation function of the velocities.
     #[arg(long)]
     friction: bool,
     /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
-    /// Known forces between the samples [default: what meets the motion best].
+    /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
     #[arg(long, value_enum, value_name = "WAY")]
     between: Option<Between>,
     /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
     /// the forces where they are known].
     #[arg(long, value_name = "TERM=VALUE", value_parser = scale)]
     scale: Option<(String, f64)>,
-    /// Resamplings of the trajectories that give every term a probability, 10000 at most.
+    /// Bootstrap samples of the trajectories, which give every term a probability; at most 10000.
     #[arg(long, value_name = "N", default_value = "40", value_parser = whole(1, MOST_BOOTSTRAPS))]
     bootstraps: usize,
-    /// Seed of held-out trajectories, resamplings and states.
+    /// Seed of the held-out trajectories, bootstrap samples and states.
     #[arg(long, value_name = "N", default_value = "0", value_parser = seed)]
     seed: u64,
     /// Threads; the result does not depend on them [default: all].
@@ -59,7 +59,7 @@ pub struct Args {
     /// One JSON object instead.
     #[arg(long, conflicts_with = "format")]
     json: bool,
-    /// Write the formula as a system file that trains, rolls out and certifies, its constants as parameters.
+    /// Write the formula as a system file for train, rollout and certify, with its constants as parameters.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Replace the file.
@@ -192,7 +192,10 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
         ("--trajectory", args.recording.trajectory.is_none()),
     ];
     if let Some((option, _)) = columns.iter().find(|(_, unused)| !unused) {
-        return Err(CliError::usage(format_args!("{option} is about recorded motion, {} is a model", path.display())));
+        return Err(CliError::usage(format_args!(
+            "{option} applies to recorded motion, but {} is a model",
+            path.display()
+        )));
     }
     let probe = Probe::model(path)?;
     let (q, v) = probe.states(MODEL_STATES, args.seed)?;

@@ -1,4 +1,4 @@
-//! `lnn identify`: the constants of a system whose form is known, from recorded motion.
+//! `lnn identify`: the constants of a known Lagrangian from recorded motion.
 
 use crate::cli::files::OutputFile;
 use crate::cli::number::{positive, seconds, thread_count, threads};
@@ -24,7 +24,7 @@ pub struct Args {
     /// The unknown constants, by symbol [default: those with learn = true in the file; all if there are none].
     #[arg(long, value_name = "SYMBOL,..", value_delimiter = ',')]
     constants: Vec<String>,
-    /// Value of a parameter: of an unknown constant where the search starts; may be repeated.
+    /// Value of a parameter; of an unknown constant it is where the search starts; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = parameter)]
     param: Vec<(String, String)>,
     /// Coordinates whose sensor has an unknown offset.
@@ -33,25 +33,25 @@ pub struct Args {
     /// Coordinates whose sensor has an unknown gain.
     #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
     gain: Vec<String>,
-    /// Coordinates whose sensor is late by an unknown time.
+    /// Coordinates whose sensor has an unknown delay.
     #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
     delay: Vec<String>,
     /// Standard deviation of the noise of every coordinate [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
-    /// Columns of the standard deviations of the positions, row by row, one per coordinate and in its unit; residuals are weighed by them.
+    /// Columns of the standard deviations of the positions, one per coordinate and in its unit; residuals are weighted by them.
     #[arg(long, value_name = "COLUMN,..", value_delimiter = ',', conflicts_with = "noise")]
     error: Vec<String>,
-    /// What the constants are fitted to: the motion, or the known forces [default: the forces of a chain of links, else the motion].
+    /// What the constants are fitted to: the motion or the known forces [default: the forces for a chain of links, else the motion].
     #[arg(long, value_enum, value_name = "WHAT")]
     targets: Option<Met>,
-    /// Known forces between the samples [default: what meets the motion best].
+    /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
     #[arg(long, value_enum, value_name = "WAY")]
     between: Option<Between>,
-    /// Length of the segments that are followed, in s [default: what makes the constants best known].
+    /// Length of the segments, in s [default: the one with the smallest standard errors].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = seconds)]
     segment: Option<f64>,
-    /// Let residuals beyond three standard deviations count linearly, so that outliers move little.
+    /// Let residuals beyond three standard deviations count linearly, which limits the influence of outliers.
     #[arg(long)]
     robust: bool,
     /// Threads; the result does not depend on them [default: all].
@@ -60,7 +60,7 @@ pub struct Args {
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write the system with the constants that were found, as a file that rolls out, trains and is known to a grey box.
+    /// Write the system with the identified constants, as a file for rollout, train and grey boxes.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Replace the file.
@@ -68,7 +68,7 @@ pub struct Args {
     overwrite: bool,
 }
 
-/// What is met.
+/// What the constants are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Met {
     /// The motion.
@@ -104,7 +104,7 @@ fn of_the_system(argument: clap::Arg) -> clap::Arg {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let system = system_arg::system(&args.system)?;
     if args.out.is_some() && system.description().is_none() {
-        let problem = "the Lagrangian of a listed system is no formula; give its constants by --param";
+        let problem = "only a system that a file describes can be written; use the constants with --param";
         return Err(CliError::usage(format_args!("--out: {problem}")));
     }
     let inputs: Vec<&Path> =

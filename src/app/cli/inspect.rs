@@ -87,7 +87,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         return inverse(file, format, &source);
     }
     if format == Format::Csv {
-        return Err(CliError::usage("--format csv: expected --inverse beside it; use json or table"));
+        return Err(CliError::usage("--format csv needs --inverse; use json or table"));
     }
     let place = input::name(file);
     let bytes = input::read(file, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;

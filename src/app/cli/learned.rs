@@ -76,7 +76,7 @@ impl<S: Scalar> Learned<S> {
     pub fn system(&self, path: &Path) -> Result<SystemInstance<f64>, CliError> {
         let known = self.header.description.is_some() || find(&self.header.system).is_ok();
         if !known {
-            let problem = "is not a system of `lnn systems`, so that there is no exact motion to compare with; name its file by --system FILE.toml";
+            let problem = "is not a built-in system, so that there is no exact motion to compare with; give its file with --system FILE.toml";
             return Err(CliError::file(path, format_args!("{:?}, which it learned, {problem}", self.header.system)));
         }
         let system = learned_system(&self.header).map_err(|e| CliError::file(path, e))?;

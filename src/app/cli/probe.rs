@@ -205,7 +205,8 @@ impl Probe {
                 // Ranges that touch have nothing in common on which functions could be told apart.
                 (true, true) if both[0] >= both[1] => {
                     let [a, b] = [own, beside].map(|range| format!("{}:{}", range[0], range[1]));
-                    let problem = format_args!("{name}: no states in common, {a} and {b}; --region chooses");
+                    let problem =
+                        format_args!("{name}: the ranges {a} and {b} do not overlap; choose one with --region");
                     return Err(CliError::usage(problem));
                 }
                 (true, true) => both,

@@ -303,7 +303,7 @@ fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     let open = open.map_or(0, |reduced| reduced.null_directions(1024.0).len());
     let directions = pluralize(open, "direction", "directions");
     output::note(&format!(
-        "least norm: the mass matrix is singular along {directions} at the start, and the motion moves none of them"
+        "least norm: the mass matrix is singular along {directions} at the start, and the motion does not follow them"
     ));
 }
 
@@ -339,12 +339,12 @@ fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), me
             rounded(*value, 6)
         ),
         RolloutError::DependentConstraint { t, constraint, .. } => format!(
-            "the constraint `{}` depends on the others at t = {t}: nothing tells which of them carries the load",
+            "the constraint `{}` depends on the others at t = {t}: the load cannot be divided among them",
             constraints.get(*constraint).map_or("?", String::as_str)
         ),
         RolloutError::SecondBranch { t, constraint, at, .. } => format!(
-            "the constraint `{}` has a second branch at t = {at}, where its gradient vanishes or follows from those of the others: nothing \
-             tells which one the motion takes after t = {t}; expected a formula that is regular there",
+            "the constraint `{}` has a second branch at t = {at}, where its gradient vanishes or follows from those of the others: the \
+             equations do not say which one the motion takes after t = {t}; use a formula that is regular there",
             constraints.get(*constraint).map_or("?", String::as_str)
         ),
         RolloutError::Stopped { t } => format!("interrupted at t = {t}"),

@@ -156,7 +156,7 @@ impl Facts<'_> {
         }
         if self.free_factor {
             text += &crate::names::wrap_text(
-                "Time and places do not act on each other: motion does not tell the unit of the time beside that of the places. The learned \
+                "Time and space are not coupled: motion does not determine the unit of time relative to that of space. The learned \
                  impact parameters are known up to one factor, and the area up to its square.\n",
                 crate::names::WIDTH,
             );
@@ -164,7 +164,7 @@ impl Facts<'_> {
         let unfinished: usize = views.iter().map(|view| view.shadow.unfinished()).sum();
         if unfinished > 0 {
             text += &format!(
-                "{} neither captured nor from the sky, in magenta\n",
+                "{} neither captured nor from the sky (magenta)\n",
                 pluralize(unfinished, "ray is", "rays are")
             );
         }

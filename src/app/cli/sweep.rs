@@ -108,7 +108,7 @@ impl Args {
             self.vary.iter().enumerate().find(|(k, one)| self.vary[..*k].iter().any(|other| other.key == one.key))
         {
             return Err(CliError::usage(format_args!(
-                "--vary {key}: the key is given twice, the last time as number {}",
+                "--vary {key}: the key is given twice, the second time as number {}",
                 k + 1
             )));
         }

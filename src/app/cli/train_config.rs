@@ -132,7 +132,7 @@ impl Args {
         };
         let mut config = config.ok_or_else(|| {
             let name = &system.system.name;
-            CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
+            CliError::usage(format_args!("--preset {known}: {name} has no such preset, use quick or --config"))
         })?;
         config.parameters = all_parameters(system);
         if layers.has("network.known") {
@@ -206,7 +206,7 @@ impl Args {
             (None, None) => {
                 let known = start.map(|start| &start.header.system).or(saved.map(|saved| &saved.system));
                 known.cloned().ok_or_else(|| {
-                    let problem = "system: no system is named, neither here nor as an argument";
+                    let problem = "system: expected a system, here or as an argument";
                     CliError::usage(format_args!("{}: {problem}", place()))
                 })?
             }
@@ -216,8 +216,7 @@ impl Args {
             && requested != written
         {
             let file = self.system.as_deref().unwrap_or_default();
-            let problem =
-                format!("{} has another description of {name} than {file}: leave one of the two out", place());
+            let problem = format!("{} describes {name} differently from {file}: leave out one of the two", place());
             return Err(CliError::usage(problem));
         }
         let known = start.and_then(|start| start.header.description.clone());

@@ -82,7 +82,7 @@ impl TubeArgs {
         let tube = Tube::new(&windows, &predictions, coordinates.len(), share).map_err(|error| match error {
             TubeError::TooFewWindows { found, needed } => CliError::data(format_args!(
                 "--tube {share}: expected at least {needed} whole motions of {} s that the model has not learned from, found {found}; \
-                 --tube-data names more",
+                 give more with --tube-data",
                 end - start
             )),
             error => CliError::data(format_args!("--tube {share}: {error}")),

@@ -160,7 +160,7 @@ impl Determined {
     /// Why no mass is determined; none if one is. Of one coordinate without known forces the mass is the unit, and the energy stands for it.
     pub(crate) fn no_mass(&self) -> Option<String> {
         if let Some(reason) = &self.withheld {
-            return Some(format!("no mass is known to be determined: {reason}"));
+            return Some(format!("whether the data determine a mass is unknown: {reason}"));
         }
         let several = self.determination.iter().filter(|q| q.mass).count() > 1;
         let judged = |q: &&Quantity| {
@@ -223,7 +223,7 @@ impl Determined {
             unit => format!("Relative to the {unit}: without known forces (--force) L has no unit."),
         };
         format!(
-            "How well the data determine the model, in the mean over the learned states: ranges hold the truth in about 9 \
+            "How well the data determine the model, averaged over the learned states: ranges contain the true value in about 9 \
              cases of 10.\n{unit}"
         )
     }
@@ -232,7 +232,7 @@ impl Determined {
     fn nothing(&self) -> String {
         match &self.withheld {
             Some(reason) => format!("How well the data determine the model is not stated: {reason}."),
-            None => "How well the data determine mass matrix, friction and energy cannot be said here.".to_string(),
+            None => "How well the data determine mass matrix, friction and energy could not be estimated.".to_string(),
         }
     }
 
@@ -240,12 +240,12 @@ impl Determined {
     fn apart(&self) -> Option<String> {
         let free = self.groups.iter().filter(|group| !group.unit_known);
         let free: Vec<String> = free.map(|group| group.coordinates.join(", ")).collect();
-        let move_by = |one: &str| if one.contains(", ") { "move by themselves" } else { "moves by itself" };
+        let move_by = |one: &str| if one.contains(", ") { "are decoupled" } else { "is decoupled" };
         let parts: Vec<String> = free.iter().map(|one| format!("{one} {}", move_by(one))).collect();
         (!parts.is_empty()).then(|| {
             format!(
-                "{}: no motion determines the factor of that part of L, and its learned masses, friction and energy are arbitrary by one factor \
-                 beside those of the other coordinates.",
+                "{}: no motion determines the factor of that part of L, so that its learned masses, friction and energy have an arbitrary factor \
+                 relative to those of the other coordinates.",
                 parts.join("; ")
             )
         })
@@ -255,7 +255,7 @@ impl Determined {
     fn beyond(&self) -> Option<String> {
         let share = self.outside.filter(|share| *share > OUTSIDE)?;
         Some(format!(
-            "{} of the held-out states lie outside of the learned ones: there nothing that is stated here holds.",
+            "{} of the held-out states lie outside the learned ones; these figures do not hold there.",
             percent(share)
         ))
     }
@@ -291,8 +291,8 @@ fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) 
     if *worst > MOST_MISFIT || worst.is_nan() {
         let missed = percent(*worst);
         return Some(format!(
-            "on {motion} the model misses {missed} of the acceleration of {name} beyond the error of the data, and a range holds \
-             only where what is missed is noise"
+            "on {motion} the model misses {missed} of the acceleration of {name} beyond the error of the data, and ranges are valid \
+             only where the residual is noise"
         ));
     }
     let lost: Vec<&str> = hold_out.force_errors.iter().filter(|e| e.is_lost()).map(|e| e.name.as_str()).collect();

@@ -185,7 +185,7 @@ pub fn evaluate(
         portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
         figures = evaluation_figures(&runs, &portraits, system);
         if learned.manifold().is_some() {
-            // Off the constraints, where a grid over coordinates lies, a Lagrangian means nothing.
+            // Off the constraints, where a grid over coordinates lies, a meaning off the constraints.
             let start = runs.iter().find(|run| !run.exact.trajectory.is_empty());
             let names = system.system.columns(n);
             let (names, unit) = (&names[..n], system.system.time_unit.as_ref());

@@ -71,7 +71,7 @@ pub(crate) fn judged(errors: &[ForceError]) -> String {
         all if all == errors.len() => {
             "bad: the learned Lagrangian does not give the forces of motion that it has not seen".to_string()
         }
-        _ => format!("limited: not learned is the force of {}", lost.join(", ")),
+        _ => format!("limited: the force of {} was not learned", lost.join(", ")),
     };
     let each: Vec<String> = errors.iter().map(|e| format!("{} {} %", e.name, percentage(e.nmse))).collect();
     format!("{verdict}; squared error over the variance of the force: {}.", each.join(", "))

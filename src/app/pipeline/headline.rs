@@ -73,12 +73,12 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let equivalence = found.physics.equivalence.as_ref();
     let free = match found.mass_matrix.groups {
         0 | 1 => "one factor".to_string(),
-        groups => format!("a factor of each of {groups} groups of coordinates that do not act on each other"),
+        groups => format!("a factor for each of {groups} decoupled groups of coordinates"),
     };
     let matrix = match equivalence.map(|found| found.mass_matrix).filter(|x| x.is_finite()) {
         Some(difference) => format!("it gives the mass matrix to {} up to {free}", percent(difference)),
         None if mass.is_finite() => format!("it gives the mass matrix to {} up to {free}", percent(mass)),
-        None => "it gives no mass matrix that can be compared".to_string(),
+        None => "its mass matrix cannot be compared".to_string(),
     };
     let predicts = found.valid_time.as_ref().map(|valid| predicted(valid, found.tested, &found.time_unit));
     let wrong = match found.wrong_signature {
@@ -170,10 +170,10 @@ fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     });
     let straight: Vec<&str> = straight.map(|c| c.name.as_str()).collect();
     if !straight.is_empty() {
-        all.push(format!("no better than constant velocity is the prediction of {}", straight.join(", ")));
+        all.push(format!("the prediction of {} is no better than constant velocity", straight.join(", ")));
     }
     if let Some(share) = determined.mostly_outside() {
-        all.push(format!("{} of the held-out states lie outside of the learned ones", percent(share)));
+        all.push(format!("{} of the held-out states lie outside the learned ones", percent(share)));
     }
     match found.energy.map(|balance| balance.unaccounted()) {
         Some(share) if share <= LOST => {}
@@ -212,7 +212,9 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
         return Headline { sentence: format!("{name}: {sentence}"), rows };
     }
     let Some((model, straight)) = found.model.last().zip(found.constant_velocity.last()) else {
-        let sentence = format!("{name}: a Lagrangian was learned; no held-out motion judges its predictions.");
+        let sentence = format!(
+            "{name}: a Lagrangian was learned; its predictions were not tested, because no motion was held out."
+        );
         return Headline { sentence, rows: signature().into_iter().collect() };
     };
     let of = |x: f64| if x.is_finite() { format!("{} {}", number(x), found.error_unit) } else { "-".to_string() };

@@ -471,7 +471,7 @@ impl HoldOut {
     /// Remarks below the table of predictions, in words.
     fn remarks(&self) -> String {
         if self.is_of_nothing() {
-            return "nothing was held out (--hold-out 0): nothing judges this model\n".to_string();
+            return "nothing was held out (--hold-out 0): this model was not tested\n".to_string();
         }
         let mut text = self.given_up.clone();
         if let Some(balance) = &self.energy {
@@ -488,7 +488,7 @@ impl HoldOut {
         let forces = self.force_table().map(|rows| format!("{}\n", text_table(&ForceError::HEADERS, &rows)));
         let forces = forces.unwrap_or_default();
         if self.model.is_empty() {
-            let none = "no window of held-out motion is as long as the horizon: nothing was predicted\n";
+            let none = "no window of the held-out motion is as long as the horizon: nothing was predicted\n";
             return format!("{forces}{none}{}", self.remarks());
         }
         let apart = self.table_by_coordinate();

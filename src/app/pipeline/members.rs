@@ -92,7 +92,7 @@ impl Members {
                 report => report?,
             };
             if let StopReason::Failed(error) = &report.stop {
-                watch.say(Event::Note(&format!("member {} is left out, with those behind it: {error}", k + 1)));
+                watch.say(Event::Note(&format!("member {} and the following ones are left out: {error}", k + 1)));
             }
             if report.stop != StopReason::Finished {
                 break;
@@ -115,7 +115,9 @@ impl Members {
         });
         let mut found = Self { each: each.collect(), mean: of_the_mean(&predicted), ..Self::default() };
         match prepared.constraints() {
-            Some(_) => found.not_compared = "under constraints motion leaves more of L open than a gauge".to_string(),
+            Some(_) => {
+                found.not_compared = "under constraints, motion leaves more of L undetermined than a gauge".to_string()
+            }
             None => {
                 if let Err(problem) = found.compare(prepared, &networks) {
                     found.not_compared = problem.to_string();
@@ -194,7 +196,7 @@ impl Members {
         let known: Vec<String> = known.into_iter().flatten().collect();
         let known = if known.is_empty() { "not finite".to_string() } else { known.join(", ") };
         format!(
-            "factor: by it a member's L becomes that of the first, up to a gauge; off: the difference that is left, at held-out states\n\
+            "factor: multiplies a member's L to match the first, up to a gauge; off: the remaining difference at held-out states\n\
              spread between the members there: {known}\n"
         )
     }

@@ -172,10 +172,10 @@ impl Physics {
         Ok(found)
     }
 
-    /// That of a model under constraints, off which its Lagrangian means nothing.
+    /// That of a model under constraints, off which its meaning off the constraints.
     pub(crate) fn under_constraints(subject: &Subject<'_>) -> Self {
-        let problem = "maps of the learned functions, curvature, symmetries, certificate of the signature: off the constraints the \
-                       Lagrangian means nothing";
+        let problem = "maps of the learned functions, curvature, symmetries, certificate of the signature: the Lagrangian has no \
+                       meaning off the constraints";
         Self { left_out: vec![problem.to_string()], ..Self::nothing(subject) }
     }
 
@@ -355,7 +355,7 @@ impl Physics {
     fn follow_charges(&mut self, subject: &Subject<'_>, exact: &dyn EulerLagrange<f64>, found: &Symmetries) {
         let Some(motion) = subject.motion.filter(|motion| motion.len() > 1) else { return };
         if !exact.conserves_energy() {
-            self.left_out.push("drift of charges: friction takes them".into());
+            self.left_out.push("drift of charges: friction changes them".into());
             return;
         }
         let all = match drifts((exact, subject.network), &found.basis, &found.fields, motion) {

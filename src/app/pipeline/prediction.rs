@@ -74,7 +74,7 @@ impl HeldOutPredictions {
             );
         }
         if predicted < self.all {
-            text += &format!("of {} windows only {predicted} were tried, for most of these failed\n", self.all);
+            text += &format!("only {predicted} of {} windows were tried, because most of these failed\n", self.all);
         }
         text
     }
@@ -103,7 +103,7 @@ fn reason(stop: &RolloutError) -> &'static str {
     match stop {
         RolloutError::SingularMass { .. } => "a singular mass matrix",
         RolloutError::Uncertified { .. } => "a mass matrix that is not certified",
-        RolloutError::TooManySteps { .. } => "a motion too wild for the steps allowed",
+        RolloutError::TooManySteps { .. } => "more steps than allowed",
         RolloutError::StepUnderflow { .. } => "steps that became too small",
         RolloutError::LeftDomain { .. } => "leaving the domain",
         RolloutError::NotConverged { .. } => "steps that did not converge",

@@ -10,7 +10,7 @@ use toml::Value;
 pub(crate) fn from_table<T: DeserializeOwned>(table: Value) -> Result<T, (String, String)> {
     // A date would be read as text.
     if let Some(path) = date(&table) {
-        return Err((path, "no key takes a date or a time".to_string()));
+        return Err((path, "no key accepts a date or a time".to_string()));
     }
     serde_path_to_error::deserialize(table).map_err(|error| {
         let path = error.path().to_string();

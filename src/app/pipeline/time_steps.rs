@@ -50,7 +50,7 @@ impl TimeSteps {
             parts.push(format!("{} trajectories", pluralize(self.cuts, "long gap cuts", "long gaps cut")));
         }
         if self.jitter > ROUNDING {
-            parts.push(format!("steps of time vary by {}", percent(self.jitter)));
+            parts.push(format!("time steps vary by {}", percent(self.jitter)));
         }
         if parts.is_empty() {
             return String::new();

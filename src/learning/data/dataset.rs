@@ -63,7 +63,7 @@ pub enum DatasetError {
     #[error("a dataset needs at least one state")]
     Empty,
     /// A state from which there is no way to a constraint.
-    #[error("from state {row} no way leads to the constraint `{constraint}`")]
+    #[error("state {row} cannot be projected onto the constraint `{constraint}`")]
     Unreachable {
         /// State, from 0.
         row: usize,

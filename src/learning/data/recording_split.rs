@@ -52,7 +52,7 @@ pub enum RecordingSplitError {
     #[error(transparent)]
     Smooth(#[from] SmoothError),
     /// A coordinate that stands still, or follows from others.
-    #[error("{coordinate} {how}; leave it out of the coordinates, or record it moving by itself")]
+    #[error("{coordinate} {how}; leave it out of the coordinates, or record motion in which it moves independently")]
     Motionless {
         /// Its name.
         coordinate: String,

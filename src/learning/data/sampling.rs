@@ -165,7 +165,7 @@ pub enum SamplingError {
     },
     /// Motions of the trajectory test hardly pass through the box.
     #[error(
-        "{field}: hardly any motion of the trajectory test stays within these bounds; data.trajectory_fraction asks for such states"
+        "{field}: hardly any motion of the trajectory test stays within these bounds, which data.trajectory_fraction needs"
     )]
     Motions {
         /// Which bounds.

@@ -81,7 +81,7 @@ pub struct Learned {
 #[non_exhaustive]
 pub enum TrainerError {
     /// Fewer states than the three parts need.
-    #[error("{found} states: expected at least 3, one each to learn from, to choose by and to judge by")]
+    #[error("{found} states: at least 3 are needed (training, validation, test)")]
     TooFew {
         /// States given.
         found: usize,

@@ -246,7 +246,7 @@ impl<S: Scalar> SystemInstance<S> {
         self.check_lengths(q, v)?;
         if self.constraints().is_some() {
             let (system, problem) =
-                (self.system.name.to_string(), "under constraints no acceleration has a closed form");
+                (self.system.name.to_string(), "the acceleration under constraints has no closed form");
             return Err(SystemError::Constraints { system, problem: problem.to_string() });
         }
         Ok(match &self.system.described {

@@ -68,7 +68,7 @@ pub enum RolloutError {
         /// The nearest state `(q, v)` that they allow; empty if none was found.
         nearest: Vec<f64>,
     },
-    /// A constraint has come to depend on the others, so that nothing tells which of them carries the load.
+    /// A constraint has come to depend on the others, so that the load cannot be divided among them.
     #[error("constraint {constraint} depends on the others just after t = {t}")]
     DependentConstraint {
         /// Last time at which it did not.

@@ -23,7 +23,7 @@ pub enum Verdict {
     Open,
 }
 
-/// A box of the search with those that it was cut into.
+/// A box of the search and its children.
 #[derive(Clone, Debug)]
 struct Node {
     verdict: Verdict,

@@ -1,4 +1,4 @@
-//! What a Lagrangian says of its own constraints, and which directions no equation moves.
+//! The constraints of a Lagrangian and its degenerate directions.
 
 use super::ConstraintKind;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// An eigenvalue of a mass matrix within its constraints below so many roundings of the largest counts as zero.
 const ROUNDINGS: f64 = 1024.0;
 
-/// What there is to say of a Lagrangian.
+/// Constraints and degenerate directions of a Lagrangian.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ExaminedLagrangian {
     /// Name of the system.

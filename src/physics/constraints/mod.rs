@@ -149,7 +149,7 @@ pub enum ConstraintSearchError {
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// More terms than are looked at.
-    #[error("{what} makes {found} terms, at most {MOST_TERMS} are looked at together")]
+    #[error("{what} gives {found} terms, at most {MOST_TERMS} can be searched together")]
     Terms {
         /// What makes them.
         what: &'static str,
@@ -187,7 +187,7 @@ pub fn find_constraints(
     if degree < search.velocity_degree {
         let asked = search.velocity_degree;
         cut_short.push(format!(
-            "factors of velocities were looked for up to degree {degree} alone, not {asked}: more than {MOST_TERMS} terms"
+            "coefficients of velocities were searched only up to degree {degree} instead of {asked}, which has more than {MOST_TERMS} terms"
         ));
     }
     if samples.stride() > 1 {
@@ -210,7 +210,7 @@ pub fn find_constraints(
     let vanishing = Vanishing::of(samples, &of_positions, None, false, (1.0, limits));
     let (candidates, all_forms) = vanishing.generators();
     if !all_forms {
-        cut_short.push("the search for forms of few terms was cut short: simpler ones may exist".to_string());
+        cut_short.push("the search for formulas with few terms was stopped early: simpler ones may exist".to_string());
     }
     stop.check()?;
     let functions = held.take(samples, &of_positions, candidates.clone(), false, IMPOSED);

@@ -223,7 +223,10 @@ fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> O
     }
     let first = recording.tracks.iter().find_map(|track| track.q.get(i))?;
     if constant {
-        return Some(format!("is constant, {} at first: it does not move, or its sensor is off", number(*first)));
+        return Some(format!(
+            "is constant ({} in the first sample): it does not move, or its sensor is off",
+            number(*first)
+        ));
     }
     // A mean takes part of the noise that neighbours share.
     let still = resolved && square <= MOVES * MOVES * noise.sigma.powi(2) * noise.slack * count;

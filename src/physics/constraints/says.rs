@@ -1,4 +1,4 @@
-//! What is said of constraints.
+//! Report of constraints.
 
 use super::examine::{ExaminedLagrangian, OwnConstraint};
 use super::{ConstraintKind, FoundConstraint, FoundConstraints};
@@ -20,16 +20,18 @@ impl FoundConstraints {
         }
         let noise = self.coordinates.iter().zip(&self.noise);
         let noise: Vec<String> = noise.map(|(name, &noise)| format!("{name} {}", percent(noise.max(1e-6)))).collect();
-        findings.gap().line(format!("smaller deviations are not seen than the noise: {}", noise.join(", ")));
-        findings.lines(self.still.iter().map(|(column, how)| format!("{column} {how}; it takes no part")));
+        findings
+            .gap()
+            .line(format!("noise relative to size, below which deviations cannot be seen: {}", noise.join(", ")));
+        findings.lines(self.still.iter().map(|(column, how)| format!("{column} {how}; it was left out")));
         for (kind, text) in [
             (
                 ConstraintKind::Nearly,
-                "nearly: vanishes, but by more than the noise explains; something stiff, or a curve that looks straight",
+                "nearly: the deviation is small but larger than the noise; a stiff element, or a curve that looks straight",
             ),
             (
                 ConstraintKind::Branching,
-                "branching: its gradient vanishes along the motion, where a second branch begins; no roll-out can be held by it",
+                "branching: its gradient vanishes along the motion, where a second branch begins; a roll-out cannot be constrained by it",
             ),
         ] {
             if self.constraints.iter().any(|found| found.kind == kind) {
@@ -38,15 +40,17 @@ impl FoundConstraints {
         }
         if let Some(gap) = self.gap {
             let gap = rounded(gap, 3);
-            findings.line(format!("the next combination of coordinates varies by {gap} times as much"));
+            findings.line(format!("the next combination of coordinates varies {gap} times as much"));
         }
         findings.lines(&self.limits);
         if self.refuted > 0 {
             let what = pluralize(self.refuted, "candidate does", "candidates do");
-            findings.line(format!("{what} not hold on trajectories that were left out, and are not listed"));
+            findings.line(format!("{what} not hold on held-out trajectories (not listed)"));
         }
         if self.trajectories == 1 && !self.constraints.is_empty() {
-            findings.line("one trajectory does not tell what is imposed from what its motion conserves: record others");
+            findings.line(
+                "one trajectory cannot distinguish constraints from conserved quantities: record more trajectories",
+            );
         }
         findings
     }

@@ -1,4 +1,4 @@
-//! Why no formula was looked for.
+//! Errors of the search for a formula.
 
 use crate::cancellation::Cancelled;
 use crate::recording::smooth::SmoothError;
@@ -44,7 +44,7 @@ pub enum FormulaError {
         known: String,
     },
     /// A coordinate that does not move, or moves as others do.
-    #[error("no law can be read off this motion: {coordinate} {how}; leave it out")]
+    #[error("no law can be found in this motion: {coordinate} {how}; leave the coordinate out")]
     Still {
         /// The coordinate.
         coordinate: String,
@@ -53,7 +53,7 @@ pub enum FormulaError {
     },
     /// A coordinate that keeps its value but for a few large steps.
     #[error(
-        "no law can be read off this motion: {coordinate} moves by steps, it keeps its value over {still} of {steps} intervals and jumps in others"
+        "no law can be found in this motion: {coordinate} moves in steps, it keeps its value over {still} of {steps} intervals and jumps in others"
     )]
     Steps {
         /// The coordinate.
@@ -67,7 +67,7 @@ pub enum FormulaError {
     #[error(
         "{coordinate} is {value:.4e} at t = {time} (sample {} of trajectory {}), {} by {size:.3e} where its motion has a range of {range:.3e}; {}",
         sample + 1, if trajectory.is_empty() { (track + 1).to_string() } else { trajectory.clone() }, if *jumps { "it jumps there" } else { "it is off" },
-        if *places == 1 { "leave the row out or mend it".to_string() } else { format!("leave such rows out or mend them, there are {places}") }
+        if *places == 1 { "remove or correct the row".to_string() } else { format!("remove or correct such rows, there are {places}") }
     )]
     Wild {
         /// The coordinate.
@@ -93,8 +93,8 @@ pub enum FormulaError {
     },
     /// Motion under a constraint.
     #[error(
-        "the coordinates are not independent, the motion keeps to {}: a Lagrangian of them is not determined; leave coordinates out or \
-         choose others (lnn constraints names what holds, lnn fit --constraints find learns under it)",
+        "the coordinates are not independent: the motion satisfies {}, so that their Lagrangian is not determined; leave coordinates out or \
+         choose others (lnn constraints lists the constraints, lnn fit --constraints find learns with them)",
         formulas.iter().map(|formula| format!("{formula} = 0")).collect::<Vec<_>>().join(" and ")
     )]
     Constrained {
@@ -102,13 +102,15 @@ pub enum FormulaError {
         formulas: Vec<String>,
     },
     /// No choice of terms has a regular mass matrix.
-    #[error("every formula that meets the motion has a nearly singular mass matrix: the library holds no law of it")]
+    #[error(
+        "every formula that fits the motion has a nearly singular mass matrix: the library contains no law for it, try another basis"
+    )]
     Singular,
     /// The motion cannot be smoothed.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
     /// Too little motion.
-    #[error("expected at least {needed} samples in a row, the longest trajectory has {found}")]
+    #[error("expected at least {needed} consecutive samples, the longest trajectory has {found}")]
     Short {
         /// Samples of the longest trajectory.
         found: usize,
@@ -117,7 +119,7 @@ pub enum FormulaError {
     },
     /// Too few stretches in which the motion changes.
     #[error(
-        "the motion has fewer than two stretches of {seconds:.3} s without a long gap: record longer, or at a higher rate"
+        "the recording has fewer than two segments of {seconds:.3} s without a long gap: record longer, or at a higher rate"
     )]
     Stretches {
         /// Their length.

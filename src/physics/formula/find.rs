@@ -152,7 +152,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     found.notes.extend(data.suspicious.iter().cloned());
     if let Some(formula) = held {
         found.notes.push(format!(
-            "the single trajectory keeps to {formula} = 0, by a constraint or by itself: what moves off it is not determined, record others"
+            "the only trajectory satisfies {formula} = 0, by a constraint or by chance: terms that vanish with it are not determined, record more trajectories"
         ));
         found.several = true;
     }
@@ -364,10 +364,10 @@ impl WeakForm {
             found.rival = Some(Rival { terms: rival.model.terms.iter().map(written).collect(), cost: rival.cost });
         }
         if !chosen {
-            found.notes.push(format!("the choice of terms still changed after {ROUNDS} rounds"));
+            found.notes.push(format!("the choice of terms has not converged after {ROUNDS} rounds"));
         }
         if !settled {
-            found.doubts.push("the fit of the coefficients has not come to its end".to_string());
+            found.doubts.push("the fit of the coefficients has not converged".to_string());
         }
         found.doubts.extend(judged.doubts());
         found.verdict = judged.verdict(&found.doubts);
@@ -375,7 +375,7 @@ impl WeakForm {
             found.doubts.clear();
         }
         if !self.path.settled && found.verdict != Verdict::Found {
-            found.notes.push("exchanges in the weak form were cut off while they still helped".to_string());
+            found.notes.push("the exchange of terms in the weak form was stopped before it converged".to_string());
         }
         Ok(found)
     }
@@ -414,7 +414,7 @@ impl Judged<'_> {
         let mut doubts = Vec::new();
         let residual = self.residual();
         if data.estimated.iter().all(|estimated| *estimated) && residual < LEAST_RESIDUAL - self.scatter() {
-            doubts.push(format!("the residual is {residual:.2} of the noise: starts follow the noise itself"));
+            doubts.push(format!("the residual is {residual:.2} times the noise: the initial states overfit the noise"));
         }
         let masses = self.search.masses(&self.model.terms, &self.model.coefficients);
         if !is_regular(data.n, &masses) {
@@ -424,7 +424,7 @@ impl Judged<'_> {
             if moved < SIGNAL * left {
                 let name = &data.recording.coordinates[i];
                 doubts.push(format!(
-                    "{name} moves by {} times its residual where it was held out: that tells no law",
+                    "{name} moves by only {} times its residual in the held-out motion: too little to confirm a law",
                     rounded(moved / left, 2)
                 ));
             }

@@ -1,4 +1,4 @@
-//! What is said of a formula.
+//! Report of a formula.
 
 use super::found::{FoundFormula, FoundTerm, Rival, Verdict};
 use crate::findings::Findings;
@@ -17,7 +17,7 @@ impl FoundFormula {
         findings.gap().table(&headers, self.terms.iter().map(FoundTerm::row));
         if let Some(Rival { terms, cost }) = &self.rival {
             let (terms, cost) = (terms.join(", "), rounded(*cost, 3));
-            findings.gap().line(format!("next best: {terms}; it costs {cost} units of noise more, a term counts 30"));
+            findings.gap().line(format!("next best: {terms}; its cost is {cost} higher (sum of squares over the noise variance, plus 30 per term)"));
         }
         if self.verdict == Verdict::NotInLibrary && !self.left.is_empty() {
             let rows = self.left.iter().map(|left| {
@@ -25,8 +25,8 @@ impl FoundFormula {
                 let [low, high, residual] = [left.low, left.high, left.residual].map(|x| rounded(x, 4));
                 [name, low, high, residual, left.samples.to_string()]
             });
-            let headers = ["coordinate", "from", "to", "residual over noise", "samples"];
-            findings.gap().line("what is left:").table(&headers, rows);
+            let headers = ["coordinate", "from", "to", "residual / noise", "samples"];
+            findings.gap().line("residuals by range of coordinate:").table(&headers, rows);
         }
         findings
     }
@@ -42,12 +42,14 @@ impl FoundFormula {
         findings.line(if self.of_model {
             format!("{verdict}: accelerations differ from the model's by {residual} of their size")
         } else {
-            let bound = if self.noise_resolved { "" } else { ", which is at most what was assumed" };
+            let bound = if self.noise_resolved { "" } else { ", an upper bound of which was assumed" };
             format!("{verdict}: the residual of held-out motion is {residual} times its noise{bound}")
         });
         findings.lines(self.doubts.iter().map(|doubt| format!("in doubt: {doubt}")));
         let (searched, removed) = self.searched;
-        findings.line(format!("{searched} terms searched, {removed} of them total derivatives or sums of others"));
+        findings.line(format!(
+            "{searched} terms searched, {removed} removed as total derivatives or linear combinations of others"
+        ));
         if self.tried.len() > 1 {
             findings.line(format!("functions of {}; searched: {}", self.basis, self.tried.join("; ")));
         }
@@ -59,13 +61,12 @@ impl FoundFormula {
         let Some((first, others)) = self.blocks.split_first() else { return Vec::new() };
         let first = first.join(", ");
         let sentence = |names: &Vec<String>| {
-            let (verb, whose) =
-                if names.len() == 1 { ("moves by itself", "its") } else { ("move by themselves", "their") };
+            let (verb, whose) = if names.len() == 1 { ("is decoupled", "its") } else { ("are decoupled", "their") };
             let names = names.join(", ");
             if self.between.is_some() {
-                return format!("{names} {verb}, apart from {first}");
+                return format!("{names} {verb} from {first}");
             }
-            format!("{names} {verb}: {whose} mass relative to that of {first} is not determined")
+            format!("{names} {verb} from {first}: {whose} mass relative to that of {first} is not determined")
         };
         others.iter().map(sentence).collect()
     }
@@ -77,7 +78,7 @@ impl FoundTerm {
         let name = if self.dissipation { format!("D: {}", self.term) } else { self.term.clone() };
         let near = self.near.as_ref().map_or(String::new(), |near| match rounded(near.standard_errors, 1) {
             off if near.standard_errors == 0.0 || off == "0" => near.fraction.clone(),
-            off => format!("{} ({off} errors off)", near.fraction),
+            off => format!("{} ({off} standard errors off)", near.fraction),
         });
         let unit = self.unit.clone().unwrap_or_else(|| "hidden in the function".to_string());
         let [coefficient, error] = [rounded(self.coefficient, 6), rounded(self.standard_error, 2)];

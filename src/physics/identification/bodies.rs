@@ -1,4 +1,5 @@
-//! Inertias of bodies: a chain of links whose constants are known in sums alone gets, of all constants with these sums, some that bodies have.
+//! Physical inertias for a chain of links. Often only sums of the constants of links are determined; of all constants with these sums, this
+//! module chooses ones that rigid bodies can have.
 //!
 //! A rigid body of mass `m`, first moments `h` and inertia `I` about the origin has a positive definite pseudo-inertia
 //! `P = [[tr(I)/2 E - I, h], [h', m]]` (Wensing, Kim and Slotine, 2018), and a chain of bodies a positive definite mass matrix at every pose.
@@ -12,18 +13,17 @@ use super::solve::Problem;
 use crate::lagrangian::{SystemInstance, inertia_symbols, loss_symbols};
 use crate::linalg::{Workspace, dot, eigh, inverse, is_positive_definite};
 
-/// Weights of the barrier, from first to last. The last costs a hundredth of a squared standard error.
+/// Weights of the barrier, from first to last. The last one costs a hundredth of a squared standard error.
 const WEIGHTS: [f64; 8] = [1e5, 1e4, 1e3, 1e2, 1e1, 1.0, 0.1, 0.01];
-/// Newton steps of each weight at most, halvings of each, and the decrement at which they end.
+/// Largest number of Newton steps for each weight, of halvings of each step, and the decrement at which they end.
 const STEPS: usize = 60;
 const HALVINGS: usize = 50;
 const SETTLED: f64 = 1e-9;
-/// Least eigenvalue of a pseudo-inertia, in units of its diagonal, of a body that is left as it is.
+/// Smallest eigenvalue of a pseudo-inertia, in units of its diagonal, at which a body is left unchanged.
 const LEAST: f64 = 1e-6;
-/// Standard deviations of the squared distance between estimates and truth, in standard errors, within which bodies lie that have the true
-/// sums.
+/// The standard deviations, in standard errors, of the squared distance between estimates and truth within which bodies with the true sums lie.
 const WITHIN: f64 = 4.0;
-/// Part of the diagonal that keeps normal equations regular.
+/// Share of the diagonal that is added to keep the normal equations regular.
 const RIDGE: f64 = 1e-14;
 
 /// `P` as the values of ten constants times these: row, column, factor.
@@ -73,7 +73,7 @@ impl Link {
         done.is_ok() && values.iter().all(|value| *value > LEAST)
     }
 
-    /// Places a body in `x`: with the constants there if it can have them, else round about its moments.
+    /// Places a body in `x`: with its current constants if they are physical, otherwise near its moments.
     fn place_body(&self, x: &mut [f64]) -> bool {
         if !self.is_body(x) {
             let [mass, hx, hy, hz, ..] = self.constants(x);
@@ -100,7 +100,7 @@ fn links(instance: &SystemInstance<f64>, problem: &Problem<'_>, x: &[f64]) -> Ve
     (1..=instance.coordinates).map(of).collect()
 }
 
-/// Moves constants of a chain to those of bodies, as near as known sums allow; `None` for a system that is no chain.
+/// Moves the constants of a chain to physical ones, as near as the determined sums allow; `None` for a system that is not a chain.
 pub(super) fn physical(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
@@ -136,7 +136,8 @@ pub(super) fn physical(
         found = next;
     }
     let change: Vec<f64> = found.iter().zip(x.iter()).map(|(after, before)| after - before).collect();
-    // No sum of what is known changes by more standard errors than the root of this, which has a chi-squared distribution for the truth.
+    // The squared distance in standard errors has a chi-squared distribution at the truth, so that no determined sum changes by more standard
+    // errors than its root.
     let square = quadratic(&determined.information, &change).max(0.0);
     let known = (change.len() - determined.silent.len() - determined.open.len()) as f64;
     *x = found;
@@ -151,7 +152,7 @@ struct Search<'a> {
     determined: &'a Determined,
     centre: Vec<f64>,
     links: &'a [Link],
-    /// Links that have to be bodies; the others are where they stay.
+    /// Links that must be physical; the others keep their constants.
     active: Vec<usize>,
     /// Losses that are held at 0.
     held: Vec<usize>,
@@ -179,7 +180,7 @@ impl Search<'_> {
         Some(y)
     }
 
-    /// What is minimised; `None` outside of the bodies.
+    /// The objective; `None` outside the physical inertias.
     fn value(&self, pull: &[f64], weight: f64, y: &[f64]) -> Option<f64> {
         let off: Vec<f64> = y.iter().zip(&self.centre).map(|(y, centre)| y - centre).collect();
         let mut value = quadratic(pull, &off) / 2.0;

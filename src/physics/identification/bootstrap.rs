@@ -1,10 +1,10 @@
 //! Errors of constants that are fitted to forces, by a parametric bootstrap.
 //!
-//! Smoothed accelerations have errors that neighbours share and that are regressors themselves, so that the errors of least squares are too small
-//! by factors and something of a bias is left. The recording is therefore made anew: the motion by polynomials of a higher degree, and the forces that the
-//! fitted constants ask for along it, are the truth; noise of encoders and of forces is drawn anew, everything is smoothed and fitted again.
-//! The mean change of the constants is their bias, which is subtracted; the scatter is their error (Efron and Tibshirani, An Introduction to the
-//! Bootstrap, 1993, sections 6.5 and 10.2). Residuals of the copies say what the right form leaves at every sample.
+//! Neighbouring smoothed accelerations have correlated errors and are regressors themselves, so that the standard errors of least squares are
+//! too small by factors and some bias remains. The recording is therefore simulated: the true motion is given by polynomials of a higher degree,
+//! the true forces are those that the fitted constants need along it; noise of encoders and forces is drawn anew, and everything is smoothed and
+//! fitted again. The mean change of the constants is their bias, which is subtracted; the scatter is their standard error (Efron and Tibshirani,
+//! An Introduction to the Bootstrap, 1993, sections 6.5 and 10.2). The residuals of the copies show what a correct model leaves at every sample.
 
 use super::covariance::Root;
 use super::follow::{Follower, LANES};
@@ -16,22 +16,22 @@ use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::{RecordedTrajectory, Recording, deviation, marks, rms};
 use rand_distr::{Distribution, StandardNormal};
 
-/// Copies of the recording.
+/// Simulated copies of the recording.
 pub(super) const COPIES: usize = 20;
-/// Degree of the polynomials of the true motion above those that are smoothed with: windows of that degree are wider.
+/// Additional degree of the polynomials of the true motion: windows for this degree are wider than those used for smoothing.
 const MORE_DEGREES: usize = 2;
-/// Part of the spread of a coordinate by which integrated accelerations may be off.
+/// Largest error of integrated accelerations, as a share of the spread of a coordinate.
 const ASTRAY: f64 = 0.1;
 
-/// What copies of the recording say.
+/// Results of fitting simulated copies of the recording.
 pub(super) struct Copies {
-    /// Constants of every copy.
+    /// Constants fitted to each copy.
     constants: Vec<Vec<f64>>,
-    /// Residuals of force of every copy, by place: `(samples, n)` of each trajectory, `NaN` where there are none.
+    /// Force residuals of each copy at each sample: `(samples, n)` per trajectory, `NaN` where there are none.
     residuals: Vec<Vec<Vec<f64>>>,
 }
 
-/// Smoothing of the motion that copies are made of; `None` if it cannot be smoothed by polynomials of a higher degree.
+/// The smoothing that gives the motion of the copies; `None` if the recording cannot be smoothed by polynomials of a higher degree.
 pub(super) fn wider(recording: &Recording, smoothing: &Smoothing) -> Option<Smoothing> {
     let given = smoothing.coordinates.iter().map(|chosen| chosen.noise.sigma).collect();
     let options =
@@ -41,7 +41,7 @@ pub(super) fn wider(recording: &Recording, smoothing: &Smoothing) -> Option<Smoo
 
 /// Fits copies of the recording; `None` if one of them fails.
 ///
-/// `usual` are the sizes of the residuals: the noise of a force is not larger. `share` gives the weights of equations in averages.
+/// `usual` gives the sizes of the residuals, which bound the noise of the forces. `share` gives the weights of equations in averages.
 pub(super) fn copies(
     problem: &Problem<'_>,
     [smoothing, wider]: [&Smoothing; 2],
@@ -105,9 +105,9 @@ pub(super) fn copies(
     (constants.len() == COPIES).then_some(Copies { constants, residuals })
 }
 
-/// Takes velocities and positions for integrals of the accelerations, which are straight lines between the samples: derivatives by local
-/// polynomials are not those of the positions, and smoothing would miss less of them than of the motion. The start is where the positions are met
-/// best. A coordinate that goes astray by that stays as it is.
+/// Replaces velocities and positions by integrals of the accelerations, which are interpolated linearly between the samples. Derivatives by
+/// local polynomials are not derivatives of the positions, so that smoothing would miss less of them than of the motion. The initial state fits
+/// the positions best. A coordinate whose integral drifts too far stays unchanged.
 fn integrate(motion: &mut Smoothed, n: usize) {
     let count = motion.times.len();
     for i in 0..n {
@@ -136,7 +136,7 @@ fn integrate(motion: &mut Smoothed, n: usize) {
     }
 }
 
-/// The forces that a motion asks for, `(samples, n)`.
+/// The forces that a motion needs, `(samples, n)`.
 fn asked(problem: &Problem<'_>, x: &[f64], motion: &Smoothed) -> Vec<f64> {
     let (n, values) = (problem.course.equations.n, problem.parameters(x));
     let mut follower = Follower::new(&problem.course);
@@ -152,7 +152,7 @@ fn asked(problem: &Problem<'_>, x: &[f64], motion: &Smoothed) -> Vec<f64> {
         );
         follower.lacking_forces(&motion.a[range.clone()], &mut force[range]);
     }
-    // Without known forces those are lacking that the motion asks for, with the other sign.
+    // Without known forces, the force that the motion needs is missing, with opposite sign.
     force.iter_mut().for_each(|f| *f = -*f);
     force
 }
@@ -172,7 +172,7 @@ fn drawn(
         let chosen = &smoothing.coordinates[at % n];
         let mut noise = |sigma: f64| sigma * normal();
         copy.q[at] = match marks[at % n] {
-            // Rounding to marks makes up a part of the noise, and hardly any where the motion is slow.
+            // Quantization is part of the noise, and contributes little where the motion is slow.
             Some(mark) => {
                 let beside = (chosen.noise.sigma.powi(2) - mark * mark / 12.0).max(0.0).sqrt();
                 mark * ((motion.q[at] + noise(beside)) / mark).round()
@@ -190,7 +190,7 @@ fn drawn(
 }
 
 impl Copies {
-    /// The bias of the constants that the root of the normal matrix tells, and their covariance in its directions.
+    /// The bias of the constants along the directions of the root of the normal matrix, and their covariance in these directions.
     pub fn bias(&self, root: &Root, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (m, count, copies) = (x.len(), root.forward.len(), self.constants.len() as f64);
         let change = |constants: &Vec<f64>| {
@@ -199,9 +199,9 @@ impl Copies {
         };
         let changes: Vec<Vec<f64>> = self.constants.iter().map(change).collect();
         let mean: Vec<f64> = (0..count).map(|k| changes.iter().map(|c| c[k]).sum::<f64>() / copies).collect();
-        // That of a new draw about the mean of these few, whose variance is known from few as well.
+        // The variance of a new draw about the mean of a few copies, which is itself estimated from a few.
         let factor = (1.0 + 1.0 / copies) / (copies - 3.0);
-        // Few copies do not tell the correlations of many constants.
+        // A few copies do not determine the correlations of many constants.
         let kept = copies / (copies + count as f64);
         let covariance = |at: usize| {
             let (i, j) = (at / count, at % count);
@@ -217,7 +217,7 @@ impl Copies {
         let at = |&(track, sample): &(usize, usize)| {
             let own = self.residuals.iter().map(|copy| copy[track][sample * n + i]).filter(|r| r.is_finite());
             let (sum, count) = own.fold((0.0, 0.0), |(sum, count), r| (sum + r * r, count + 1.0));
-            // The mean of one over a mean square of few numbers is larger than one over the square.
+            // The expected inverse of a mean square of a few numbers is larger than the inverse of its expectation.
             if count > 2.0 { sum / (count - 2.0) } else { 0.0 }
         };
         places.iter().map(at).collect()

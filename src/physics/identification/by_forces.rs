@@ -1,8 +1,8 @@
 //! Constants by known forces: least squares on the residuals of force of smoothed motion.
 //!
-//! The residual is `r = M a + c - dL/dq + dD/dv - Q`. It needs no accelerations to be solved for, so the mass matrix may be singular during
-//! the search. The weight of a coordinate is one over the size of its residuals. If the equations are linear in the constants, a single
-//! step suffices for given weights.
+//! The residual is `r = M a + c - dL/dq + dD/dv - Q`. It does not solve for accelerations, so the mass matrix may be singular during the search.
+//! The weight of a coordinate is the inverse of the size of its residuals. If the equations are linear in the constants, a single step suffices
+//! for given weights.
 
 use super::IdentifyError;
 use super::bootstrap::{self, COPIES};
@@ -18,18 +18,19 @@ use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::{Smoothed, Smoothing, noise};
 use crate::recording::{deviation, quantile, rms};
 
-/// How often coordinates are weighed anew at most, and relative change of all weights that ends it: one that is not reached is reported.
+/// Largest number of updates of the coordinates' weights, and the relative change of all weights that ends the updates; failing to reach it is
+/// reported.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.01;
-/// Parts of a smoothing window over which, to either side and twice, equations are averaged: two thirds of a window in all, with which ranges of
-/// constants hold (`lnn-studies rates --part identify`).
+/// Half-width of the double average of equations, as a share of a smoothing window: two thirds of a window in all. With this value, confidence
+/// intervals have their stated coverage (`lnn-studies rates --part identify`).
 const AVERAGED: usize = 6;
-/// Residual over the spread of a force that is taken at least.
+/// Smallest residual that is assumed, over the spread of a force.
 const LEAST: f64 = 1e-9;
-/// Change of slopes, relative to them, that is rounding.
+/// Relative change of slopes that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Identifies the constants of `problem` that meet the known forces, from their starting values on.
+/// Identifies the constants of `problem` from the known forces, beginning at their starting values.
 pub(super) fn identify(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
@@ -53,7 +54,7 @@ pub(super) fn identify(
         return Err(IdentifyError::Lost);
     }
     let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
-    // A coordinate that nothing drives is weighed as the others are.
+    // A coordinate without a force gets the weight of the others.
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
@@ -71,7 +72,7 @@ pub(super) fn identify(
         let of = |(r, square): (&f64, &f64)| if *square > 0.0 { r / square.sqrt().max(least[i]) } else { f64::NAN };
         residuals.iter().zip(&expected[i]).map(of).collect::<Vec<f64>>()
     };
-    // Averages over the errors of their samples, by coordinate.
+    // Averages in units of their standard errors, by coordinate.
     let scaled: Vec<Vec<f64>> = (0..n).map(|i| over(&column(&averages, (n, i)), i)).collect();
     let size = |i: usize| {
         let far = FAR * usual(std::slice::from_ref(&scaled[i]), 1, 0);
@@ -86,7 +87,7 @@ pub(super) fn identify(
     let probabilities: Vec<f64> = (0..n).map(|i| (n as f64 * probability(i)).min(1.0)).collect();
     let left = |i: usize| {
         let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
-        // Of single equations: averages of neighbours are alike.
+        // Of single equations: neighbouring averages are correlated.
         let autocorrelation = correlation(&[column(&single, (n, i))]).neighbours;
         let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= CHANCE);
         Residual { coordinate, rms: sizes[i] * noise, noise, spread: spread[i], autocorrelation, white }
@@ -98,7 +99,7 @@ pub(super) fn identify(
         let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
         Outlier { track, sample, trajectory: String::new(), row: 0, time, coordinate, size }
     };
-    // States of all trajectories in a row.
+    // States of all trajectories, one after another.
     let (outliers, outlier_count) = outliers((&[whole], &[single]), n, far);
     let verdict = Evidence {
         converged: normal.converged,
@@ -118,7 +119,7 @@ pub(super) fn identify(
             let (bias, mut covariance) = copies.bias(&root, &x);
             let away: Vec<f64> = bias.iter().map(|bias| -bias).collect();
             x = problem.moved(&x, &away, &normal);
-            // Residuals that are larger than those of the copies come with errors that are.
+            // Residuals larger than those of the copies imply larger standard errors.
             covariance.iter_mut().for_each(|c| *c *= over_noise.max(1.0).powi(2));
             let inflation = mean_eigenvalue(&covariance, root.forward.len());
             (root.informed(&normal, &covariance, f64::MIN_POSITIVE), inflation)
@@ -143,7 +144,8 @@ pub(super) fn identify(
     })
 }
 
-/// Fits the constants, coordinates weighed by the sizes of their averages, until these stay the same; the normal equations there.
+/// Fits the constants and updates the weights of coordinates by the sizes of their averages until both settle; returns the normal equations
+/// there.
 fn weighed(
     problem: &Problem<'_>,
     (states, x): (&mut States, &mut Vec<f64>),
@@ -180,7 +182,7 @@ fn weighed(
     Ok(Normal { converged: search.converged, decrement: search.decrement, held: search.held, ..normal })
 }
 
-/// Residuals of the equations of force, `(states, n)`: of single ones, of averages, and the single ones in units of their errors.
+/// Residuals of the force equations, `(states, n)`: of single equations, of averages, and of single equations in units of their errors.
 struct ForceResiduals {
     raw: Vec<f64>,
     averages: Vec<f64>,
@@ -202,11 +204,11 @@ fn column(values: &[f64], (n, i): (usize, usize)) -> Vec<f64> {
     values.iter().skip(i).step_by(n).copied().collect()
 }
 
-/// Samples over which residuals are added up to see slow ones.
+/// Number of samples over which residuals are summed to detect slow ones.
 const BLOCKS: [usize; 3] = [4, 16, 64];
 
-/// Probability that residuals of the right form vary as much over many samples, judged by those of copies: sums over blocks, `t`-distributed in
-/// their logarithm.
+/// Probability that the residuals of a correct model vary as much over many samples, judged by the residuals of the copies: sums over blocks,
+/// whose logarithms are `t`-distributed.
 fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -> f64 {
     let slow = |values: &[f64], block: usize| {
         let mut square = f64::MIN_POSITIVE;
@@ -230,14 +232,14 @@ fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -
     (BLOCKS.iter().map(of).fold(1.0, f64::min) * BLOCKS.len() as f64).min(1.0)
 }
 
-/// Weights of equations by their errors: those of the usual error or a smaller one have 1.
+/// Weights of equations by their errors: 1 for the typical error or a smaller one.
 fn shares(errors: &[f64], n: usize) -> Vec<f64> {
     let usual: Vec<f64> = (0..n).map(|i| quantile(&mut column(errors, (n, i)), 0.5)).collect();
     errors.iter().enumerate().map(|(at, error)| (usual[at % n] / error).powi(2).min(1.0)).collect()
 }
 
-/// Error of every equation of force that noise alone leaves, `(states, n)`: that of the force itself, and what the errors of the accelerations
-/// come to.
+/// Error of every force equation that noise alone causes, `(states, n)`: the noise of the force and the contribution of the errors of the
+/// accelerations.
 fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
     let n = problem.course.equations.n;
     let tracks =
@@ -265,7 +267,7 @@ impl Problem<'_> {
         let v: Vec<f64> = starts().flat_map(|(_, v)| v.to_vec()).collect();
         let slopes = |factor: f64| {
             let x: Vec<f64> = (0..m).map(|k| factor * (1.0 + k as f64 / m as f64)).collect();
-            // What a state has for an acceleration does not matter here.
+            // The acceleration of the state does not matter here.
             Follower::new(&self.course).force_slopes(&self.parameters(&x), (&q, &v, &q)).to_vec()
         };
         let (one, other) = (slopes(1.0), slopes(1.7));

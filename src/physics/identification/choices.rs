@@ -1,4 +1,4 @@
-//! What a user chose: unknown constants, sensors, errors, and what is met.
+//! The user's choices: unknown constants, sensors, position errors, and the quantity that is fitted.
 
 use super::smoothed::Met;
 use super::solve::{Sensor, SensorKind};
@@ -7,7 +7,7 @@ use crate::lagrangian::SystemInstance;
 use crate::names::pluralize;
 use crate::recording::{Recording, Targets};
 
-/// Errors of positions: one positive number for each of them.
+/// Position errors: one positive number for each position.
 pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result<(), IdentifyError> {
     if errors.is_empty() {
         return Ok(());
@@ -26,17 +26,17 @@ pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result
     Ok(())
 }
 
-/// What is met.
+/// What the constants are fitted to.
 pub(super) fn met(
     instance: &SystemInstance<f64>,
     recording: &Recording,
     options: &IdentifyOptions,
 ) -> Result<Met, IdentifyError> {
     let driven = recording.is_driven();
-    // A joint that nothing drives has a known force of 0.
+    // A joint without an actuator has a known force of 0.
     let mut forces = recording.tracks.iter().flat_map(|track| &track.force);
     let pushed = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
-    // Both belong to motion that is followed.
+    // Both need a fit to the motion.
     let follows = options.segment.is_some()
         || !options.errors.is_empty()
         || [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
@@ -46,11 +46,10 @@ pub(super) fn met(
     };
     match options.targets {
         Some(Targets::Motion) => Ok(Met::Accelerations),
-        Some(Targets::Forces) if !pushed => refused("motion, of a recording without known forces", "forces"),
-        Some(Targets::Forces) if follows => refused(
-            "motion, beside unknown constants of sensors, errors of positions or a length of segments",
-            "forces",
-        ),
+        Some(Targets::Forces) if !pushed => refused("motion, because the recording has no known forces", "forces"),
+        Some(Targets::Forces) if follows => {
+            refused("motion, because sensor constants, position errors or a segment length are given", "forces")
+        }
         Some(Targets::Forces) => Ok(Met::Forces),
         Some(Targets::Measured) => refused("motion or forces", "measured"),
         Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),

@@ -1,4 +1,4 @@
-//! Covariance of the unknowns where residuals are correlated, or are weighed by their size.
+//! Covariance of the unknowns where residuals are correlated or weighted by their size.
 //!
 //! With scores `u_t`, the gradient of the sum of squares at a sample once starts are eliminated, the covariance is `S^-1 B S^-1`, `S` the normal
 //! matrix and `B` the long-run covariance of the scores: from the mean of the outer products of their sums over all windows of one length, which is
@@ -12,14 +12,14 @@ use super::solve::{HUBER, Normal, Problem};
 use super::stages::{Fitted, choose_steps, joined};
 use crate::linalg::{Workspace, dot, eigh};
 
-/// Eigenvalue of a segment's matrix of correlations from which on it tells its own constants.
+/// Smallest eigenvalue of a segment's correlation matrix at which the segment determines constants of its own.
 const TOLD: f64 = 1e-6;
-/// Newton decrement for each number of the starts up to which they have arrived.
+/// Largest Newton decrement per number of the initial states at which they count as converged.
 const ARRIVED: f64 = 0.01;
-/// Share of the samples that a window of correlated residuals has at most.
+/// Largest window of correlated residuals, as a share of the samples.
 const MOST_WINDOW: f64 = 0.25;
 
-/// How residuals are weighed: all numbers are means over residuals in units of the noise.
+/// Effect of weighting residuals by size: all numbers are means over residuals in units of the noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighing {
     /// Variance of the scores over the normal matrix: the mean square residual if none is cut.
@@ -29,8 +29,8 @@ pub(super) struct Weighing {
 }
 
 impl Weighing {
-    /// `E psi^2`, `E psi'` and the mean weight of residuals beyond three standard deviations that count linearly (Huber, Robust
-    /// Statistics, 1981, section 7.6); `taken` is the share of numbers that are not taken by starts and constants.
+    /// `E psi^2`, `E psi'` and the mean weight if residuals beyond three standard deviations count linearly (Huber, Robust Statistics, 1981,
+    /// section 7.6); `taken` is the share of degrees of freedom that are not used by initial states and constants.
     pub fn of(residuals: &[Vec<f64>], robust: bool, taken: f64) -> Self {
         let all = || residuals.iter().flatten().copied().filter(|r| r.is_finite());
         let cut = |r: f64| if robust && r.abs() > HUBER { HUBER } else { r.abs() };
@@ -48,7 +48,7 @@ impl Weighing {
 pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
     let (starts, m) = (2 * problem.sigma.len(), problem.unknowns());
     let width = starts + m;
-    // How starts follow the unknowns, `(m, starts)`.
+    // Response of the initial states to the unknowns, `(m, starts)`.
     let follow = problem.all(x, segments).into_iter().map(|linear| {
         let linear = linear?;
         let inverse = problem.start_inverse(&linear, 0.0);
@@ -73,7 +73,7 @@ pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> 
     found
 }
 
-/// Long-run covariance of scores, `(m, m)`: those of segments that follow each other on a trajectory in a row, correlated over `lags` samples.
+/// Long-run covariance of scores, `(m, m)`, correlated over `lags` samples; consecutive segments of a trajectory are concatenated.
 pub(super) fn long_run(scores: &[Vec<f64>], segments: &[Segment], m: usize, lags: usize) -> Vec<f64> {
     let mut order: Vec<usize> = (0..segments.len()).collect();
     order.sort_by_key(|&k| (segments[k].track, segments[k].first));
@@ -95,14 +95,14 @@ pub(super) fn long_run(scores: &[Vec<f64>], segments: &[Segment], m: usize, lags
             }
         }
     }
-    // All scores together are 0: windows that are a large part of them vary less than those of independent numbers.
+    // All scores sum to 0: windows that are a large part of them vary less than those of independent numbers.
     let part = window as f64 / samples as f64;
     let factor = window as f64 * (1.0 - part + part * part / 3.0);
     covariance.iter_mut().for_each(|c| *c /= factor);
     covariance
 }
 
-/// Square root `R` of a normal matrix with `S = R' R`, and its inverse, along the directions that the motion tells: rows `(directions, m)`.
+/// Square root `R` of a normal matrix with `S = R' R`, and its inverse, along the directions that the motion determines: rows `(directions, m)`.
 pub(super) struct Root {
     pub forward: Vec<Vec<f64>>,
     pub back: Vec<Vec<f64>>,
@@ -127,9 +127,9 @@ impl Root {
         }
     }
 
-    /// The normal equations of independent residuals of unit size that know the unknowns as well as those do whose scores have this covariance.
+    /// Normal equations of independent residuals of unit size that give the same covariance of the unknowns as scores with this covariance.
     ///
-    /// In the directions of the root a covariance of the unknowns is `W`; no eigenvalue counts below `least`.
+    /// `W` is a covariance of the unknowns in the directions of the root; eigenvalues below `least` are raised to it.
     pub fn informed(&self, normal: &Normal, covariance: &[f64], least: f64) -> Normal {
         let (m, count) = (normal.right.len(), self.forward.len());
         let (mut values, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
@@ -157,10 +157,11 @@ impl Root {
     }
 }
 
-/// Probability that noise keeps segments from continuing each other as they do: the sum of squares that is gained by a start of its own for every
-/// second one, over that of the residuals, which has the F distribution for the right form.
+/// Probability that noise causes the discontinuities between segments: the sum of squares that independent initial states of every second
+/// segment gain, over that of the residuals, has the F distribution for a correct model.
 ///
-/// Starts take up much of what a missing term does, over a short segment nearly all of it; what they cannot do is to follow each other.
+/// Initial states absorb much of the effect of a missing term, over a short segment nearly all of it; but then segments do not continue each
+/// other.
 pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighing: Weighing) -> f64 {
     let longer = joined(&fitted.segments);
     if longer.len() == fitted.segments.len() {
@@ -170,11 +171,11 @@ pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighing: Wei
     choose_steps(&mut problem, &fitted.x, &longer);
     let [apart, together] = [&fitted.segments, &longer].map(|segments| problem.normal_at(&fitted.x, segments));
     let freedom = together.count - apart.count;
-    // Where motion is too chaotic for the starts to arrive nothing is seen.
+    // Where the motion is too chaotic for the initial states to converge, the test has no power.
     if together.failed + apart.failed > 0 || together.of_starts > ARRIVED || freedom < 1.0 {
         return 1.0;
     }
-    // What the best constants would still take off, to first order.
+    // The gain that remains at the best constants, to first order.
     let least = |normal: &Normal| {
         let root = Root::of(fitted.x.len(), &normal.matrix);
         let gained: f64 = root.back.iter().map(|row| dot(row, &normal.right).powi(2)).sum();
@@ -184,8 +185,8 @@ pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighing: Wei
     tail(ratio, freedom, (apart.count - fitted.x.len() as f64).max(1.0))
 }
 
-/// Probability that noise makes the constants of segments differ as much as they do: the score test of constants of each segment's own, whose
-/// sum of squares over that of the residuals has the F distribution.
+/// Probability that noise makes the constants of segments differ as much as they do: the score test of separate constants for each segment,
+/// whose sum of squares over that of the residuals has the F distribution.
 pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], weighing: Weighing) -> f64 {
     let m = x.len();
     let (mut sum, mut freedom, mut rest) = (0.0, 0.0, 0.0);

@@ -1,7 +1,8 @@
-//! Which motion would determine what is open: the equations are examined at other states, faster, farther, and under forces.
+//! Finds motion that would determine what is open: it evaluates the equations at other states, with larger positions, higher velocities and
+//! forces.
 //!
-//! What counts are ranks and determinants of the effect of all open directions together, which do not depend on their basis. What is
-//! advised is the same wherever along the open directions the search has ended, or nothing particular.
+//! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is
+//! specific only if it is the same at every point along the open directions where the search may have ended.
 
 use super::determined::{Column, echelon};
 use super::follow::{Follower, LANES, Segment};
@@ -10,25 +11,25 @@ use super::solve::Problem;
 use crate::lagrangian::system::Bounds;
 use crate::linalg::{dot, singular};
 
-/// Singular value of the effect of directions, over the effects of their unknowns each for itself, that is rounding.
+/// Singular value of the effect of directions, relative to the separate effects of their unknowns, below which it is rounding.
 const ROUNDING: f64 = 1e-6;
-/// States at which the effect of a direction is examined, at most.
+/// Largest number of states at which the effect of a direction is evaluated.
 const MOST_STATES: usize = 256;
-/// A motion this many times as telling as the recorded one is worth a word.
+/// A motion is recommended if it is this many times as informative as the recorded one.
 const WORTH: f64 = 2.0;
-/// Part of the effect at other states that the recorded ones are taken to have at least.
+/// Smallest effect, relative to other states, that is assumed at the recorded states.
 const LEAST: f64 = 1e-6;
-/// Spread of a coordinate over that of the others in which it stands still.
+/// A coordinate stands still if its spread, relative to the others, is below this.
 const STILL: f64 = 1e-9;
 
-/// Kinds of numbers that are spread.
+/// Kinds of numbers that are sampled.
 const POSITION: usize = 0;
 const VELOCITY: usize = 1;
 const DRIVE: usize = 2;
 
-const MORE: &str = "more motion of this kind, or less noise";
+const MORE: &str = "record more motion of this kind, or reduce the noise";
 
-/// Looks for motion that would tell open directions.
+/// Searches for motion that would determine open directions.
 pub(super) struct Examiner<'a> {
     pub problem: &'a Problem<'a>,
     pub segments: &'a [Segment],
@@ -44,19 +45,19 @@ struct Probe {
     force: Vec<f64>,
 }
 
-/// Unknowns with changes of theirs.
+/// Unknowns and changes of them.
 struct Place<'a> {
     x: &'a [f64],
     changes: Vec<Vec<f64>>,
 }
 
-/// Directions of constants by what would tell them.
+/// Directions of constants, classified by what would determine them.
 pub(super) struct ByForces {
-    /// Single constants that no force depends on.
+    /// Single constants on which no force depends.
     pub silent: Vec<Vec<f64>>,
-    /// Held together by the equations.
+    /// Combinations that the equations never separate.
     pub always: Vec<Vec<f64>>,
-    /// Not told by this motion.
+    /// Directions that this motion does not determine.
     pub here: Vec<Vec<f64>>,
 }
 
@@ -193,7 +194,7 @@ impl Examiner<'_> {
     /// What would determine a group of open directions.
     pub fn cure(&self, x: &[f64], group: &Group<'_>) -> String {
         if group.inside.iter().any(|k| *k >= self.problem.chosen.len()) {
-            return "a sensor that is calibrated: its constants and those of the system do the same to this motion"
+            return "calibrate the sensor: its constants and those of the system have the same effect on this motion"
                 .into();
         }
         let own = Place { x, changes: group.columns.iter().map(|column| column.change.clone()).collect() };
@@ -220,7 +221,7 @@ impl Examiner<'_> {
         if by_force > 0 {
             cures.push(match forced {
                 true => MORE.to_string(),
-                false => "motion under a known force (--force), without which nothing depends on it".to_string(),
+                false => "record motion under a known force (--force), or fix one of the constants".to_string(),
             });
         }
         if !by_motion.is_empty() {
@@ -230,10 +231,10 @@ impl Examiner<'_> {
         match (never, cures.is_empty()) {
             (0, _) => {}
             (_, true) => {
-                return "no motion, the equations contain these combinations alone; fix one of the constants".into();
+                return "fix one of the constants: no motion separates them, the equations contain only their combinations".into();
             }
-            (1, _) => cures.push("the value of one of them, which no motion determines".to_string()),
-            (never, _) => cures.push(format!("the values of {never} of them, which no motion determines")),
+            (1, _) => cures.push("fix one of the constants in any case: no motion determines it".to_string()),
+            (never, _) => cures.push(format!("fix {never} of the constants in any case: no motion determines them")),
         }
         cures.dedup();
         cures.join("; ")
@@ -256,11 +257,14 @@ impl Examiner<'_> {
             let mut far = recorded.clone();
             spread((&mut far.q, n), (i, POSITION), wide_q[i].1);
             let (now, then) = (range(wide_q[i].0), range(wide_q[i].1));
-            let farther = (far, format!("motion in which {name} goes farther, over {then}, not {now}"));
+            let farther = (far, format!("record motion in which {name} goes farther, over {then} instead of {now}"));
             let mut fast = recorded.clone();
             spread((&mut fast.v, n), (i, VELOCITY), wide_v[i].1);
             let (now, then) = (range(wide_v[i].0), range(wide_v[i].1));
-            let faster = (fast, format!("motion in which {name} is faster, with {name}_dot over {then}, not {now}"));
+            let faster = (
+                fast,
+                format!("record motion in which {name} is faster, with {name}_dot over {then} instead of {now}"),
+            );
             for (probe, text) in [farther, faster] {
                 let effect = tells(&probe);
                 if effect > best.0 {

@@ -1,4 +1,4 @@
-//! What the motion determines: which changes of the unknowns it does not show, and the errors of everything else.
+//! What the motion determines: the changes of the unknowns that have no visible effect, and the standard errors of everything else.
 //!
 //! Let `S` be the normal matrix of the unknowns in units of the noise, starts eliminated, and `D` the size of each unknown. The singular
 //! values of the Jacobian times `D` are the roots of the eigenvalues of `D S D`. A direction is *open* if its singular value is below 1, that
@@ -7,29 +7,29 @@
 use super::solve::{Normal, Problem};
 use crate::linalg::{Workspace, components, dot, eigh};
 
-/// Part of the squared effect of an unknown that the elimination of the starts leaves as rounding: their ridge is 1e-11, and sums over some
-/// hundred samples lose the rest.
+/// Share of the squared effect of an unknown that is rounding after the elimination of initial states: their ridge is 1e-11, and sums over some
+/// hundred samples lose the remaining digits.
 pub(super) const ROUNDING: f64 = 1e-8;
-/// Size of an unknown that starts at 0, in errors with the others held: it is compared with what the motion tells of it alone.
+/// Size of an unknown that starts at 0, in standard errors with the others held fixed.
 const ALONE: f64 = 10.0;
-/// Part of the largest effect along a direction that is rounding of the eigenvectors; their unknowns are scaled to effects of at most 1e4.
+/// Share of the largest effect along a direction that is rounding of the eigenvectors; unknowns are scaled to effects of at most 1e4.
 const PART: f64 = 1e-6;
-/// Relative error from which on the motion does not depend on a direction: what it shows is rounding.
+/// Relative error above which the motion does not depend on a direction: its effect is rounding.
 pub(super) const NOTHING: f64 = 1e6;
-/// Part of the largest change from which on another one is as large.
+/// Share of the largest change above which another change counts as equally large.
 const EQUAL: f64 = 0.99;
 
 /// What normal equations determine.
 pub(super) struct Determined {
     /// Size of each unknown, in its own units.
     pub size: Vec<f64>,
-    /// Effect of a unit change of each unknown, the others held, in standard deviations.
+    /// Effect of a unit change of each unknown with the others held fixed, in standard deviations.
     pub effect: Vec<f64>,
     /// `(m, m)`, with every open direction held.
     pub covariance: Vec<f64>,
-    /// Unknowns whose own effect is not seen.
+    /// Unknowns without a visible effect of their own.
     pub silent: Vec<usize>,
-    /// Open directions among the others: changes of all unknowns in their own units, of few unknowns each.
+    /// Open directions of the other unknowns: changes in their own units, each of as few unknowns as possible.
     pub open: Vec<Column>,
     /// The normal matrix in units of the noise, `(m, m)`.
     pub information: Vec<f64>,
@@ -37,18 +37,18 @@ pub(super) struct Determined {
     rounding: Vec<f64>,
 }
 
-/// An open direction in a basis where each has a pivot that the others do not move.
+/// An open direction in a basis where each direction has a pivot that the others leave unchanged.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
-    /// The unknown that this direction alone moves.
+    /// The unknown that only this direction changes.
     pub pivot: usize,
-    /// Change of each unknown, the largest as large as the unknown itself.
+    /// Change of each unknown; the largest is as large as the unknown itself.
     pub change: Vec<f64>,
 }
 
 impl Determined {
-    /// From undamped normal equations of `x`, found from `start`; `variance` is that of the residuals. A direction is open from the relative error
-    /// `open` on: 1, or [`NOTHING`] of equations that are linear in the unknowns, where a sum with a large error is known none the less.
+    /// From undamped normal equations at `x`, found from `start`; `variance` is that of the residuals. A direction is open if its relative error
+    /// exceeds `open`: 1, or [`NOTHING`] for equations that are linear in the unknowns, where a sum with a large error still counts as known.
     pub fn new(
         problem: &Problem<'_>,
         (x, start): (&[f64], &[f64]),
@@ -104,7 +104,8 @@ impl Determined {
         found
     }
 
-    /// An unknown has part in an open direction if its own change along it, the others held, is seen and is no rounding of the others.
+    /// An unknown takes part in an open direction if its own change along it, with the others held fixed, has a visible effect that is not
+    /// rounding.
     fn drop_unseen(&mut self, seen_from: f64) {
         for column in &mut self.open {
             let seen: Vec<f64> = column.change.iter().zip(&self.effect).map(|(x, effect)| (x * effect).abs()).collect();
@@ -116,12 +117,12 @@ impl Determined {
         }
     }
 
-    /// `true` if an unknown has part in an open direction.
+    /// `true` if an unknown takes part in an open direction.
     pub fn is_open(&self, k: usize) -> bool {
         self.silent.contains(&k) || self.open.iter().any(|column| column.change[k] != 0.0)
     }
 
-    /// Standard errors of unknowns that are known by themselves.
+    /// Standard errors of unknowns that are determined individually.
     pub fn errors(&self) -> Vec<Option<f64>> {
         let m = self.size.len();
         (0..m).map(|k| (!self.is_open(k)).then(|| self.covariance[k * m + k].max(0.0).sqrt())).collect()
@@ -140,7 +141,7 @@ impl Determined {
         (seen > 10.0 * rounding && seen > size / (NOTHING * NOTHING)).then(|| (size / seen).sqrt())
     }
 
-    /// Changes of all unknowns without an effect that is seen.
+    /// Changes of all unknowns without a visible effect.
     pub fn changes(&self) -> Vec<Vec<f64>> {
         let m = self.size.len();
         let alone = |&k: &usize| (0..m).map(|j| if j == k { self.size[k] } else { 0.0 }).collect();
@@ -161,8 +162,8 @@ pub(super) fn quadratic(matrix: &[f64], x: &[f64]) -> f64 {
     matrix.chunks_exact(x.len().max(1)).zip(x).map(|(row, own)| own * dot(row, x)).sum()
 }
 
-/// The same space in reduced echelon form: each direction has a pivot, an unknown that moves most relative to its size, and which no other
-/// direction moves.
+/// The same space in reduced echelon form: each direction has a pivot, an unknown with the largest relative change, which no other direction
+/// changes.
 pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<Column> {
     let mut pivots: Vec<usize> = Vec::new();
     for at in 0..rows.len() {
@@ -173,7 +174,7 @@ pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<Column> {
         let free = (0..size.len()).filter(|k| !pivots.contains(k));
         let places: Vec<(usize, usize)> = free.flat_map(|k| (at..rows.len()).map(move |row| (row, k))).collect();
         let largest = places.iter().map(relative).fold(0.0, f64::max);
-        // Of equal ones the first, whatever rounding says.
+        // The first of equal ones, independent of rounding.
         let Some(&(row, pivot)) = places.iter().find(|place| relative(place) >= EQUAL * largest) else { break };
         rows.swap(at, row);
         let value = rows[at][pivot];

@@ -1,4 +1,4 @@
-//! Why nothing is identified.
+//! Errors of identification.
 
 use crate::cancellation::Cancelled;
 use crate::names::unknown;
@@ -6,14 +6,14 @@ use crate::recording::TrajectoryError;
 use crate::recording::smooth::SmoothError;
 use crate::tape::TapeError;
 
-/// Why constants cannot be identified.
+/// Why constants could not be identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
     /// The search was ended from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-    /// Arrays that do not make a trajectory.
+    /// Arrays that do not form a trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
     /// Motion that cannot be smoothed.
@@ -23,12 +23,12 @@ pub enum IdentifyError {
     #[error(transparent)]
     Lagrangian(#[from] TapeError),
     /// A system under constraints.
-    #[error("{system} is under constraints; a system without them, in coordinates that are free, can be identified")]
+    #[error("{system} has constraints; identification needs a system without them, in independent coordinates")]
     Constrained {
         /// The system.
         system: String,
     },
-    /// Another number of coordinates than the system has.
+    /// The number of coordinates differs from that of the system.
     #[error("expected {expected} coordinates, found {found}")]
     Coordinates {
         /// Coordinates of the system.
@@ -62,8 +62,8 @@ pub enum IdentifyError {
         /// Coordinates there are.
         known: Vec<String>,
     },
-    /// Nothing is unknown.
-    #[error("{system} has no constants")]
+    /// The system has no constants.
+    #[error("{system} has no constants to identify")]
     Nothing {
         /// The system.
         system: String,
@@ -78,7 +78,7 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
-    /// A standard deviation of a position that is none, or another number of them than of positions.
+    /// A standard deviation of a position that is not a finite number above 0, or the wrong number of standard deviations.
     #[error("errors of {track}: expected a finite number above 0 for each of {expected} positions, found {found}")]
     Errors {
         /// The trajectory.
@@ -89,7 +89,7 @@ pub enum IdentifyError {
         found: String,
     },
     /// Too few samples.
-    #[error("the trajectories of three samples or more have {found} samples, at least {needed} are needed")]
+    #[error("expected at least {needed} samples in trajectories of three or more, found {found}")]
     Short {
         /// Samples of the trajectories that have three or more.
         found: usize,
@@ -101,9 +101,9 @@ pub enum IdentifyError {
         "the equations of motion cannot be solved at any recorded state with the given constants: the mass matrix is singular, or a term is not finite"
     )]
     Singular,
-    /// The motion cannot be followed.
+    /// The model cannot follow the motion.
     #[error(
-        "no part of the recorded motion can be followed with the constants found so far: are the columns those of the coordinates?"
+        "the model follows no part of the recorded motion with the constants found so far: check that the columns are those of the coordinates"
     )]
     Lost,
 }

@@ -1,4 +1,4 @@
-//! Motion from its starts, side by side, with its derivatives by starts and constants.
+//! Integrates many segments side by side, with derivatives by initial states and constants.
 
 use super::Between;
 use crate::lagrangian::Equations;
@@ -7,10 +7,10 @@ use crate::recording::{RecordedTrajectory, Recording};
 use crate::tape::Replay;
 use std::sync::Arc;
 
-/// Segments that are followed side by side.
+/// Segments that are integrated side by side.
 pub(super) const LANES: usize = 64;
 
-/// Samples that are followed from one start.
+/// Samples that are followed from one initial state.
 #[derive(Clone, Debug)]
 pub(crate) struct Segment {
     pub track: usize,
@@ -21,12 +21,12 @@ pub(crate) struct Segment {
     pub start: Vec<f64>,
 }
 
-/// What is followed: recorded times and forces, and the equations.
+/// What is integrated: the recorded times and forces, and the equations.
 #[derive(Clone, Debug)]
 pub(crate) struct Course<'a> {
     pub recording: &'a Recording,
     pub equations: &'a Equations,
-    /// Constants that derivatives are taken by.
+    /// Constants by which derivatives are taken.
     pub chosen: usize,
     pub between: Between,
     /// Usual step between samples in s, and integration steps in it.
@@ -49,7 +49,7 @@ impl State {
         Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
     }
 
-    /// Slopes of positions and velocities by the starts, `(lanes, 2n, 2n)`, of derivatives with `columns` numbers.
+    /// Derivatives of positions and velocities by the initial states, `(lanes, 2n, 2n)`, taken from derivatives with `columns` numbers.
     pub fn by_starts(&self, n: usize, columns: usize) -> Vec<f64> {
         let lane = |(q, v): (&[f64], &[f64])| {
             let rows = q.chunks_exact(columns).chain(v.chunks_exact(columns));
@@ -59,7 +59,7 @@ impl State {
         lanes.flat_map(lane).collect()
     }
 
-    /// `from` moved by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
+    /// `from` advanced by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
     fn moved(&mut self, from: &Self, (h, widths): (&[f64], [usize; 2]), along: &Self) {
         let [n, columns] = widths;
         add(&mut self.q, &from.q, (h, n), &along.q);
@@ -115,7 +115,7 @@ impl<'a> Follower<'a> {
         &self.mass
     }
 
-    /// Accelerations of states under forces, `(lanes, n)` each, forces empty for none; `NaN` where they cannot be solved for.
+    /// Accelerations of states under forces, `(lanes, n)` each, forces empty for none; `NaN` where they have no solution.
     pub fn accelerate(&mut self, values: &[f64], (q, v): (&[f64], &[f64]), force: &[f64], a: &mut [f64]) {
         let n = self.course.equations.n;
         let lanes = q.len() / n;
@@ -134,14 +134,14 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// The known forces less those that accelerations ask for, `Q + h - M a`, at the states evaluated last: `(lanes, n)`.
+    /// The known forces minus those that the accelerations need, `Q + h - M a`, at the states evaluated last: `(lanes, n)`.
     pub fn lacking_forces(&self, a: &[f64], into: &mut [f64]) {
         let n = self.course.equations.n;
         let rows = self.mass.chunks_exact(n).zip(&self.rest).zip(into).enumerate();
         rows.for_each(|(at, ((row, rest), into))| *into = rest - linalg::dot(row, &a[at / n * n..][..n]));
     }
 
-    /// Slopes of `M a - h - Q` by positions, velocities and constants, accelerations held fixed: `(lanes, n, 2n + chosen)`.
+    /// Derivatives of `M a - h - Q` by positions, velocities and constants, with the accelerations held fixed: `(lanes, n, 2n + chosen)`.
     pub fn force_slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
         let n = self.course.equations.n;
         self.by_state.resize(q.len() * (2 * n + self.course.chosen), 0.0);
@@ -204,8 +204,8 @@ impl<'a> Follower<'a> {
         rate.v = a;
     }
 
-    /// Follows segments, longest first, and calls `visit` with every sample, counted from the segments' first, and the states of all
-    /// lanes; those of segments that are over are to be ignored. With `derivatives` by starts and constants, `2n + chosen` columns.
+    /// Integrates segments, longest first, and calls `visit` with every sample, counted from the first of each segment, and the states of all
+    /// lanes; ignore those of segments that have ended. With `derivatives` by initial states and constants, `2n + chosen` columns.
     pub fn follow(
         &mut self,
         values: &[f64],
@@ -239,7 +239,7 @@ impl<'a> Follower<'a> {
             };
             let intervals: Vec<f64> = segments.iter().map(interval).collect();
             let most = intervals.iter().copied().fold(0.0, f64::max);
-            // Across a gap there are as many steps as its length asks for.
+            // The number of steps across a gap grows with its length.
             let steps = ((course.substeps as f64 * most / course.step - 0.5).ceil() as usize).max(course.substeps);
             let h: Vec<f64> = intervals.iter().map(|interval| interval / steps as f64).collect();
             for step in 0..steps {
@@ -286,8 +286,8 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// The states of segments at a sample, followed on by a time that may be negative, with their derivatives: from sample to sample, so that
-    /// known forces are what they were in each interval.
+    /// Integrates the states of segments from a sample over a time that may be negative, with their derivatives, from sample to sample, so that
+    /// the known forces of each interval apply.
     pub fn shifted(
         &mut self,
         values: &[f64],
@@ -308,7 +308,7 @@ impl<'a> Follower<'a> {
         };
         let mut places: Vec<(f64, f64)> = segments.iter().zip(&tracks).map(of).collect();
         while places.iter().any(|(_, left)| left.abs() > 0.0) {
-            // The interval of each lane, and the way to go in it.
+            // The interval of each lane and the direction in it.
             let way = |((now, left), track): (&(f64, f64), &&RecordedTrajectory)| {
                 let (times, last) = (&track.times, track.len() - 1);
                 let end = times.partition_point(|t| if *left < 0.0 { t < now } else { t <= now }).clamp(1, last.max(1));
@@ -340,7 +340,7 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// States between, for steps.
+/// Intermediate states of steps.
 struct Scratch {
     stage: State,
     rates: [State; 4],

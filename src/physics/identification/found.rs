@@ -11,13 +11,13 @@ pub struct Constant {
     pub symbol: String,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the motion says nothing of it, whose value is then the one it started with.
+    /// Its standard error; none where the motion does not determine it, and its value is then the starting value.
     pub standard_error: Option<f64>,
     /// Its unit.
     pub unit: String,
     /// The value it started with.
     pub start: f64,
-    /// `true` if it lies at the bound of its range, beyond which the data would be met better: its error is no symmetric one.
+    /// `true` if it lies at a bound of its range and the data would be fitted better beyond it: its error is then not symmetric.
     pub at_bound: bool,
 }
 
@@ -30,18 +30,18 @@ pub struct SensorConstant {
     pub coordinate: String,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the motion says nothing of it.
+    /// Its standard error; none where the motion does not determine it.
     pub standard_error: Option<f64>,
 }
 
 impl SensorConstant {
-    /// What it is, and of what: `"offset of q1"`.
+    /// Its kind and coordinate: `"offset of q1"`.
     pub fn name(&self) -> String {
         format!("{} of {}", self.kind, self.coordinate)
     }
 }
 
-/// Constants that the motion leaves open, alone or together.
+/// Constants that the motion does not determine, alone or together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Undetermined {
     /// The constants.
@@ -49,18 +49,18 @@ pub struct Undetermined {
     /// Relative change of each constant along each open direction, the largest 1: `(directions, constants)`. A constant is compared with its
     /// value or its start, whichever is larger.
     pub directions: Vec<Vec<f64>>,
-    /// Combinations that are known nevertheless, each confirmed by moving the constants by a factor of two along every direction and fitting
-    /// the others again.
+    /// Combinations that are nevertheless determined, each confirmed by moving the constants by a factor of two along every direction and
+    /// fitting the others again.
     pub known: Vec<Combination>,
-    /// Largest standard error along a direction, relative to the values; none where the motion does not depend on one at all.
+    /// Largest standard error along a direction, relative to the values; none where the motion does not depend on a direction at all.
     pub relative_error: Option<f64>,
-    /// What is open, in words.
+    /// What is not determined, in words.
     pub text: String,
     /// What would determine it, in words.
     pub cure: String,
 }
 
-/// A sum or a product of powers of constants that is known though they are not, such as a base parameter of a robot.
+/// A sum or a product of powers of constants that is determined although they are not, such as a base parameter of a robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Combination {
     /// Its formula, such as `c1/(g^2*m1)` or `m1 + 0.5*m2`.
@@ -103,26 +103,26 @@ fn as_object<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S:
 pub struct Bodies {
     /// Links whose constants had to be moved, from 1.
     pub moved: Vec<usize>,
-    /// Largest change of a known sum by it, in standard errors of the sum.
+    /// Largest change of a determined sum that this causes, in standard errors of the sum.
     pub largest_change: f64,
-    /// `false` if no bodies have the known sums within their errors, or none have the constants that are given.
+    /// `false` if no physical bodies have the determined sums within their errors, or none have the given constants.
     pub exist: bool,
 }
 
-/// The residual of one coordinate, of its motion or of the force on it. Neighbouring equations of force are averaged first.
+/// The residual of one coordinate, of its motion or of the force on it. Neighbouring force equations are averaged first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residual {
     /// The coordinate.
     pub coordinate: String,
     /// Root mean square.
     pub rms: f64,
-    /// Standard deviation of the noise, as given or as estimated before the fit; of forces with what the errors of accelerations come to.
+    /// Standard deviation of the noise, as given or as estimated before the fit; for forces, it includes the errors of the accelerations.
     pub noise: f64,
-    /// Standard deviation of what is met: of the positions, or of the forces.
+    /// Standard deviation of the fitted quantity: the positions or the forces.
     pub spread: f64,
-    /// Correlation of residuals that follow each other, as far as the start of a segment does not make it; that of white noise is 0.
+    /// Autocorrelation of the residuals beyond what the initial state of a segment causes; that of white noise is 0.
     pub autocorrelation: f64,
-    /// `true` if residuals do not follow from the earlier ones, over all lags together at a level of 1 %.
+    /// `true` if the residuals are independent, tested over all lags together at a level of 1 %.
     pub white: bool,
 }
 
@@ -143,11 +143,11 @@ pub struct Outlier {
     pub time: f64,
     /// The coordinate.
     pub coordinate: String,
-    /// Residual over the usual one.
+    /// Residual over the typical one.
     pub size: f64,
 }
 
-/// Correlations of the errors of constants, then of sensors; 0 beside those without error.
+/// Correlations of the errors of constants, then of sensors; 0 for those without an error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Correlations {
     /// Symbols of the constants, and `"offset of q1"` and the like.
@@ -156,7 +156,7 @@ pub struct Correlations {
     pub matrix: Vec<Vec<f64>>,
 }
 
-/// Constants with their errors, and how far these can be trusted.
+/// Constants with their standard errors, and how far these can be trusted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Identified {
     /// The constants that were unknown, in the order of the system; in JSON an object by symbol.
@@ -166,25 +166,25 @@ pub struct Identified {
     pub sensors: Vec<SensorConstant>,
     /// How the errors are correlated.
     pub correlations: Correlations,
-    /// What the motion leaves open.
+    /// Constants that the motion does not determine.
     pub undetermined: Vec<Undetermined>,
-    /// Sums of constants that are known, where forces are met and are linear in the constants.
+    /// Sums of constants that are determined, if forces are fitted and are linear in the constants.
     pub combinations: Vec<Combination>,
-    /// How inertias became those of bodies; none for a system that is no chain of links.
+    /// How the inertias were made physical; none for a system that is not a chain of links.
     pub bodies: Option<Bodies>,
-    /// What is left, by coordinate.
+    /// Residuals by coordinate.
     pub residuals: Vec<Residual>,
     /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
     pub over_noise: f64,
     /// `true` if residuals beyond three standard deviations counted linearly.
     pub robust: bool,
-    /// What is to be known before all else: coordinates that stand still, forces of which too little is known between the samples.
+    /// Obstacles to read first: coordinates that stand still, forces that are not known well enough between the samples.
     pub obstacles: Vec<String>,
-    /// `true` if the search arrived; if not, the constants are where it stopped.
+    /// `true` if the search converged; if not, the constants are where it stopped.
     pub converged: bool,
-    /// The decrease of the sum of squares that was left to gain at the end, over the variance of the noise: the Newton decrement.
+    /// The Newton decrement: the decrease of the sum of squares that another step would bring, over the variance of the noise.
     pub decrement: f64,
-    /// Whether the form explains what was measured, and if not, why; in JSON also in words, as `says`.
+    /// Whether the model fits the recording, and if not, why; in JSON also in words, as `says`.
     #[serde(serialize_with = "in_words")]
     pub verdict: Verdict,
     /// `true` if it does: [`Verdict::explains`].
@@ -193,19 +193,19 @@ pub struct Identified {
     pub outliers: Vec<Outlier>,
     /// Number of all of them.
     pub outlier_count: usize,
-    /// Mean factor by which variances of the unknowns are larger than those of independent residuals of the same size; 1 for these.
+    /// Mean factor by which variances of the unknowns are larger than those of independent residuals of the same size.
     pub inflation: f64,
-    /// Standard deviation of the noise of the known force on every coordinate, as the motion shows it; empty if it shows none.
+    /// Standard deviation of the noise of the known force on every coordinate, estimated from the motion; empty if none is visible.
     pub force_noise: Vec<f64>,
-    /// Samples that were followed, or whose forces were met.
+    /// Samples whose motion was followed, or whose forces were fitted.
     pub samples: usize,
-    /// Number of segments; none where forces were met.
+    /// Number of segments; none if forces were fitted.
     pub segments: usize,
-    /// Length of the usual segment in s.
+    /// Length of a typical segment in s.
     pub segment_seconds: f64,
     /// Integration steps from sample to sample.
     pub substeps: usize,
-    /// How known forces were taken between the samples; none without forces.
+    /// Interpolation of known forces between the samples; none without forces.
     pub between: Option<Between>,
 }
 

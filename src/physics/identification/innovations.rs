@@ -1,4 +1,4 @@
-//! Residuals that do not follow from the earlier ones, by a Kalman filter along each segment.
+//! Whitens residuals by a Kalman filter along each segment.
 //!
 //! An error of a known force moves the motion from there on, so that the residuals of positions are correlated however long the segment is.
 //! In terms of the segment's start the filter is simple: with `P = d(q, v)/d(start)` at a sample, an error `e` of the force over an interval
@@ -12,18 +12,19 @@ use super::solve::Problem;
 use crate::linalg::{self, Workspace, dot};
 use crate::recording::smooth::noise;
 
-/// Standard deviation of an unknown start, in units of what a single position tells of it.
+/// Standard deviation of an unknown initial state, in units of what a single position determines of it.
 const UNKNOWN: f64 = 100.0;
-/// Variance of an innovation over that of the noise up to which it tells of the noise: others tell of the start.
+/// Largest variance of an innovation, over that of the noise, at which it is used to estimate the noise: larger ones come from the unknown
+/// initial state.
 const MOST_VARIANCE: f64 = 100.0;
 
-/// What moves the motion beside the equations.
+/// Disturbances of the motion that the equations do not contain.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Disturbances {
     /// Standard deviation of the noise of every known force; empty for forces that are exact.
     pub force: Vec<f64>,
-    /// Given if the filter does not know the starts: innovations of the right form are then independent, those that tell of the start `NaN`.
-    /// Innovations beyond so many standard deviations are those of outliers, `NaN` too, and do not move the filter.
+    /// Given if the filter does not know the initial states: innovations of a correct model are then independent, and those that depend on the
+    /// initial state are `NaN`. Innovations beyond so many standard deviations are outliers, also `NaN`, and do not update the filter.
     pub unknown_start: Option<f64>,
 }
 
@@ -32,14 +33,14 @@ pub(super) struct Filter {
     unknown_start: Option<f64>,
     /// Variance of the start, `(2n, 2n)`.
     variance: Vec<f64>,
-    /// Expected deviation of the start, of residuals and of each of their slopes: `(1 + width, 2n)`.
+    /// Expected deviation of the initial state, of residuals and of each of their slopes: `(1 + width, 2n)`.
     expected: Vec<Vec<f64>>,
     /// Sum of the logarithms of the variances of innovations over those of the noise.
     pub log_variance: f64,
 }
 
 impl Filter {
-    /// Passes a residual with its slopes, the first `2n` of them by the start; the innovation.
+    /// Passes a residual and its slopes, the first `2n` of them by the initial state, through the filter; returns the innovation.
     pub fn pass(&mut self, residual: f64, row: &mut [f64]) -> f64 {
         let size = self.expected[0].len();
         let slopes = row[..size].to_vec();
@@ -63,7 +64,7 @@ impl Filter {
         if self.unknown_start.is_some() && variance > MOST_VARIANCE { f64::NAN } else { innovation }
     }
 
-    /// Lets errors of forces change the start, each by one row of `(n, 2n)`.
+    /// Adds the effect of force errors to the initial state, each by one row of `(n, 2n)`.
     pub fn disturb(&mut self, impulses: &[f64]) {
         let size = self.expected[0].len();
         for impulse in impulses.chunks_exact(size) {
@@ -74,19 +75,19 @@ impl Filter {
     }
 }
 
-/// Noise of forces over that of neighbouring samples up to which it is looked for: more would not be noise of theirs.
+/// Largest noise of forces that is tried, over that of neighbouring samples: the noise of the forces cannot be larger.
 const MOST_FORCE_NOISE: f64 = 1.5;
 /// Factors of that noise that are tried, `4^-k`.
 const FACTORS: i32 = 7;
-/// Decrease of minus twice the logarithm of the likelihood from which on forces have noise: 1 in 1,000 by chance.
+/// Decrease of minus twice the log-likelihood above which forces have noise: 1 in 1,000 by chance.
 const PLAIN: f64 = 10.0;
 
 impl Problem<'_> {
-    /// Estimates the noise of the known forces by the likelihood of the innovations, up to what their neighbouring samples show; `true` if that
-    /// changes it.
+    /// Estimates the noise of the known forces by the likelihood of the innovations, up to the noise of neighbouring samples; `true` if the
+    /// estimate changes.
     ///
-    /// Noise of the positions is taken out of the likelihood: its variance is the mean square innovation. Starts are taken for unknown, as those
-    /// that are fitted take up much of what the forces do (Patterson and Thompson, Biometrika 58 (1971) 545).
+    /// The noise of the positions is profiled out of the likelihood: its variance is the mean square innovation. Initial states count as
+    /// unknown, because fitted ones absorb much of the effect of the forces (Patterson and Thompson, Biometrika 58 (1971) 545).
     pub(super) fn estimate_force_noise(&mut self, x: &[f64], segments: &[Segment]) -> bool {
         let recording = self.course.recording;
         let forced = recording.tracks.iter().filter(|track| !track.force.is_empty());
@@ -103,7 +104,7 @@ impl Problem<'_> {
                 if factor > 0.0 { shown.iter().map(|s| factor * s).collect() } else { Vec::new() };
             let (mut square, mut count) = (0.0, 0.0);
             let logarithms = tried.residuals(x, &probes, false, |_, _, _, r, _| {
-                // Those that tell of a start are missing.
+                // Innovations that depend on the initial state are missing.
                 if !r.is_nan() {
                     square += r * r;
                     count += 1.0;
@@ -159,8 +160,8 @@ impl Problem<'_> {
         (0..lanes).map(|_| filter()).collect()
     }
 
-    /// Changes of the starts by the errors of the forces over one interval, `(lanes, n, 2n)`; `slopes` are those of states by starts,
-    /// `(lanes, 2n, 2n)`, `mass` is `(lanes, n, n)`. Empty for exact forces.
+    /// Changes of the initial states by force errors over one interval, `(lanes, n, 2n)`; `slopes` are the derivatives of states by initial
+    /// states, `(lanes, 2n, 2n)`, `mass` is `(lanes, n, n)`. Empty for exact forces.
     pub(super) fn impulses(&self, slopes: &[f64], mass: &[f64], step: f64) -> Vec<f64> {
         let (n, force) = (self.course.equations.n, &self.disturbances.force);
         let size = 2 * n;
@@ -194,7 +195,7 @@ mod tests {
         const STEPS: usize = 6;
         let slopes = |t: usize| [1.0, 0.4 * t as f64];
         let impulse = |t: usize| [0.3 - 0.1 * t as f64, 0.5];
-        // Variance of what is seen: noise, and the changes of the start up to the earlier of two samples.
+        // Variance of a measurement: noise, and the changes of the initial state up to the earlier of two samples.
         let of = |t: usize, s: usize| {
             let both = (0..t.min(s)).map(|k| dot(&slopes(t), &impulse(k)) * dot(&slopes(s), &impulse(k)));
             f64::from(u8::from(t == s)) + both.sum::<f64>()

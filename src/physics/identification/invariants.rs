@@ -1,4 +1,4 @@
-//! Functions of constants that open directions leave as they are, with their names.
+//! Functions of constants that open directions leave unchanged, and their names.
 //!
 //! A sum `c.x` is determined if `c' N = 0` for all open directions `N`, a product of powers `x_k^e_k` if `e' diag(1/x) N = 0`. Exponents of
 //! short products form the integer kernel of `diag(1/x) N`, whose columns are rounded to small fractions. Both conditions hold at one
@@ -9,13 +9,13 @@ use super::determined::Column;
 /// Largest power of a constant in a product, and largest denominator of a fraction.
 const MOST_POWER: i64 = 6;
 const MOST_DENOMINATOR: i64 = 4;
-/// Distance of an exponent from a fraction that counts as rounding. Exponents along exact symmetries hold to 1e-6; the finite move refutes
-/// the others.
+/// Distance of an exponent from a fraction that counts as rounding. Exponents along exact symmetries hold to 1e-6; the finite move refutes false
+/// ones.
 const NEAR: f64 = 0.02;
-/// Part of a factor that is rounding.
+/// Share of a factor that is rounding.
 const TINY: f64 = 1e-6;
 
-/// What a name says.
+/// The meaning of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Product,
@@ -113,7 +113,7 @@ pub(super) fn unit_of(factors: &[(&str, f64)]) -> String {
     if powers.is_empty() { String::new() } else { written(Kind::Product, &powers).replace('*', " ") }
 }
 
-/// Products that no direction of a group changes, the shortest first; of the unknowns whose relative changes are small fractions.
+/// Products that no direction of a group changes, the shortest first; only of unknowns whose relative changes are small fractions.
 pub(super) fn products(columns: &[&Column], x: &[f64], inside: &[usize]) -> Vec<Invariant> {
     let exponent =
         |column: &Column, k: usize| column.change[k] / x[k] / (column.change[column.pivot] / x[column.pivot]);
@@ -121,7 +121,7 @@ pub(super) fn products(columns: &[&Column], x: &[f64], inside: &[usize]) -> Vec<
         return Vec::new();
     }
     let row = |&k: &usize| {
-        // A small exponent is no fraction.
+        // Small exponents are not fractions.
         let part = |column: &&Column| fraction(exponent(column, k)).filter(|(p, _)| *p != 0 || column.change[k] == 0.0);
         let own: Option<Vec<(i64, i64)>> = columns.iter().map(part).collect();
         own.filter(|_| x[k] != 0.0).map(|own| (k, own))
@@ -139,7 +139,7 @@ pub(super) fn products(columns: &[&Column], x: &[f64], inside: &[usize]) -> Vec<
     kernel.into_iter().filter(|powers| powers.iter().all(|e| e.abs() <= MOST_POWER)).map(of).collect()
 }
 
-/// Sums that no direction of a group changes, one for each unknown that is no pivot.
+/// Sums that no direction of a group changes, one for each unknown that is not a pivot.
 pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invariant> {
     let free = inside.iter().filter(|k| columns.iter().all(|column| column.pivot != **k));
     let of = |&k: &usize| {
@@ -148,7 +148,7 @@ pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invar
         for column in columns {
             factors[column.pivot] = -near(column.change[k] / column.change[column.pivot]);
         }
-        // The first has a positive factor, whichever the pivots are.
+        // The first factor is positive, whichever the pivots are.
         if factors.iter().find(|factor| **factor != 0.0).is_some_and(|first| *first < 0.0) {
             factors.iter_mut().for_each(|factor| *factor = -*factor);
         }
@@ -157,7 +157,7 @@ pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invar
     free.map(of).collect()
 }
 
-/// A factor without its rounding.
+/// A factor after removing rounding.
 fn near(x: f64) -> f64 {
     let whole = fraction(x).map(|(p, q)| p as f64 / q as f64);
     whole.filter(|whole| (whole - x).abs() <= TINY * x.abs().max(1.0)).unwrap_or(x)
@@ -172,7 +172,7 @@ fn fraction(x: f64) -> Option<(i64, i64)> {
     (1..=MOST_DENOMINATOR).find_map(of)
 }
 
-/// All whole numbers `e` with `sum_i e_i row_i = 0`, as a basis: Euclid's algorithm on the rows, by steps that can be undone.
+/// All integer vectors `e` with `sum_i e_i row_i = 0`, as a basis: Euclid's algorithm on the rows, by reversible steps.
 fn integer_kernel(rows: &[Vec<i64>]) -> Vec<Vec<i64>> {
     let count = rows.len();
     let unit = |i: usize| (0..count).map(|j| i64::from(i == j)).collect::<Vec<i64>>();
@@ -197,7 +197,7 @@ fn integer_kernel(rows: &[Vec<i64>]) -> Vec<Vec<i64>> {
     all.into_iter().map(|(_, powers)| powers).collect()
 }
 
-/// The same basis with sums and differences of two where these are shorter, the shortest first.
+/// The same basis, with two vectors replaced by their sum or difference where that is shorter; the shortest first.
 fn shortened(mut basis: Vec<Vec<i64>>) -> Vec<Vec<i64>> {
     let size = |powers: &[i64]| powers.iter().map(|e| e.abs()).sum::<i64>();
     let shorter = |basis: &[Vec<i64>]| {

@@ -2,7 +2,7 @@
 
 use crate::linalg::{self, Workspace, dot};
 
-/// Part of the diagonal that is added to it: directions that the data say nothing of get the smallest solution.
+/// Share of the diagonal that is added: directions that the data do not determine get the smallest solution.
 const RIDGE: f64 = 1e-11;
 
 /// Inverse of a symmetric matrix that is positive semi-definite.

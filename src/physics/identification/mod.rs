@@ -1,12 +1,12 @@
-//! The constants of a Lagrangian whose form is known, from recorded motion.
+//! The constants of a known Lagrangian from recorded motion.
 //!
-//! Least squares on smoothed accelerations come first. From there Levenberg and Marquardt's method goes through the motion, by multiple
-//! shooting: segments of the recording, each with a start of its own, are followed by the equations of motion, and constants, starts and
-//! constants of sensors are moved to where the measured positions are met best. Segments grow as long as that makes the constants better
-//! known. Noise enters positions alone, so that nothing is biased by it.
+//! A least-squares fit to smoothed accelerations comes first. Then Levenberg and Marquardt's method fits the motion itself by multiple shooting:
+//! the recording is divided into segments, each with an initial state of its own; the equations of motion are integrated along each segment, and
+//! constants, initial states and sensor constants are adjusted until the measured positions are fitted best. Segments grow as long as that
+//! reduces the standard errors. Only positions enter with noise, so that the noise causes no bias.
 //!
-//! Of machines under known forces whose noise is larger than that of the motion, such as robots, residuals of force are met instead: those
-//! of a chain of links are linear in its constants, however many there are.
+//! For machines under known forces that are noisier than their motion, such as robots, the forces are fitted instead: those of a chain of links
+//! are linear in its constants, however many there are.
 //!
 //! ```
 //! use lnn::identification::{IdentifyOptions, identify};
@@ -70,35 +70,36 @@ use crate::recording::Targets;
 pub use crate::rollout::Between;
 use serde::Deserialize;
 
-/// What is identified, and how.
+/// Options of [`identify`].
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IdentifyOptions {
-    /// Symbols of the unknown constants; empty for those that the system marks to be learned, or for all if it marks none.
+    /// Symbols of the unknown constants; if empty, those that the system marks to be learned, or all if it marks none.
     pub constants: Vec<String>,
     /// Coordinates whose sensor has an unknown offset.
     pub offsets: Vec<String>,
     /// Coordinates whose sensor has an unknown gain.
     pub gains: Vec<String>,
-    /// Coordinates whose sensor is late by an unknown time.
+    /// Coordinates whose sensor has an unknown delay.
     pub delays: Vec<String>,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,
-    /// Standard deviations of the positions of every trajectory, `(samples, n)` each, in the units of the coordinates; residuals are weighed
-    /// by them. Empty if they are not known.
+    /// Standard deviations of the positions of every trajectory, `(samples, n)` each, in the units of the coordinates; residuals are weighted by
+    /// them. Empty if they are not known.
     #[serde(default)]
     pub errors: Vec<Vec<f64>>,
-    /// What is met, [`Targets::Motion`] or [`Targets::Forces`]; of a chain of links under known forces these, else the motion, if not given.
+    /// What is fitted, [`Targets::Motion`] or [`Targets::Forces`]; by default the forces of a chain of links under known forces, otherwise the
+    /// motion.
     pub targets: Option<Targets>,
-    /// Known forces between the samples; what meets the motion best if not given.
+    /// Interpolation of known forces between the samples; by default the one that fits the motion best.
     pub between: Option<Between>,
     /// Length of the segments in s; chosen by the data if not given.
     pub segment: Option<f64>,
-    /// Residuals beyond three standard deviations count linearly, so that outliers move little.
+    /// Residuals beyond three standard deviations count linearly, which limits the influence of outliers.
     pub robust: bool,
     /// Threads; 0 for one. The result does not depend on their number.
     pub threads: usize,
-    /// Ends the search, and receives reports of how far it is.
+    /// Cancels the search, and receives reports of its progress.
     #[serde(skip)]
     pub cancellation: Cancellation,
 }

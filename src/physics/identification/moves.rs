@@ -1,4 +1,4 @@
-//! Finite moves along open directions: what stays as it is has a name, and unknowns that stay open return to their start.
+//! Finite moves along open directions confirm the names of combinations that stay constant, and return undetermined unknowns to their start.
 
 use super::descent::mute;
 use super::determined::{Column, Determined};
@@ -8,36 +8,37 @@ use super::solve::{Normal, Problem};
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
-/// Factor by which a pivot is moved, either way.
+/// Factor by which a pivot is moved, up and down.
 const FACTOR: f64 = 2.0;
-/// Steps of a fit with the pivots held, and halvings of each.
+/// Largest number of steps of a fit with the pivots held fixed, and of halvings of each.
 const STEPS: usize = 12;
 const HALVINGS: usize = 5;
-/// Newton decrement in units of the noise variance at which such a fit ends: a tenth of a standard error.
+/// Newton decrement, in units of the noise variance, at which such a fit ends: a tenth of a standard error.
 const SETTLED: f64 = 1e-2;
-/// Increase of the sum of squares in units of the noise variance up to which a moved motion is as good: three standard deviations.
+/// Largest increase of the sum of squares, in units of the noise variance, at which a moved motion counts as equally good: three standard
+/// deviations.
 const AS_GOOD: f64 = 9.0;
-/// Part of the diagonal that keeps normal equations regular.
+/// Share of the diagonal that is added to keep the normal equations regular.
 const RIDGE: f64 = 1e-11;
 
-/// Moves from fitted unknowns.
+/// Moves away from fitted unknowns.
 pub(super) struct Moves<'a> {
     pub problem: &'a Problem<'a>,
     pub determined: &'a Determined,
     /// Variance of the residuals.
     pub variance: f64,
-    /// The normal equations at other unknowns, starts fitted.
+    /// The normal equations at other unknowns, with initial states fitted.
     pub normal_at: &'a dyn Fn(&[f64]) -> Option<Normal>,
 }
 
-/// A group of open directions and what they leave as it is.
+/// A group of open directions and the combinations that they leave unchanged.
 pub(super) struct Group<'a> {
     pub columns: Vec<&'a Column>,
-    /// Unknowns that have part.
+    /// Unknowns that take part.
     pub inside: Vec<usize>,
     pub kind: Kind,
     pub invariants: Vec<Invariant>,
-    /// Moved unknowns that meet the motion as well.
+    /// Moved unknowns that fit the motion equally well.
     pub moved: Vec<Vec<f64>>,
 }
 
@@ -49,12 +50,12 @@ impl<'a> Group<'a> {
         Self { columns, inside, kind: Kind::Product, invariants: Vec::new(), moved: Vec::new() }
     }
 
-    /// `true` if as many functions are named as are determined.
+    /// `true` if as many combinations have names as are determined.
     pub fn is_named(&self) -> bool {
         self.invariants.len() + self.columns.len() == self.inside.len()
     }
 
-    /// The directions at a point that was reached along them.
+    /// The directions at a point that was reached by moving along them.
     pub fn changes_at(&self, x: &[f64], moved: &[f64]) -> Vec<Vec<f64>> {
         let turned = |column: &&Column| {
             let parts = column.change.iter().zip(x.iter().zip(moved));
@@ -69,7 +70,7 @@ impl<'a> Group<'a> {
 }
 
 impl<'a> Moves<'a> {
-    /// Fits unknowns with pivots and silent ones held; the sum of squares in units of the variance.
+    /// Fits unknowns with the pivots and the silent ones held fixed; returns the sum of squares in units of the variance.
     pub fn refit(&self, mut x: Vec<f64>) -> Option<(Vec<f64>, f64)> {
         let m = x.len();
         let held = |k: usize| {
@@ -123,7 +124,7 @@ impl<'a> Moves<'a> {
         self.determined.groups().into_iter().map(of).collect()
     }
 
-    /// Names of one kind whose values stay within their errors when pivots are moved and the others fitted again.
+    /// Names of one kind whose values stay within their errors when pivots are moved and the other unknowns are fitted again.
     fn confirmed(&self, (x, square): (&[f64], f64), group: &Group<'_>, kind: Kind) -> (Vec<Invariant>, Vec<Vec<f64>>) {
         let mut left = match kind {
             Kind::Product => products(&group.columns, x, &group.inside),
@@ -149,7 +150,7 @@ impl<'a> Moves<'a> {
         (left, points)
     }
 
-    /// Unknowns as near to their start as what is known allows, with the sums and products that are.
+    /// Unknowns as near to their start as the determined sums and products allow.
     pub fn least_change(&self, x: &[f64], start: &[f64], groups: &[Group<'_>]) -> Vec<f64> {
         if self.determined.silent.is_empty() && self.determined.open.is_empty() {
             return x.to_vec();
@@ -169,8 +170,8 @@ impl<'a> Moves<'a> {
         near.map_or_else(|| x.to_vec(), |(x, _)| x)
     }
 
-    /// Every direction alone, either way, and of several all together, alternately forth and back: what holds along each need not hold along
-    /// all. A pivot far below its size is moved up to this.
+    /// Moves along each direction, up and down, and along several together, with alternating signs: an invariant of each single direction need
+    /// not be one of all. A pivot far below its size is first raised to it.
     fn moves_of<'c>(&self, x: &[f64], columns: &[&'c Column]) -> Vec<Vec<(&'c Column, f64)>> {
         let factors = |column: &'c Column| {
             let far = self.determined.size[column.pivot] / x[column.pivot].abs();
@@ -191,7 +192,7 @@ impl<'a> Moves<'a> {
     }
 }
 
-/// Unknowns moved along directions until the pivot of each has changed by a factor.
+/// Unknowns moved along directions until each pivot has changed by a factor.
 fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
     let mut moved = x.to_vec();
     for (column, factor) in moves {
@@ -200,7 +201,7 @@ fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
             match kind {
                 Kind::Product if x != 0.0 => *moved *= factor.powf(change / x * pivot / own),
                 Kind::Product => {}
-                // The change is as large as the size already.
+                // The change is already as large as the size.
                 Kind::Sum => *moved += (factor.min(FACTOR) - 1.0) * change,
             }
         }
@@ -208,7 +209,7 @@ fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
     moved
 }
 
-/// Moves `x` along directions to the least change from `start` in units of `size`.
+/// Moves `x` along directions to the smallest change from `start` in units of `size`.
 pub(super) fn nearest(x: &mut [f64], start: &[f64], columns: &[&[f64]], size: &[f64]) {
     let count = columns.len();
     let scaled: Vec<Vec<f64>> =

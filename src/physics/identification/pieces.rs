@@ -1,6 +1,6 @@
-//! Pieces of recorded motion between long gaps, each sample with a position and a velocity to start from.
+//! Pieces of recorded motion between long gaps; each sample has a position and a velocity for an initial state.
 //!
-//! Smoothing does not reach across a long gap, but the equations of motion do: pieces are only where the search begins.
+//! Smoothing does not reach across a long gap, but the equations of motion do: pieces matter only at the beginning of the search.
 
 use super::follow::Segment;
 use super::stages::thinned;
@@ -11,29 +11,29 @@ use crate::recording::survey::{Stillness, stillness};
 use crate::recording::{Clock, Filled, RecordedTrajectory, Recording};
 use std::ops::Range;
 
-/// Samples that are needed of all trajectories together.
+/// Smallest number of samples in all trajectories together.
 const LEAST_SAMPLES: usize = 12;
-/// Samples of a piece that is smoothed.
+/// Smallest number of samples in a piece that is smoothed.
 const SMOOTHED: usize = 12;
-/// Samples of a first segment at least.
+/// Smallest number of samples in a first segment.
 pub(super) const LEAST_SEGMENT: usize = 6;
-/// Samples of a trajectory that has something to say: two are taken by its start.
+/// Smallest number of samples in a useful trajectory: its initial state uses up two.
 const LEAST_TRACK: usize = 3;
 
 /// A piece of a trajectory.
 pub(super) struct Piece {
     pub track: usize,
     pub samples: Range<usize>,
-    /// Its number among the long ones.
+    /// Its number among the long pieces.
     long: Option<usize>,
 }
 
-/// The pieces of a recording in order.
+/// The pieces of a recording, in order.
 pub(super) struct Pieces<'a> {
     recording: &'a Recording,
-    /// Pieces of a recording, those of one trajectory after each other.
+    /// Pieces of a recording, trajectory by trajectory.
     all: Vec<Piece>,
-    /// The long pieces as trajectories of their own, of repeated measurements the first, with the trajectory and the samples they come from.
+    /// The long pieces as separate trajectories, with the trajectory and the samples they come from; of repeated measurements only the first.
     pub long: Recording,
     origin: Vec<(usize, Vec<usize>)>,
     /// Their motion, if there are any.
@@ -45,12 +45,12 @@ pub(super) struct Pieces<'a> {
     pub noise: Vec<f64>,
     /// The same by trajectory, each estimated from its own pieces.
     pub noise_of: Vec<Vec<f64>>,
-    /// What is to be said of the coordinates that stand still.
+    /// Messages about coordinates that stand still.
     pub still: Vec<String>,
 }
 
 impl<'a> Pieces<'a> {
-    /// Of a recording, whose held readings are `filled` in.
+    /// From a recording; `filled` contains it with its held readings interpolated.
     pub fn new(
         recording: &'a Recording,
         filled: Option<&Filled>,
@@ -59,7 +59,7 @@ impl<'a> Pieces<'a> {
         let n = recording.n();
         let (mut all, mut parts) = (Vec::new(), Vec::new());
         for (track, recorded) in recording.tracks.iter().enumerate().filter(|(_, t)| t.len() >= LEAST_TRACK) {
-            // A state that was measured again is one state.
+            // Repeated measurements of a state count once.
             let distinct: Vec<usize> =
                 (0..recorded.len()).filter(|&k| k == 0 || recorded.times[k] > recorded.times[k - 1]).collect();
             let times: Vec<f64> = distinct.iter().map(|&k| recorded.times[k]).collect();
@@ -85,7 +85,7 @@ impl<'a> Pieces<'a> {
             origin.push((piece.track, states.clone()));
         }
         let choices = SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() };
-        // Short pieces tell of the noise, but are not smoothed.
+        // Short pieces help to estimate the noise, but are not smoothed.
         let chosen = (!long.tracks.is_empty()).then(|| Smoothing::choose(&long, &choices)).transpose();
         let smoothing = match chosen {
             Ok(smoothing) => smoothing,
@@ -107,13 +107,14 @@ impl<'a> Pieces<'a> {
         let noise_of = (0..recording.tracks.len()).map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
         let still = smoothing.as_ref().map_or_else(Vec::new, |smoothing| stillness(&long, smoothing));
         let still = still.into_iter().filter(|(_, how)| !matches!(how, Stillness::Copy(_)));
-        let still =
-            still.map(|(i, how)| format!("{} {how}; nothing can be learned of it", recording.coordinates[i])).collect();
+        let still = still
+            .map(|(i, how)| format!("{} {how}; nothing can be learned about it", recording.coordinates[i]))
+            .collect();
         let smooth =
             |track: &RecordedTrajectory| smoothing.as_ref().map(|smoothing| smoothing.apply(track)).transpose();
         let mut smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
         if let Some(filled) = filled {
-            // Smoothed values weigh the readings around held ones as if these were missing.
+            // Smoothed values weight the readings around held ones as if the held ones were missing.
             for ((track, smoothed), (from, samples)) in long.tracks.iter_mut().zip(&smoothed).zip(&origin) {
                 let held = samples.iter().flat_map(|k| &filled.held[*from][k * n..(k + 1) * n]);
                 let values = smoothed.iter().flat_map(|smoothed| &smoothed.q);
@@ -125,7 +126,7 @@ impl<'a> Pieces<'a> {
         Ok(Self { recording, all, long, origin, smoothing, smoothed, step, noise, noise_of, still })
     }
 
-    /// Trajectory and sample of a sample of a long piece.
+    /// Trajectory and sample index of a sample of a long piece.
     pub fn origin(&self, track: usize, sample: usize) -> (usize, usize) {
         let (from, samples) = &self.origin[track];
         (*from, samples[sample])
@@ -146,14 +147,14 @@ impl<'a> Pieces<'a> {
         thinned(self.smoothed.iter().enumerate().filter_map(of).flatten().collect())
     }
 
-    /// First samples behind long gaps, by trajectory.
+    /// First samples after long gaps, by trajectory.
     pub fn gaps(&self) -> Vec<Vec<usize>> {
         let mut gaps = vec![Vec::new(); self.recording.tracks.len()];
         self.all.iter().filter(|piece| piece.samples.start > 0).for_each(|p| gaps[p.track].push(p.samples.start));
         gaps
     }
 
-    /// Segments of about so many samples. Pieces of few samples are one segment with those behind them.
+    /// Segments of about so many samples. A short piece forms one segment with the pieces after it.
     pub fn cut(&self, samples: usize) -> Vec<Segment> {
         let mut segments: Vec<Segment> = Vec::new();
         for pieces in self.all.chunk_by(|one, next| one.track == next.track) {
@@ -191,7 +192,7 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// Some samples of a trajectory.
+/// A range of samples of a trajectory.
 fn part(track: &RecordedTrajectory, samples: &[usize], n: usize) -> RecordedTrajectory {
     let rows = |values: &[f64]| match values.is_empty() {
         true => Vec::new(),
@@ -202,7 +203,7 @@ fn part(track: &RecordedTrajectory, samples: &[usize], n: usize) -> RecordedTraj
     RecordedTrajectory { name, times, q, v, a: rows(&track.a), force: rows(&track.force) }
 }
 
-/// Median step within pieces, or over their gaps if these are all there is.
+/// Median step within pieces, or across their gaps if there are no other steps.
 fn usual_step(parts: &[(RecordedTrajectory, Vec<usize>)]) -> f64 {
     let mut steps: Vec<f64> =
         parts.iter().flat_map(|(part, _)| part.times.windows(2).map(|pair| pair[1] - pair[0])).collect();
@@ -210,8 +211,8 @@ fn usual_step(parts: &[(RecordedTrajectory, Vec<usize>)]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Position and velocity at a sample by a polynomial of the second degree through all samples of its piece and, if these are few, those
-/// nearest to it in time.
+/// Position and velocity at a sample by a quadratic polynomial through all samples of its piece and, if these are few, the samples nearest to it
+/// in time.
 fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usize>) -> Vec<f64> {
     let (mut first, mut end) = (piece.start.min(sample), piece.end.max(sample + 1));
     let now = track.times[sample];
@@ -229,7 +230,7 @@ fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usiz
             (0..n).for_each(|c| rights[c][i] += row[i] * track.q[k * n + c]);
         }
     }
-    // Of fewer than three times the smallest polynomial.
+    // Pieces of fewer than three times the smallest polynomial.
     (0..3).for_each(|i| matrix[4 * i] += 1e-9);
     let mut start = vec![0.0; 2 * n];
     for (i, right) in rights.iter().enumerate() {

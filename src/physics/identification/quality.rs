@@ -1,4 +1,4 @@
-//! Residuals: whether they are noise, and which samples stand out.
+//! Tests of residuals: whether they are noise, and which samples are outliers.
 
 use super::follow::{LANES, Segment};
 use super::found::{Outlier, Residual};
@@ -8,27 +8,27 @@ use super::verdict::Verdict;
 use crate::recording::robust_deviation;
 use crate::scalar::Real;
 
-/// Size of residuals over the noise up to which a form explains what was measured.
+/// Largest ratio of residuals to noise at which a model fits.
 pub(super) const EXPLAINED: f64 = 1.3;
-/// Probability below which independent residuals of the right form are not believed to be as correlated as those that were found. Of right
-/// forms this test and that of [`DIFFERENT`] refuse one and a half in a hundred.
+/// Significance level of the test that residuals are independent. Together with [`DIFFERENT`] it rejects one and a half in a hundred correct
+/// models.
 pub(super) const CHANCE: f64 = 0.01;
-/// Probability below which parts of a recording are not believed to have the same constants, nor to continue each other.
+/// Significance level of the tests that segments have the same constants and continue each other.
 const DIFFERENT: f64 = 0.0025;
-/// Residual over the spread of what is met from which on there is more noise than anything else.
+/// Residual over the spread of the fitted quantity above which the noise dominates.
 const NOISY: f64 = 0.5;
-/// Times the precision of the integration that motion made by another integrator is off, and size of residuals over the noise up to which they may
-/// be its error: that is smooth, but no more so than what passes for noise in the differences of neighbouring samples.
+/// How many times the precision of the integration motion from another integrator may be off, and the largest residual over the noise that this
+/// may explain: such an error is smooth, but no smoother than noise estimated from differences of neighbouring samples.
 const COARSER: f64 = 40.0;
 const ALMOST_NOISE: f64 = 4.0;
-/// Share of samples that may stand out.
+/// Largest share of outliers.
 const FEW: f64 = 0.01;
-/// Residuals this many times the usual one stand out.
+/// A sample is an outlier if its residual is this many times the typical one.
 pub(super) const FAR: f64 = 5.5;
-/// Samples that stand out, listed at most.
+/// Largest number of outliers that are listed.
 const MOST_LISTED: usize = 100;
-/// Lags of the test of independence. A missing term is correlated over many samples, and a sum over as many lags shows it best; more than these
-/// find no more (`lnn-studies rates --part identify`).
+/// Lags of the test of independence. A missing term is correlated over many samples, and a sum over as many lags detects it best; more lags
+/// detect no more (`lnn-studies rates --part identify`).
 const LAGS: usize = 20;
 
 /// Probability that a variable of the F distribution with these degrees of freedom is larger: Paulson's normal approximation of its cube root
@@ -40,18 +40,18 @@ pub(super) fn tail(ratio: f64, first: f64, second: f64) -> f64 {
     Real::erfc(z / std::f64::consts::SQRT_2) / 2.0
 }
 
-/// How the residuals of a coordinate follow each other.
+/// Autocorrelation of the residuals of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Correlation {
-    /// Correlation of neighbours.
+    /// Autocorrelation at lag 1.
     pub neighbours: f64,
     /// Probability that independent residuals are as correlated (Ljung and Box, Biometrika 65 (1978) 297).
     pub probability: f64,
-    /// Samples over which residuals are plainly correlated.
+    /// Number of samples over which residuals are clearly correlated.
     pub length: usize,
 }
 
-/// Correlation of runs of numbers, of which those that are missing are `NaN`.
+/// Autocorrelation of runs of numbers, where missing ones are `NaN`.
 pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
     let (squares, count) = runs
         .iter()
@@ -60,7 +60,7 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
         .fold((0.0, 0.0), |(sum, count): (f64, f64), x| (sum + x * x, count + 1.0));
     let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
     let square = squares / count.max(1.0);
-    // The correlation at a lag in units of its scatter, and the number of pairs.
+    // The correlation at a lag in units of its standard deviation, and the number of pairs.
     let at = |lag: usize| {
         let pairs = runs.iter().flat_map(|run| run.iter().zip(run.iter().skip(lag)));
         let (sum, pairs) = pairs
@@ -80,7 +80,7 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
     }
 }
 
-/// Innovations of every coordinate along segments that start anywhere: those of the right form are independent, of variance 1.
+/// Innovations of every coordinate along segments with unknown initial states: for a correct model they are independent, with variance 1.
 pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<Vec<f64>>> {
     let n = problem.sigma.len();
     let mut open = problem.clone();
@@ -96,14 +96,14 @@ pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]
     found
 }
 
-/// Standard deviation of the residuals of a coordinate by the median of their size, which samples that stand out do not move.
+/// Standard deviation of the residuals of a coordinate by the median of their size, which is robust against outliers.
 pub(super) fn usual(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> f64 {
     let own = residuals.iter().flat_map(|segment| segment.iter().skip(coordinate).step_by(n));
     let mut sizes: Vec<f64> = own.copied().collect();
     if sizes.is_empty() { 0.0 } else { robust_deviation(&mut sizes) }
 }
 
-/// Samples far from the motion, the farthest first, and the number of all of them.
+/// Outliers, the farthest first, and their number.
 pub(super) fn outliers(
     (segments, residuals): (&[Segment], &[Vec<f64>]),
     n: usize,
@@ -137,27 +137,27 @@ pub(super) fn mean_eigenvalue(matrix: &[f64], n: usize) -> f64 {
     (0..n).map(|k| matrix[k * n + k]).sum::<f64>() / n.max(1) as f64
 }
 
-/// What speaks for a form and against it.
+/// Evidence for and against a model.
 pub(super) struct Evidence<'a> {
     pub converged: bool,
-    /// By coordinate, with its noise and its spread, which is 0 where nothing is to be compared with.
+    /// By coordinate, with its noise and its spread; a spread of 0 means that there is nothing to compare with.
     pub residuals: &'a [Residual],
-    /// Size of the residuals of every coordinate that samples far from the motion do not move.
+    /// Size of the residuals of every coordinate, robust against outliers.
     pub sizes: Vec<f64>,
-    /// The same that integration and rounding leave.
+    /// The same size due to integration and rounding alone.
     pub exact: Vec<f64>,
-    /// Probability that independent residuals are as correlated, by coordinate, whichever of all it is.
+    /// Probability that independent residuals are as correlated, for each coordinate, corrected for the number of coordinates.
     pub probabilities: Vec<f64>,
-    /// Share of samples far from the motion.
+    /// Share of outliers.
     pub outliers: f64,
-    /// Probability that noise makes parts of the recording differ as much.
+    /// Probability that noise makes the constants of segments differ as much.
     pub agreement: f64,
-    /// Probability that noise keeps segments from continuing each other as they do, and their usual length in s.
+    /// Probability that noise causes the discontinuities between segments, and their typical length in s.
     pub continuation: (f64, f64),
 }
 
 impl Evidence<'_> {
-    /// Nothing is held against residuals that are as small as integration and rounding let them be.
+    /// Accepts residuals that are as small as integration and rounding allow.
     pub fn verdict(&self) -> Verdict {
         let all = |times: f64| self.sizes.iter().zip(&self.exact).all(|(size, exact)| *size <= times * exact);
         let near = |(size, residual): (&f64, &Residual)| *size <= ALMOST_NOISE * residual.noise;
@@ -170,7 +170,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// What is held against the form first.
+    /// The first objection to the model.
     fn refusal(&self) -> Option<Verdict> {
         let share = |i: usize| {
             let spread = self.residuals[i].spread;

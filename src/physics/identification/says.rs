@@ -1,22 +1,22 @@
-//! What is said of identified constants.
+//! Report of identified constants.
 
 use super::found::{Bodies, Combination, Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
 use crate::findings::Findings;
 use crate::names::{number, pluralize, rounded};
 
-/// Outliers and correlations that are listed.
+/// Largest number of outliers and correlations that are listed.
 const SHOWN: usize = 10;
-/// Correlations of errors that are listed.
+/// Smallest correlation of errors that is listed.
 const CORRELATED: f64 = 0.9;
 
 impl Identified {
-    /// The constants, what is not determined, the residuals and the verdict, in tables and sentences.
+    /// The constants, the undetermined combinations, the residuals and the verdict, as tables and sentences.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.lines(&self.obstacles);
         self.say_constants(&mut findings);
         for Undetermined { text, cure, .. } in &self.undetermined {
-            findings.gap().line(text).line(format!("  what would determine it: {cure}"));
+            findings.gap().line(text).line(format!("  advice: {cure}"));
         }
         if let Some(text) = self.bodies.as_ref().and_then(Bodies::text) {
             findings.gap().line(text);
@@ -26,7 +26,10 @@ impl Identified {
         let headers = [what, "residual", "noise", "spread", "autocorrelation", ""];
         findings.gap().table(&headers, self.residuals.iter().map(Residual::row)).line(self.verdict.to_string());
         if !self.converged {
-            findings.line(format!("{} times the variance of the noise is left to gain", number(self.decrement)));
+            findings.line(format!(
+                "the next step would still reduce the sum of squares by {} times the variance of the noise",
+                number(self.decrement)
+            ));
         }
         findings.line(self.extent());
         self.say_outliers(&mut findings);
@@ -34,7 +37,7 @@ impl Identified {
     }
 
     fn say_constants(&self, findings: &mut Findings) {
-        // Where sums are known, constants that they alone tell have no row of their own.
+        // Where sums are determined, constants that are known only within sums have no row of their own.
         let alone = |c: &&Constant| self.combinations.is_empty() || c.standard_error.is_some();
         let constants = self.constants.iter().filter(alone).map(Constant::row);
         let headers = ["constant", "value", "standard error", "unit", "start"];
@@ -64,7 +67,7 @@ impl Identified {
         }
     }
 
-    /// How much was followed, and how forces were taken.
+    /// How much motion was used, and how forces were interpolated.
     fn extent(&self) -> String {
         let mut text = pluralize(self.samples, "sample", "samples");
         if self.segments > 0 {
@@ -77,7 +80,7 @@ impl Identified {
         }
         if !self.force_noise.is_empty() {
             let sizes: Vec<String> = self.force_noise.iter().map(|size| rounded(*size, 2)).collect();
-            text += &format!(", noise of forces {}", sizes.join(", "));
+            text += &format!(", force noise {}", sizes.join(", "));
         }
         text
     }
@@ -90,11 +93,11 @@ impl Identified {
         let samples = pluralize(self.outlier_count, "sample", "samples");
         let headers = ["trajectory", "row", "t", "coordinate", "residual / typical"];
         let rows = self.outliers.iter().take(SHOWN).map(Outlier::line);
-        findings.gap().line(format!("{samples} far from the motion{advice}")).table(&headers, rows);
+        findings.gap().line(format!("{samples} far from the fitted motion{advice}")).table(&headers, rows);
     }
 }
 
-/// A value with the digits that its error leaves it, and the error.
+/// A value with the digits that its standard error justifies, and the error.
 fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
     let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
         return [rounded(value, 4), "-".to_string()];
@@ -137,19 +140,19 @@ impl Outlier {
 }
 
 impl Bodies {
-    /// What became of the inertias of links; nothing where they already were those of bodies.
+    /// How the inertias of links were made physical; nothing if they already were.
     fn text(&self) -> Option<String> {
         let Self { moved, largest_change, exist } = self;
         let links = moved.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
         let change = rounded(*largest_change, 2);
         match (moved.is_empty(), exist) {
             (true, true) => None,
-            (true, false) => Some("no bodies have the constants that are given".to_string()),
+            (true, false) => Some("no physical bodies have the given constants".to_string()),
             (false, false) => Some(format!(
-                "no bodies have these sums within their errors: the nearest ones are {change} standard errors away; is the form complete?"
+                "no physical bodies have these combinations within their errors: the nearest ones differ by {change} standard errors; is the model complete?"
             )),
             (false, true) => Some(format!(
-                "the constants of links {links} are the nearest to the start that bodies have; known sums change by {change} standard errors at most"
+                "the constants of links {links} are the physically possible ones nearest to the start; determined combinations change by at most {change} standard errors"
             )),
         }
     }

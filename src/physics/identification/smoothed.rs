@@ -1,4 +1,4 @@
-//! Constants by least squares on smoothed motion: on its accelerations, where the fit through the motion begins, or on known forces.
+//! Least-squares fits to smoothed motion: to its accelerations, where the fit to the motion begins, or to known forces.
 
 use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
@@ -6,13 +6,13 @@ use super::solve::{Normal, Problem};
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
 
-/// States at most.
+/// Largest number of states.
 const MOST_STATES: usize = 12_000;
 /// Errors beyond so many standard deviations count linearly.
 const HUBER: f64 = 3.0;
 const ITERATIONS: usize = 60;
 
-/// States with their accelerations, `(states, n)`, and the errors to expect of these.
+/// States with their accelerations, `(states, n)`, and the expected errors of these.
 #[derive(Default)]
 pub(super) struct States {
     pub q: Vec<f64>,
@@ -22,17 +22,17 @@ pub(super) struct States {
     pub a_error: Vec<f64>,
     /// Trajectory and sample of every state.
     pub places: Vec<(usize, usize)>,
-    /// One over the errors of what is met: of the accelerations, or of the forces.
+    /// Inverse errors of the fitted quantity: of the accelerations, or of the forces.
     pub weight: Vec<f64>,
-    /// Samples from a state to the next one.
+    /// Number of samples between states.
     pub stride: usize,
-    /// States to either side over which equations of forces are averaged, twice: weights are a triangle.
+    /// Number of states on either side over which force equations are averaged, twice: the weights form a triangle.
     pub averaged: usize,
-    /// Weights of the equations of forces in averages, `(states, n)`; empty for equal ones.
+    /// Weights of the force equations in averages, `(states, n)`; empty for equal weights.
     pub share: Vec<f64>,
 }
 
-/// What is met.
+/// What the constants are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Met {
     Accelerations,
@@ -40,7 +40,7 @@ pub(super) enum Met {
 }
 
 impl States {
-    /// Of the samples with full windows.
+    /// From the samples with full windows.
     pub fn new(problem: &Problem<'_>, smoothed: &[Option<Smoothed>]) -> Self {
         let n = problem.course.equations.n;
         let (mut states, mut force) = (Self::default(), vec![0.0; n]);
@@ -66,7 +66,7 @@ impl States {
             }
         }
         states.weight = states.a_error.iter().map(|error| error.max(1e-300).recip()).collect();
-        // One sample that happens to look exact does not outweigh all others.
+        // A single sample that happens to look exact must not outweigh all others.
         let mut sorted = states.weight.clone();
         sorted.sort_by(f64::total_cmp);
         let most = 5.0 * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
@@ -78,7 +78,7 @@ impl States {
         self.q.len() / n
     }
 
-    /// Calls `visit` with every batch of states: what follows it, its place among the numbers, and its accelerations by constants `x`.
+    /// Calls `visit` with every batch of states: the integrator, the batch's offset among the numbers, and its accelerations for constants `x`.
     pub fn batches(
         &self,
         problem: &Problem<'_>,
@@ -99,7 +99,7 @@ impl States {
         }
     }
 
-    /// Residuals of what is met with their slopes by the constants, some states at a time: `visit(first number, residuals, slopes)`.
+    /// Residuals with their slopes by the constants, in batches of states: `visit(first number, residuals, slopes)`.
     fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
         let (n, values) = (problem.course.equations.n, problem.parameters(x));
         let width = 2 * n + problem.course.chosen;
@@ -133,11 +133,11 @@ impl States {
         }
     }
 
-    /// Means over neighbouring states of every trajectory, of what has as many numbers for each equation of force, `(states, n, numbers)`.
+    /// Means over neighbouring states of every trajectory; each force equation has several numbers, `(states, n, numbers)`.
     ///
-    /// What is averaged are the equations, forces and all, which hold as well as each of them does: the noise of accelerations is gone from
-    /// the regressors before these are squared, so that least squares are hardly biased by it, and polynomials may be of a degree that misses
-    /// nothing. Robots are identified like this ("parallel filtering", Gautier, IEEE ICRA 1997).
+    /// Averages of equations, forces included, hold as well as the equations themselves: the noise of accelerations is averaged out of the
+    /// regressors before these are squared, so that least squares are hardly biased by it, and the polynomials may have a degree that misses
+    /// nothing. Robots are identified this way ("parallel filtering", Gautier, IEEE ICRA 1997).
     fn average(&self, n: usize, values: &mut [f64]) {
         let (states, half) = (self.places.len(), self.averaged);
         if half == 0 || values.is_empty() {
@@ -170,7 +170,7 @@ impl States {
         failed.into_iter().for_each(|at| values[at * width..(at + 1) * width].fill(f64::NAN));
     }
 
-    /// Normal equations of what is met, with the right-hand sides of batches of states; `None` where no residual is finite.
+    /// Normal equations, with the right-hand sides of batches of states; `None` where no residual is finite.
     pub fn normal(&self, problem: &Problem<'_>, x: &[f64], met: Met) -> Option<Normal> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
         let mut normal = Normal::empty(m);
@@ -201,7 +201,7 @@ impl States {
         (normal.count > 0.0).then_some(normal)
     }
 
-    /// Residuals of force, `(states, n)`, and their averages.
+    /// Force residuals, `(states, n)`, and their averages.
     pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> [Vec<f64>; 2] {
         let mut all = vec![0.0; self.q.len()];
         self.batches(problem, x, |follower, range, _| follower.lacking_forces(&self.a[range.clone()], &mut all[range]));
@@ -210,7 +210,7 @@ impl States {
         [all, averages]
     }
 
-    /// Moves constants to where smoothed motion is met best; the normal equations there, `None` if no residual is finite.
+    /// Fits constants to the smoothed motion; returns the normal equations there, `None` if no residual is finite.
     pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> Option<Normal> {
         let mut best = self.normal(problem, x, met)?;
         let given = if met == Met::Forces { &self.force } else { &self.a };
@@ -237,7 +237,7 @@ impl States {
     }
 }
 
-/// Sums over `half` rows of so many numbers to either side.
+/// Moving sums over `half` rows on either side.
 fn sums(rows: &mut [f64], size: usize, half: usize) {
     let given = rows.to_vec();
     let row = |at: usize| given.get(at * size..(at + 1) * size);

@@ -1,6 +1,6 @@
-//! Multiple shooting: constants and the starts of all segments by Levenberg and Marquardt's method.
+//! Multiple shooting: fits constants and the initial states of all segments by Levenberg and Marquardt's method.
 //!
-//! Every segment has a start of its own, which is eliminated from the normal equations.
+//! Every segment has an initial state of its own, which is eliminated from the normal equations.
 
 use super::descent::{FAILED, RIDGE};
 use super::follow::{Course, Follower, LANES, Segment, State};
@@ -11,12 +11,12 @@ use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 use std::f64::consts::TAU;
 
-/// Residuals beyond so many standard deviations count linearly where that is asked for.
+/// Residuals beyond so many standard deviations count linearly if the user chose so.
 pub(super) const HUBER: f64 = 3.0;
-/// Rounds in which starts follow other unknowns.
+/// Number of rounds in which initial states are adapted to other unknowns.
 const SETTLING: usize = 6;
 
-/// Part of normal equations of a constant that is as good as given.
+/// Share of the normal equations of a constant that counts as given.
 const GIVEN: f64 = 1e100;
 
 /// A constant of a sensor: measured positions are `gain q(t - delay) + offset`.
@@ -41,7 +41,7 @@ impl Sensor {
     }
 }
 
-/// Unknowns of the fit beside starts, and how residuals are weighed.
+/// Unknowns of the fit other than initial states, and the weights of residuals.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
     pub course: Course<'a>,
@@ -53,23 +53,23 @@ pub(crate) struct Problem<'a> {
     pub sensors: Vec<Sensor>,
     /// Standard deviation of every coordinate's noise.
     pub sigma: Vec<f64>,
-    /// The same by trajectory where these differ; empty if they do not.
+    /// The same by trajectory if trajectories differ; otherwise empty.
     pub sigma_of: Vec<Vec<f64>>,
-    /// The same of every sample where they are known, `(samples, n)` by trajectory; empty if they are not.
+    /// The same for every sample if known, `(samples, n)` by trajectory; otherwise empty.
     pub errors: &'a [Vec<f64>],
-    /// First samples behind long gaps, by trajectory: which turn an angle is in there is not known.
+    /// First samples after long gaps, by trajectory: there the number of turns of an angle is unknown.
     pub gaps: Vec<Vec<usize>>,
     /// Spread of every coordinate over all samples.
     pub spread: Vec<f64>,
     pub robust: bool,
-    /// What moves the motion beside the equations.
+    /// Disturbances of the motion that the equations do not contain.
     pub disturbances: Disturbances,
     pub threads: usize,
-    /// Ends every loop.
+    /// Cancels every loop.
     pub cancellation: Cancellation,
 }
 
-/// Normal equations of a segment: start, constants, sensors.
+/// Normal equations of a segment: initial state, constants, sensors.
 #[derive(Clone, Debug)]
 pub(crate) struct Linear {
     pub(super) matrix: Vec<f64>,
@@ -78,37 +78,37 @@ pub(crate) struct Linear {
     pub count: f64,
 }
 
-/// Normal equations of constants and sensors, starts eliminated.
+/// Normal equations of constants and sensors, with initial states eliminated.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Normal {
     pub matrix: Vec<f64>,
     pub right: Vec<f64>,
-    /// Diagonal with starts held fixed.
+    /// Diagonal with initial states held fixed.
     pub diagonal: Vec<f64>,
     /// The right-hand side of every segment.
     pub parts: Vec<Vec<f64>>,
     pub square: f64,
-    /// Residuals less the numbers that starts take.
+    /// Number of residuals minus the numbers of initial states.
     pub count: f64,
     pub failed: usize,
-    /// Newton decrement of the starts, for each of their numbers.
+    /// Newton decrement of the initial states, per number.
     pub of_starts: f64,
-    /// Newton decrement over the variance of the noise: the decrease of the sum of squares that is left to gain.
+    /// Newton decrement over the variance of the noise: the decrease of the sum of squares that another step would bring.
     pub decrement: f64,
     /// `true` if that is far below 1.
     pub converged: bool,
-    /// Constants at the bound of their range, beyond which the motion would be met better.
+    /// Constants at the bound of their range, beyond which the fit would be better.
     pub held: Vec<bool>,
 }
 
 impl Normal {
-    /// Of `m` unknowns before the first residual.
+    /// For `m` unknowns, before the first residual.
     pub fn empty(m: usize) -> Self {
         let [right, diagonal] = [(); 2].map(|()| vec![0.0; m]);
         Self { matrix: vec![0.0; m * m], right, diagonal, held: vec![false; m], ..Self::default() }
     }
 
-    /// The same with the constants at their bounds taken for known to far below their least value.
+    /// The same, with constants at their bounds treated as known to far below their least value.
     pub fn with_held(mut self) -> Self {
         let m = self.right.len();
         for k in (0..m).filter(|&k| self.held[k]) {
@@ -124,12 +124,12 @@ impl Problem<'_> {
         self.course.equations.n
     }
 
-    /// Unknowns beside starts.
+    /// Number of unknowns other than initial states.
     pub fn unknowns(&self) -> usize {
         self.chosen.len() + self.sensors.len()
     }
 
-    /// Values of all parameters with those of the unknowns.
+    /// Values of all parameters, including the unknowns.
     pub fn parameters(&self, x: &[f64]) -> Vec<f64> {
         let mut values = self.values.clone();
         self.chosen.iter().zip(x).for_each(|(&k, &x)| values[k] = x);
@@ -155,15 +155,15 @@ impl Problem<'_> {
         }
     }
 
-    /// `true` for a sample of a segment with a long gap before it.
+    /// `true` for a sample of a segment that follows a long gap.
     fn is_beyond_gap(&self, segment: &Segment, sample: usize) -> bool {
         let next = |gaps: &Vec<usize>| gaps.get(gaps.partition_point(|gap| *gap <= segment.first)).copied();
         self.gaps.get(segment.track).and_then(next).is_some_and(|gap| gap <= sample)
     }
 
-    /// Calls `visit(segment, sample, coordinate, residual, row)` along segments: residuals of positions in units of noise, and their
-    /// derivatives by start, constants and sensors of one lane if those are asked for; innovations where something disturbs the motion.
-    /// Gives the sum of the logarithms of the innovations' variances, in units of the noise.
+    /// Calls `visit(segment, sample, coordinate, residual, row)` along segments: residuals of positions in units of noise and, if requested,
+    /// their derivatives by initial state, constants and sensors of one lane; innovations if there are disturbances. Returns the sum of the
+    /// logarithms of the innovations' variances, in units of the noise.
     pub(super) fn residuals(
         &self,
         x: &[f64],
@@ -325,7 +325,7 @@ impl Problem<'_> {
         ends
     }
 
-    /// The normal equations without the starts.
+    /// The normal equations after eliminating the initial states.
     pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment]) -> Normal {
         let (n, m) = (self.n(), self.unknowns());
         let (starts, width) = (2 * n, 2 * n + m);
@@ -365,7 +365,7 @@ impl Problem<'_> {
         normal
     }
 
-    /// Inverse of the part of the start, damped by a part of its diagonal.
+    /// Inverse of the block of the initial state, damped by a share of its diagonal.
     pub(super) fn start_inverse(&self, linear: &Linear, damping: f64) -> Vec<f64> {
         let starts = 2 * self.n();
         let width = starts + self.unknowns();
@@ -377,7 +377,7 @@ impl Problem<'_> {
         inverse_with(starts, &own, RIDGE).unwrap_or_else(|| vec![0.0; starts * starts])
     }
 
-    /// Undamped normal equations at other unknowns, the starts of the segments fitted to them.
+    /// Undamped normal equations at other unknowns, with the initial states of the segments fitted to them.
     pub fn normal_at(&self, x: &[f64], segments: &[Segment]) -> Normal {
         let mut segments = segments.to_vec();
         self.settle(x, &mut segments, SETTLING);

@@ -1,4 +1,4 @@
-//! From smoothed accelerations to longer and longer segments of motion.
+//! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
 
 use super::choices::{check_errors, chosen, met, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
@@ -18,34 +18,34 @@ use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::{Filled, Recording, deviation, filled, rms};
 
-/// Share of independent numbers that starts and constants leave at least.
+/// Smallest share of degrees of freedom that initial states and constants leave.
 const LEAST_LEFT: f64 = 0.25;
-/// Times in which the motion changes that a first segment lasts.
+/// Length of a first segment, in time scales of the motion.
 const PACES: f64 = 2.5;
-/// Samples that are followed at most.
+/// Largest number of samples that are followed.
 const MOST_SAMPLES: usize = 60_000;
-/// Noise over the spread of a coordinate that is taken at least: the equations are integrated so well.
+/// Smallest noise that is assumed, over the spread of a coordinate: the accuracy of the integration.
 const LEAST_NOISE: f64 = 1e-9;
 /// Error of the integrator over the noise.
 const INTEGRATOR: f64 = 0.05;
 const MOST_SUBSTEPS: usize = 64;
-/// Longer segments may be met worse by this factor of the mean square.
+/// Largest factor by which longer segments may increase the mean square.
 const WORSE: f64 = 1.5;
-/// Decrease of the mean logarithm of the errors that longer segments must bring.
+/// Smallest decrease of the mean log standard error that longer segments must bring.
 const GAIN: f64 = 0.01;
-/// Segments from which on their scatter tells how far errors are to be widened.
+/// Smallest number of segments whose scatter is used to widen errors.
 const MANY: usize = 8;
-/// Residual over the spread of a coordinate up to which it is that of the integration, a few times [`LEAST_NOISE`].
+/// Residual over the spread of a coordinate up to which it is due to the integration, a few times [`LEAST_NOISE`].
 const EXACT: f64 = 5.0 * LEAST_NOISE;
 pub(super) const ITERATIONS: usize = 40;
-/// Samples of a trajectory that tell its own noise.
+/// Smallest number of samples from which the noise of a single trajectory is estimated.
 const MANY_SAMPLES: usize = 40;
-/// Logarithm of the noise of a trajectory over that of all from which on it has a noise of its own.
+/// Log ratio of the noise of a trajectory to that of all above which it has a noise of its own.
 const UNLIKE: f64 = 0.25;
-/// Of the last fit, whose constants are the result: one that is not done by then has not converged.
+/// Largest number of steps of the last fit, which gives the result: if it takes more, it has not converged.
 const LAST_ITERATIONS: usize = 200;
 
-/// Constants, sensors and starts with the normal equations there.
+/// Constants, sensors and initial states with the normal equations there.
 #[derive(Clone)]
 pub(super) struct Fitted {
     pub x: Vec<f64>,
@@ -60,14 +60,14 @@ impl Fitted {
         self.normal.square / self.normal.count.max(1.0)
     }
 
-    /// `true` for a fit that arrived at the noise with every constant inside of its range: a better one is not to be expected.
+    /// `true` for a fit that reached the noise with every constant inside its range: no better fit is to be expected.
     fn is_plain(&self) -> bool {
         let inside = !self.normal.held.contains(&true);
         self.normal.converged && inside && self.mean_square() < EXPLAINED * EXPLAINED
     }
 
-    /// Variance of the unknowns over that of independent noise of the given size: the mean square of the residuals, or what the
-    /// scatter of the segments' pulls says if they are alike all along a segment. The second number is the part of the latter.
+    /// Variance of the unknowns over that of independent noise of the given size: the mean square of the residuals, or the scatter of the
+    /// segments' scores if residuals are correlated along a segment. The second number is the share of the latter.
     pub fn inflation(&self) -> (f64, f64) {
         let square = self.mean_square();
         let (m, count) = (self.x.len(), self.normal.parts.len());
@@ -86,8 +86,8 @@ impl Fitted {
         if plain { (square, 1.0) } else { (square * scatter, scatter) }
     }
 
-    /// Mean logarithm of the errors of the unknowns, each with the others fixed; of those whose size is seen, since the others have rounding
-    /// for errors.
+    /// Mean log standard error of the unknowns, each with the others fixed; only of those with a visible effect, since the errors of the others
+    /// are rounding.
     fn spread(&self) -> f64 {
         let m = self.x.len();
         let own = |k: &usize| self.normal.matrix[k * m + k];
@@ -102,7 +102,7 @@ impl Fitted {
 ///
 /// # Errors
 /// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and systems under constraints.
-/// Constants that the motion leaves open are no error, nor is a form that does not explain the motion: the result says so.
+/// Constants that the motion does not determine are not an error, nor is a model that does not fit: the result reports them.
 pub fn identify(
     instance: &SystemInstance<f64>,
     recording: &Recording,
@@ -191,7 +191,7 @@ pub fn identify(
     if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
         refit(&problem, &mut fitted, ITERATIONS);
     }
-    // Noise of the forces is known by now: the smoothest curve through it does not pass for the best.
+    // The noise of the forces is now known, so that the smoothest curve through it does not win.
     let (best, rivals) = best_between(&mut problem, fitted, options, forced);
     fitted = best;
     if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
@@ -205,7 +205,7 @@ pub fn identify(
     stop.stage("longer segments");
     fitted = grown(&mut problem, fitted, options.segment);
     if forced {
-        // Errors of forces add up: longer segments show them best.
+        // Force errors accumulate: longer segments show them best.
         let mut longer = joined(&fitted.segments);
         problem.settle(&fitted.x, &mut longer, 6);
         problem.estimate_force_noise(&fitted.x, &longer);
@@ -228,7 +228,7 @@ pub fn identify(
     let mut found = result(instance, &problem, &fitted, (&start, &noise), known);
     stop.check()?;
     if pieces.still.len() == n {
-        // Of coordinates that all stand still no form is seen to be right.
+        // Coordinates that all stand still cannot confirm a model.
         let coordinate = recording.coordinates[0].clone();
         (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
     }
@@ -237,12 +237,12 @@ pub fn identify(
     Ok(found.named(recording, options.robust))
 }
 
-/// What is to be said of the readings that a sensor repeated.
+/// Messages about readings that a sensor repeated.
 fn repeated(filled: &Filled) -> Vec<String> {
     let recording = &filled.recording;
     let of = |(i, name): (usize, &String)| {
         let (held, samples) = (filled.count(i), recording.samples());
-        let says = "readings repeat the one before while the motion goes on; they are filled in from those around them";
+        let says = "readings repeat the previous one during motion; they were interpolated from their neighbours";
         (held > 0).then(|| format!("{name}: {held} of {samples} {says}"))
     };
     recording.coordinates.iter().enumerate().filter_map(of).collect()
@@ -255,7 +255,7 @@ pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
     if spread > 0.0 { spread } else { 1.0 }
 }
 
-/// Samples of the first segments: some of the times in which the fastest coordinate changes, or as many as are wanted if these are fewer.
+/// Samples of the first segments: a few time scales of the fastest coordinate, or the requested number if that is smaller.
 fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) -> Result<usize, IdentifyError> {
     let size = |values: &[f64], i: usize| deviation(values.iter().skip(i).step_by(n));
     let paces = (0..n).map(|i| size(&states.v, i) / size(&states.a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
@@ -271,7 +271,7 @@ fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) 
     Ok(samples.min(wanted))
 }
 
-/// Segments of as many samples as are followed: runs of segments that follow each other, so that they can be joined later.
+/// Segments up to the number of samples that can be followed: runs of consecutive segments, so that they can be joined later.
 pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
     const RUN: usize = 16;
     let all: usize = segments.iter().map(|segment| segment.samples).sum();
@@ -284,8 +284,8 @@ pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
     segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }
 
-/// The fit of the first segments from either of two starts, the better one; segments that cannot be followed are left out. The second
-/// start is tried where the first one does not arrive at the noise.
+/// The better fit of the first segments from either of two starts; segments that cannot be followed are left out. The second start is tried if
+/// the first one does not reach the noise.
 fn first(problem: &mut Problem<'_>, starts: [Vec<f64>; 2], segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
     let mut best: Option<Fitted> = None;
     for x in starts {
@@ -324,7 +324,7 @@ fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>
     Some(fitted)
 }
 
-/// The better one of a fit with constants at their bounds and of that from the values these were given.
+/// The better of two fits: one with constants at their bounds, and one that restarts these from their given values.
 fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     if !fitted.normal.held.contains(&true) {
         return fitted;
@@ -350,8 +350,7 @@ fn log(fitted: &Fitted, what: &str) {
     tracing::debug!(?x, samples, segments, substeps, square, spread, failed = fitted.normal.failed, "{what}");
 }
 
-/// As many integration steps from sample to sample as keep the integrator's error below a part of the noise; `true` if that changes
-/// their number.
+/// Chooses as many integration steps between samples as keep the integrator's error below a share of the noise; `true` if their number changes.
 pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
     let before = problem.course.substeps;
     let stride = segments.len().div_ceil(32).max(1);
@@ -376,7 +375,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     problem.course.substeps != before
 }
 
-/// Weighs coordinates by the residuals that are left, and those of every trajectory by its own where trajectories plainly differ.
+/// Weights coordinates by their residuals, and trajectories by their own residuals where they clearly differ.
 fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
     let (n, tracks) = (problem.sigma.len(), problem.course.recording.tracks.len());
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
@@ -394,21 +393,21 @@ fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
         let least = (LEAST_NOISE * problem.spread[i]).max(1e-3 * problem.sigma[i]);
         let size = |values: Vec<f64>| (deviation_of(values, problem.robust) / taken.sqrt()).max(least);
         let whole = size(own.iter().skip(i).step_by(n).flatten().copied().collect());
-        // What integration leaves of exact motion is no noise.
+        // Integration errors of exact motion are not noise.
         let noisy = whole > EXACT * problem.spread[i];
         problem.sigma[i] = whole;
         for (track, of) in of.iter_mut().enumerate() {
             let values = &own[track * n + i];
             let count = independent(values);
             of[i] = if values.len() < MANY_SAMPLES { whole } else { size(values.clone()) };
-            // The logarithm of a standard deviation scatters by the root of half a count.
+            // The log of a standard deviation has a standard error of one over the root of twice the count.
             unlike |= noisy && (of[i] / whole).ln().abs() > UNLIKE.max(5.0 / (2.0 * count).sqrt());
         }
     }
     problem.sigma_of = if unlike { of } else { Vec::new() };
 }
 
-/// As many independent numbers as tell a mean square as well as these, by the correlation of neighbours.
+/// Effective number of independent samples for a mean square, by the autocorrelation.
 fn independent(values: &[f64]) -> f64 {
     let square: f64 = values.iter().map(|x| x * x).sum();
     let product: f64 = values.windows(2).map(|pair| pair[0] * pair[1]).sum();
@@ -417,7 +416,7 @@ fn independent(values: &[f64]) -> f64 {
     if share.is_finite() { values.len() as f64 * share } else { 0.0 }
 }
 
-/// Root mean square, or what the median of the size says of normal numbers, which is 0.6745 of it.
+/// Root mean square, or a robust estimate from the median of the size, which is 0.6745 of it for normal numbers.
 fn deviation_of(mut values: Vec<f64>, robust: bool) -> f64 {
     if !robust {
         return rms(values);
@@ -427,7 +426,7 @@ fn deviation_of(mut values: Vec<f64>, robust: bool) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0) / 0.6745
 }
 
-/// Pairs of segments that follow each other as one.
+/// Joins pairs of adjacent segments.
 pub(crate) fn joined(segments: &[Segment]) -> Vec<Segment> {
     let mut joined: Vec<(Segment, bool)> = Vec::new();
     for segment in segments {
@@ -444,7 +443,7 @@ pub(crate) fn joined(segments: &[Segment]) -> Vec<Segment> {
     joined.into_iter().map(|(segment, _)| segment).collect()
 }
 
-/// Both halves of every segment that is long enough, each with a start where the motion passes.
+/// Halves every segment that is long enough; both halves start on the fitted motion.
 fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
     let long = |segment: &&Segment| segment.samples >= 2 * LEAST_SEGMENT;
     let to_middle = |segment: &Segment| Segment { samples: segment.samples / 2 + 1, ..segment.clone() };
@@ -464,7 +463,7 @@ fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
     segments
 }
 
-/// Shorter segments of a form that misses the motion, as long as constants become better known by them: what is missing adds up along a
+/// For a model that does not fit, shortens segments while that reduces the standard errors: the effect of a missing term accumulates along a
 /// segment.
 fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
     while fitted.mean_square() > EXPLAINED * EXPLAINED && !problem.cancellation.is_cancelled() {
@@ -484,7 +483,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
     fitted
 }
 
-/// Longer and longer segments, as long as constants become better known by them.
+/// Joins segments while that reduces the standard errors.
 fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
     let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
     let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * 1.5 < wanted);
@@ -510,7 +509,7 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
     fitted
 }
 
-/// Samples of the usual segment.
+/// Number of samples of a typical segment.
 fn usual_samples(segments: &[Segment]) -> usize {
     let mut samples: Vec<usize> = segments.iter().map(|segment| segment.samples).collect();
     samples.sort_unstable();
@@ -534,7 +533,7 @@ fn result(
     let follow: Vec<Correlation> =
         innovations(problem, &fitted.x, &fitted.segments).iter().map(|runs| correlation(runs)).collect();
     let is_white = |of: &Correlation| of.probability * n as f64 >= CHANCE;
-    // Samples that stand out do not excuse the others.
+    // Outliers do not excuse the other samples.
     let size = |i: usize| usual(&residuals, n, i) * problem.sigma[i] / taken.sqrt();
     let of = |i: usize| {
         let own = residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n).copied());
@@ -554,7 +553,7 @@ fn result(
         size,
     };
     let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
-    // Where a correlation is not seen to end within segments it goes on in the next ones.
+    // A correlation whose end is not seen within segments continues in the next ones.
     let longest = fitted.segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
     let window = |of: &Correlation| if 4 * of.length >= longest { 4 * longest } else { 2 * of.length };
     let lags = follow.iter().filter(|of| !is_white(of)).map(window).max();
@@ -592,7 +591,7 @@ fn result(
         ..unknowns(
             instance,
             problem,
-            // A constant at its bound is known as if it had been given.
+            // A constant at its bound counts as given.
             &Fitted { normal: normal.with_held(), ..fitted.clone() },
             (start, 1.0),
             (Met::Accelerations, &normal_at),
@@ -600,8 +599,8 @@ fn result(
     }
 }
 
-/// The normal equations that know the unknowns as well as the residuals say, and the factor of variances by which correlated residuals
-/// know less than independent ones. Correlated ones have `lags`; with `given` noise residuals count as large as that at least.
+/// Normal equations whose covariance is that of the residuals, and the factor by which correlated residuals increase variances. Correlated
+/// residuals have `lags`; with `given` noise, residuals count as at least that large.
 fn informed(
     problem: &Problem<'_>,
     fitted: &Fitted,
@@ -619,15 +618,15 @@ fn informed(
     };
     let scores = scores(problem, &fitted.x, &fitted.segments);
     let [wide, narrow] = [lags, lags / 2].map(|lags| long_run(&scores, &fitted.segments, m, lags));
-    // A kernel that is 1 over the first half of the lags: noise that is still correlated there counts whole (Politis and Romano, J. Time Series
+    // A kernel that is 1 over the first half of the lags, where correlated noise gets its full weight (Politis and Romano, J. Time Series
     // Analysis 16 (1995) 67).
     let flat: Vec<f64> = wide.iter().zip(&narrow).map(|(wide, narrow)| 2.0 * wide - narrow).collect();
     let mut seen = root.seen(m, &flat);
     seen.iter_mut().for_each(|x| *x *= bread);
     let mean = mean_eigenvalue(&seen, root.forward.len());
     let inflation = (mean / plain).max(1.0);
-    // Starts and constants take as much from a few independent numbers as from many: correlated residuals are smaller than the noise by more than
-    // independent ones.
+    // Initial states and constants use up as many of a few independent numbers as of many: correlated residuals fall below the noise by more
+    // than independent ones.
     let numbers: f64 = fitted.segments.iter().map(|segment| (segment.samples * problem.sigma.len()) as f64).sum();
     let taken = (numbers - fitted.normal.count + m as f64) / numbers;
     let hidden = (1.0 - taken) / (1.0 - taken * inflation).max(LEAST_LEFT);

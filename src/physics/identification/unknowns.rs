@@ -1,4 +1,4 @@
-//! The part of the result about constants and sensors: values, errors, what is open, and what is known nevertheless.
+//! Results for constants and sensors: values, standard errors, undetermined directions, and combinations that are nevertheless determined.
 
 use super::bodies;
 use super::cure::{ByForces, Examiner};
@@ -12,7 +12,7 @@ use super::stages::Fitted;
 use crate::lagrangian::SystemInstance;
 use crate::names::rounded;
 
-/// Factor of a sum below which a constant has no part in it, relative to the effect of the first constant: rounding.
+/// Factor in a sum, relative to the effect of the first constant, below which a constant does not take part in it: rounding.
 const PIVOT: f64 = 1e-5;
 
 /// Names and units of the unknowns.
@@ -21,7 +21,7 @@ struct Names<'a> {
     units: Vec<&'a str>,
 }
 
-/// Normal equations at other unknowns; `None` where there are none.
+/// Normal equations at other unknowns; `None` where they cannot be formed.
 pub(super) type NormalAt<'a> = &'a dyn Fn(&[f64]) -> Option<Normal>;
 
 /// Constants and sensors of a fit that ended at `fitted`; the caller adds the residuals. `normal_at` gives the normal equations at other
@@ -36,7 +36,7 @@ pub(super) fn unknowns(
     let (n, m) = (problem.sigma.len(), fitted.x.len());
     let recording = problem.course.recording;
     let before: Vec<f64> = start.iter().copied().chain(problem.sensors.iter().map(|sensor| sensor.perfect())).collect();
-    // What sums are known says what is open.
+    // The determined sums show what is not determined.
     let is_linear = met == Met::Forces && problem.is_linear(&fitted.segments);
     let from = if is_linear { NOTHING } else { 1.0 };
     let determined = Determined::new(problem, (&fitted.x, &before), &fitted.normal, (variance, from));
@@ -110,7 +110,7 @@ fn kind(kind: SensorKind) -> &'static str {
     }
 }
 
-/// Names in a sentence.
+/// Names joined for a sentence.
 fn listed(names: &[String]) -> String {
     match names.split_last() {
         Some((last, [])) => last.clone(),
@@ -145,7 +145,7 @@ impl Names<'_> {
     }
 }
 
-/// Constants that nothing shows of themselves.
+/// Constants that have no visible effect.
 fn silent(determined: &Determined, names: &Names<'_>, cure: impl Fn(&Group<'_>) -> String) -> Vec<Undetermined> {
     let m = determined.size.len();
     let of = |&k: &usize| {
@@ -164,7 +164,7 @@ fn in_words(relative_error: Option<f64>) -> String {
     relative_error.map(|error| format!(", relative error {error:.1}")).unwrap_or_default()
 }
 
-/// A group of open directions in words.
+/// Describes a group of open directions in words.
 fn described(
     determined: &Determined,
     names: &Names<'_>,
@@ -191,13 +191,13 @@ fn described(
     };
     let text = match (group.inside.len(), known.is_empty(), group.is_named()) {
         (1, ..) => format!("{all} is not determined{error}"),
-        (_, false, true) => format!("{all} are not determined apart{error}, only {}", known_names.join(", ")),
+        (_, false, true) => format!("{all} cannot be separated{error}; determined: {}", known_names.join(", ")),
         (_, true, _) => format!(
-            "{all} are not determined apart{error}: in parts of their size, they may change together, {}",
+            "{all} cannot be separated{error}; relative to their sizes, they can change together: {}",
             numbers()
         ),
         (_, false, false) => format!(
-            "{all} are not determined apart{error}; known are {}: in parts of their size, they may change together, {}",
+            "{all} cannot be separated{error}; determined: {}; relative to their sizes, they can change together: {}",
             known_names.join(", "),
             numbers()
         ),
@@ -205,14 +205,14 @@ fn described(
     Undetermined { constants, directions, known, relative_error, text, cure: examiner.cure(x, group) }
 }
 
-/// What sums alone tell of constants, in words.
+/// Constants that are determined only within sums, in words.
 fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undetermined> {
     let here = match still {
-        [] => "motion that goes farther, faster, or by other joints".to_string(),
-        [single] => format!("motion of {single}, which stands still; else motion that goes farther or faster"),
-        many => format!("motion of {}, which stand still; else motion that goes farther or faster", listed(many)),
+        [] => "record motion that goes farther or faster, or that moves other joints".to_string(),
+        [single] => format!("record motion of {single}, which stands still, or motion that goes farther or faster"),
+        many => format!("record motion of {}, which stand still, or motion that goes farther or faster", listed(many)),
     };
-    let always = "no motion, the forces depend on their sums alone".to_string();
+    let always = "no motion can separate them: the forces depend only on their sums".to_string();
     let told = |(changes, text, cure): (&Vec<Vec<f64>>, &str, String)| {
         let inside = |k: &usize| changes.iter().any(|change| change[*k] != 0.0);
         let constants = names.of(&(0..names.all.len()).filter(inside).collect::<Vec<_>>());
@@ -223,17 +223,17 @@ fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undeter
         (
             &open.silent,
             "have no effect on the forces, whatever the motion",
-            "no motion, nothing depends on it".to_string(),
+            "fix them: no motion depends on them".to_string(),
         ),
-        (&open.always, "appear in the equations in sums alone", always),
+        (&open.always, "appear in the equations only in sums", always),
         (&open.here, "cannot be separated by this motion", here),
     ];
     all.into_iter().filter(|(changes, ..)| !changes.is_empty()).map(told).collect()
 }
 
 /// Sums of constants that determine the forces: the base parameters of a robot (Khalil and Dombre, "Modeling, Identification and Control of
-/// Robots", 2002). Every open change of the constants removes one of them from the list, and adds it to the sums of others. Constants with
-/// short names are removed first, so that masses are added to moments.
+/// Robots", 2002). Every open change of the constants removes one of them from the list and adds it to the sums of others. Constants with short
+/// names are removed first, so that masses are added to moments.
 fn base_parameters(determined: &Determined, names: &Names<'_>, x: &[f64]) -> Vec<Combination> {
     let m = x.len();
     let effect: Vec<f64> = determined.effect.iter().map(|effect| if *effect > 0.0 { *effect } else { 1.0 }).collect();

@@ -1,31 +1,30 @@
-//! What may be said of the form.
+//! Verdicts about the model.
 
 use crate::names::rounded;
 use serde::Serialize;
 use std::fmt::{Display, Formatter, Result};
 
-/// Whether the form explains what was measured, and why not.
+/// Whether the model fits the recording, and if not, why.
 ///
-/// A form explains a recording if all of this holds; the first that does not is named:
-/// the search has converged; residuals are below half of the motion; they are as large as the noise; at most one sample in a hundred lies far
-/// from the motion; residuals do not follow from the earlier ones; segments of the motion agree about the constants, and every second one can start
-/// where the one before it ends.
+/// A model fits a recording if all of the following holds; the verdict names the first condition that fails:
+/// the search has converged; residuals are below half of the motion and as large as the noise; at most one sample in a hundred is an outlier;
+/// residuals are not correlated over time; segments agree about the constants, and every second segment can start where the one before it ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Verdict {
     /// Residuals are consistent with the noise.
     Explained,
-    /// Residuals are as small as integration and rounding let them be.
+    /// Residuals are as small as integration and rounding allow.
     Exact,
     /// The search ended before the best constants were reached.
     #[default]
     NotConverged,
-    /// The noise is half of what is met or more.
+    /// The noise is at least half of the fitted quantity.
     Uninformative {
         /// The coordinate.
         coordinate: String,
-        /// Residual over the spread of what is met.
+        /// Residual over the spread of the fitted quantity.
         share: f64,
     },
     /// Residuals are larger than the noise.
@@ -34,7 +33,7 @@ pub enum Verdict {
         coordinate: String,
         /// Residual over the noise.
         over_noise: f64,
-        /// Residual over the spread of what is met.
+        /// Residual over the spread of the fitted quantity.
         share: f64,
     },
     /// Too many samples are far from the motion.
@@ -42,31 +41,31 @@ pub enum Verdict {
         /// Their share.
         share: f64,
     },
-    /// Residuals follow from the earlier ones.
+    /// Residuals are correlated over time.
     Correlated {
         /// The coordinate.
         coordinate: String,
         /// Probability that independent noise is as correlated by chance.
         probability: f64,
-        /// Residual over the spread of what is met.
+        /// Residual over the spread of the fitted quantity.
         share: f64,
     },
-    /// Parts of the recording ask for different constants.
+    /// Segments disagree about the constants.
     Disagreement {
         /// Probability that noise makes them differ as much.
         probability: f64,
     },
-    /// Parts of the recording do not continue each other.
+    /// Segments do not continue each other.
     Discontinuous {
-        /// Probability that noise makes their ends and starts differ as much.
+        /// Probability that noise causes discontinuities as large.
         probability: f64,
-        /// Their usual length in s.
+        /// Their typical length in s.
         seconds: f64,
     },
 }
 
 impl Verdict {
-    /// `true` if the form explains what was measured.
+    /// `true` if the model fits the recording.
     pub fn explains(&self) -> bool {
         matches!(self, Self::Explained | Self::Exact)
     }
@@ -76,7 +75,7 @@ impl Display for Verdict {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         let percent = |share: f64| format!("{} %", rounded(100.0 * share, 2));
         if !self.explains() && !matches!(self, Self::Uninformative { .. }) {
-            f.write_str("The model does not explain what was measured: ")?;
+            f.write_str("The model does not fit: ")?;
         }
         match self {
             Self::Explained => f.write_str("The model fits: the residuals are consistent with the noise."),
@@ -84,7 +83,7 @@ impl Display for Verdict {
             Self::NotConverged => f.write_str("the search has not converged."),
             Self::Uninformative { coordinate, share } => write!(
                 f,
-                "These data tell nothing of the model: the residual of {coordinate}, {} of its spread, is noise.",
+                "These data cannot test the model: the noise of {coordinate} is {} of its spread.",
                 percent(*share)
             ),
             Self::Large { coordinate, over_noise, share } => write!(
@@ -96,20 +95,18 @@ impl Display for Verdict {
             Self::Outliers { share } => write!(f, "{} of the samples lie far from the model.", percent(*share)),
             Self::Correlated { coordinate, probability, share } => write!(
                 f,
-                "the residuals of {coordinate}, {} of the spread, are correlated over time (probability by chance {}): \
+                "the residuals of {coordinate}, {} of the spread, are correlated over time (p-value {}): \
                  a term is missing, or the noise itself is correlated.",
                 percent(*share),
                 rounded(*probability, 2)
             ),
-            Self::Disagreement { probability } => write!(
-                f,
-                "parts of the recording ask for different constants (probability by chance {}).",
-                rounded(*probability, 2)
-            ),
+            Self::Disagreement { probability } => {
+                write!(f, "the segments disagree about the constants (p-value {}).", rounded(*probability, 2))
+            }
             Self::Discontinuous { probability, seconds } => write!(
                 f,
-                "motion is followed over {} s each, but not on from there (probability by chance {}): \
-                 a slow term is missing, or the noise itself is slow.",
+                "the model follows segments of {} s, but these do not continue each other (p-value {}): \
+                 a slowly acting term is missing, or the noise varies slowly.",
                 rounded(*seconds, 2),
                 rounded(*probability, 2)
             ),

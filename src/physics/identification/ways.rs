@@ -1,21 +1,22 @@
-//! Known forces between the samples: the way that meets the motion best, and what the other ways that meet it as well say of the unknowns.
+//! Interpolation of known forces between the samples: the one that fits the motion best, and how the unknowns differ for others that fit as
+//! well.
 
 use super::found::Identified;
 use super::solve::Problem;
 use super::stages::{Fitted, ITERATIONS, refit};
 use super::{Between, IdentifyOptions};
 
-/// Sum of squares, in units of the variance, by which a way may be worse and still not be excluded: three standard deviations.
+/// Increase of the sum of squares, in units of the variance, up to which an interpolation is not excluded: three standard deviations.
 const RIVAL: f64 = 9.0;
 
-/// Ways that the motion does not exclude beside the best, and the farthest that unknowns are by one of them.
+/// Other interpolations that the motion does not exclude, and the largest difference of the unknowns for one of them.
 #[derive(Default)]
 pub(super) struct Rivals {
     names: Vec<&'static str>,
     farthest: Vec<f64>,
 }
 
-/// The fit by the way that meets the motion best.
+/// The fit with the interpolation of forces that fits the motion best.
 pub(super) fn best_between(
     problem: &mut Problem<'_>,
     fitted: Fitted,
@@ -51,7 +52,7 @@ pub(super) fn best_between(
 }
 
 impl Rivals {
-    /// Widens the errors of the unknowns that rivals say otherwise, and says so of those that are doubled at least.
+    /// Widens the standard errors of unknowns that differ between interpolations, and reports those that at least double.
     pub fn widen(&self, found: &mut Identified) {
         let names = found.constants.iter().map(|c| c.symbol.clone());
         let names: Vec<String> =
@@ -69,9 +70,9 @@ impl Rivals {
         }
         if !doubled.is_empty() {
             let (ways, names) = (self.names.join(", "), doubled.join(", "));
-            found
-                .obstacles
-                .push(format!("forces between the samples may be {ways}: the error of {names} is what that changes"));
+            found.obstacles.push(format!(
+                "forces between the samples may be {ways}: the standard errors of {names} include the difference"
+            ));
         }
     }
 }

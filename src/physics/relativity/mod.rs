@@ -62,7 +62,7 @@ use crate::lagrangian::MechanicsError;
 #[non_exhaustive]
 pub enum RelativityError {
     /// The model is not one of space-time.
-    #[error("expected a metric of a time and three places, found {found} coordinates")]
+    #[error("expected a metric with one time and three spatial coordinates, found {found} coordinates")]
     Coordinates {
         /// Coordinates of the model.
         found: usize,
@@ -77,7 +77,7 @@ pub enum RelativityError {
     },
     /// The metric at the camera is not that of a space-time.
     #[error(
-        "expected a metric with one time and three places at the camera, found {negative} negative and {positive} positive eigenvalues"
+        "expected a metric with one time and three spatial directions at the camera, found {negative} negative and {positive} positive eigenvalues"
     )]
     Signature {
         /// Number of negative eigenvalues.
@@ -86,10 +86,12 @@ pub enum RelativityError {
         positive: usize,
     },
     /// The camera would have to be faster than light.
-    #[error("no camera rests at this place: it is within the ergosurface, or its time is no time there")]
+    #[error(
+        "no camera can be at rest here: the position is inside the ergosurface, or the time coordinate is not timelike there"
+    )]
     NothingRests,
     /// A metric that is another one at another time.
-    #[error("the metric depends on its time, expected one that is the same at all times")]
+    #[error("the metric depends on its time coordinate, expected a stationary metric")]
     DependsOnTime,
     /// A number that makes no picture.
     #[error("{what}: expected {expected}, found {found}")]

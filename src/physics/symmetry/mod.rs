@@ -75,7 +75,7 @@ use crate::lagrangian::MechanicsError;
 #[non_exhaustive]
 pub enum SymmetryError {
     /// Slices of states of unfit lengths.
-    #[error("expected as many velocities as coordinates, whole states of {coordinates}; found {q} and {v} numbers")]
+    #[error("expected whole states of {coordinates} coordinates and as many velocities, found {q} and {v} numbers")]
     Shape {
         /// Number of coordinates of the model.
         coordinates: usize,
@@ -85,7 +85,7 @@ pub enum SymmetryError {
         v: usize,
     },
     /// Terms that are not finite.
-    #[error("the terms of L are finite at {found} of {states} states alone")]
+    #[error("the terms of L are finite at only {found} of {states} states")]
     States {
         /// States asked for.
         states: usize,
@@ -94,7 +94,7 @@ pub enum SymmetryError {
     },
     /// More unknowns than equations.
     #[error(
-        "{unknowns} unknown coefficients need as many states at least, found {states}: more states or a smaller basis"
+        "{unknowns} unknown coefficients need at least as many states, found {states}: use more states or a smaller basis"
     )]
     TooFew {
         /// Unknowns.
@@ -103,7 +103,7 @@ pub enum SymmetryError {
         states: usize,
     },
     /// A basis of too many functions.
-    #[error("{unknowns} unknown coefficients are too many, at most {most}: a smaller basis")]
+    #[error("{unknowns} unknown coefficients are too many, at most {most}: use a smaller basis")]
     TooMany {
         /// Unknowns.
         unknowns: usize,

@@ -139,7 +139,7 @@ impl SymmetrySummary {
             Invariant::Nothing => "no time translation (friction removes energy)",
         };
         let count = match self.count {
-            None => "no gap between singular values, so that the number of symmetries is unknown".to_string(),
+            None => "the singular values have no gap, so that the number of symmetries is unknown".to_string(),
             Some(0) => "no point symmetry in space".to_string(),
             Some(count) => {
                 format!("{}, {}", pluralize(count, "point symmetry", "point symmetries"), self.algebra())
@@ -149,8 +149,8 @@ impl SymmetrySummary {
         if self.singular_states > 0 {
             let (singular, points) = (self.singular_states, self.points);
             let text = format!(
-                "L is degenerate: its mass matrix is singular at {singular} of {points} states and determines no motion there; a null \
-                 direction of it times any function may be a symmetry, so that the number depends on the functions"
+                "L is degenerate: its mass matrix is singular at {singular} of {points} states and does not determine the motion there; a null \
+                 direction times any function may be a symmetry, so that the number of symmetries depends on the basis"
             );
             findings.line(wrap_text(&text, WIDTH).trim_end());
         }
@@ -169,7 +169,7 @@ impl SymmetrySummary {
     fn algebra(&self) -> String {
         match (self.closes, self.closure, self.name.as_deref()) {
             (Some(true), _, Some(name)) => format!("algebra {name}"),
-            (Some(true), ..) => "an algebra without a name".to_string(),
+            (Some(true), ..) => "an algebra that was not recognized".to_string(),
             (_, Some(closure), _) => format!("which do not form an algebra (closure {})", digits(closure)),
             _ => format!("too many for an algebra (at most {MOST_FIELDS})"),
         }

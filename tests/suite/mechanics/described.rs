@@ -233,7 +233,7 @@ fn a_mistake_is_placed_by_line_key_and_column() {
         PENDULUM,
         "name = \"theta\"",
         "name = \"2theta\"",
-        "8: coordinates[0].name: \"2theta\" is no name: expected a letter or _, then letters, digits and _, 64 at most",
+        "8: coordinates[0].name: \"2theta\" is not a valid name: expected a letter or _, then letters, digits and _, 64 at most",
     );
     refused(
         TWO_PENDULA,
@@ -246,7 +246,7 @@ fn a_mistake_is_placed_by_line_key_and_column() {
         TWO_PENDULA,
         "\"l1*theta1_dot\"",
         "\"u2*kinetic\"",
-        "29: definitions.kinetic: it needs itself: kinetic -> u1 -> kinetic",
+        "29: definitions.kinetic: it depends on itself: kinetic -> u1 -> kinetic",
     )
 }
 
@@ -256,7 +256,7 @@ fn metrics_and_definitions_are_checked() {
         BLACK_HOLE,
         "\"r^2\"",
         "\"r^2*t_dot\"",
-        "37: metric.theta,theta: column 5: expected coordinates and parameters alone, `t_dot` is or holds a velocity",
+        "37: metric.theta,theta: column 5: expected only coordinates and parameters, but `t_dot` is or contains a velocity",
     );
     refused(
         BLACK_HOLE,
@@ -336,7 +336,7 @@ fn hostile_files_are_refused_and_large_ones_are_not() {
     let circle: String = (0..200).map(|k| format!("d{k} = \"d{}\"\n", (k + 1) % 200)).collect();
     let (_, problem) = parse_system(&format!("{}\n[definitions]\n{circle}", with("d0"))).map(|_| ()).unwrap_err();
     assert!(
-        problem.starts_with("definitions.d0: it needs itself: d0 -> d1 -> d2") && problem.ends_with(".."),
+        problem.starts_with("definitions.d0: it depends on itself: d0 -> d1 -> d2") && problem.ends_with(".."),
         "{problem}"
     );
     let many: String = (0..300).map(|k| format!("p{k} = 1\n")).collect();

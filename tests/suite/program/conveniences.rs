@@ -96,7 +96,7 @@ fn a_fit_starts_from_a_model_and_holds_nothing_out() {
     assert_eq!((&summary["held_out"], &summary["samples"]), (&"nothing".into(), &serde_json::json!([400, 400, 0])));
     assert!(summary["test_loss"].is_null() && summary["wrong_signature"].is_null() && summary["energy"].is_null());
     assert_eq!(summary["model"], serde_json::json!([]));
-    assert!(fs::read_to_string(folder.path("all/report.html")).unwrap().contains("nothing judges this model"));
+    assert!(fs::read_to_string(folder.path("all/report.html")).unwrap().contains("this model was not tested"));
 
     fit("tuned", &["--from", &out("all"), "--learning-rate", "1e-4"]);
     let weights = |name: &str| ModelFile::<f64>::load(&folder.path(name).join("model.safetensors")).unwrap().weights;

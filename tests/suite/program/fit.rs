@@ -169,7 +169,7 @@ fn the_same_bytes_on_any_number_of_threads() {
     let mut notes = warnings(&data, &COLUMNS);
     assert!(notes.iter().any(|note| note.contains("not look like smooth motion")), "{notes:?}");
     // Of one coordinate friction and Lagrangian are not told apart.
-    let friction = "note: every motion of one coordinate has a Lagrangian: without known forces (--force) L and the friction \
+    let friction = "note: every motion of a single coordinate has a Lagrangian: without known forces (--force) L and the friction \
                     cannot be separated";
     notes.push(friction.to_string());
     let more = ["--targets", "motion", "--friction", "4", "--epochs", "3", "--shooting-epochs", "2", "--threads"];

@@ -292,7 +292,7 @@ fn configurations_are_placed() {
     with("[parameters]", "[parameters]\nm1 = nan", &["m1", "NaN"]);
     with("[parameters]", "[parameters]\nm1 = -1.0", &["m1", "-1"]);
     // No configuration at all.
-    train(b"").refused(2, &["c.toml: system: no system is named"]);
+    train(b"").refused(2, &["c.toml: system: expected a system, here or as an argument"]);
     train(b"\xff\xfe\0").refused(2, &["c.toml: not UTF-8 text"]);
     train(b"\0").refused(2, &["c.toml:1: "]);
     train(format!("a = {}", "[".repeat(100_000)).as_bytes()).refused(2, &["c.toml:1: ", "recurs"]);

@@ -63,7 +63,7 @@ fn a_run_goes_on_with_its_own_system_alone() {
     resume(&folder.file("same.toml", format!("# the same\n{PENDULUM}"))).succeeded();
     // Its configuration with another file.
     let config = text(&folder.path("run/config.toml"));
-    lnn(&["train", "--config", &config, &changed]).refused(2, &["another description of pendulum"]);
+    lnn(&["train", "--config", &config, &changed]).refused(2, &["describes pendulum differently"]);
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn mistakes_name_file_line_key_and_column() {
     }
     lnn(&["train", &text(&folder.path("none.toml"))]).refused(1, &["none.toml"]);
     lnn(&["train", "pendulum"]).refused(2, &["unknown system \"pendulum\""]);
-    lnn(&["train", &folder.file("p.toml", PENDULUM), "--preset", "paper"]).refused(2, &["there is none for pendulum"]);
+    lnn(&["train", &folder.file("p.toml", PENDULUM), "--preset", "paper"]).refused(2, &["pendulum has no such preset"]);
     // A configuration with a broken description.
     let printed = lnn(&["train", &folder.file("p.toml", PENDULUM), "--print-config"]);
     printed.succeeded();

@@ -141,7 +141,7 @@ fn coordinates_that_move_by_themselves_are_named_and_give_no_good_model() {
         (2, &"y".into(), &false.into()),
         "{told}"
     );
-    assert!(told.contains("y moves by itself"), "{told}");
+    assert!(told.contains("y is decoupled"), "{told}");
     let (_, found) = fitted(&folder, oscillators(3.0, 12.0), &["--epochs", "200"]);
     assert!(found.get("groups").is_none(), "{found}");
 }

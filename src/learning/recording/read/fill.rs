@@ -82,7 +82,7 @@ impl Source<'_> {
     fn end(&mut self) -> Result<(), Problem> {
         let more = self.input.read(&mut [0]).map_err(|error| self.broken(error))?;
         if more > 0 && self.whole {
-            let problem = format!("{}more bytes stand behind the numbers than its header says", self.name);
+            let problem = format!("{}there are more bytes after the numbers than its header states", self.name);
             return Err(Problem::Array(problem));
         }
         Ok(())

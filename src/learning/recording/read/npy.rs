@@ -62,14 +62,14 @@ impl Header {
         }
         let mut text = vec![0; length];
         input.read_exact(&mut text).map_err(short)?;
-        let text = String::from_utf8(text).map_err(|_| Problem::Array("the array's header is no text".to_string()))?;
+        let text = String::from_utf8(text).map_err(|_| Problem::Array("the array's header is not text".to_string()))?;
         let header = Self { start: prefix + length as u64, ..Self::parse(&text)? };
         let bytes = (header.rows as u128) * (header.columns as u128) * (header.element.size() as u128);
         let behind = available.saturating_sub(header.start);
         if bytes != u128::from(behind) {
             let (rows, columns) = (header.rows, header.columns);
             return Err(Problem::Array(format!(
-                "the header promises {rows} x {columns} numbers ({bytes} bytes), {behind} bytes stand behind it"
+                "the header promises {rows} x {columns} numbers ({bytes} bytes), {behind} bytes follow it"
             )));
         }
         Ok(header)

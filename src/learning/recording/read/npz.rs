@@ -23,8 +23,8 @@ const ANYWAY: u64 = 1 << 26;
 fn broken(error: ZipError) -> Problem {
     match error {
         ZipError::Io(error) => Problem::Io(error),
-        ZipError::UnsupportedArchive(what) => Problem::Array(format!("an archive that is not read: {what}")),
-        _ => Problem::Array("not a whole archive of arrays".to_string()),
+        ZipError::UnsupportedArchive(what) => Problem::Array(format!("an unsupported archive: {what}")),
+        _ => Problem::Array("an incomplete or damaged archive of arrays".to_string()),
     }
 }
 
@@ -109,8 +109,8 @@ fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = usiz
     }
     if size > ANYWAY.max(compressed.saturating_mul(EXPANSION)) {
         return Err(Problem::Array(format!(
-            "the archive promises {size} bytes of numbers from {compressed}, more than {EXPANSION} times as many: saved \
-             without compression they are read"
+            "the archive promises {size} bytes of numbers from {compressed}, more than {EXPANSION} times as many: save it \
+             without compression"
         )));
     }
     Ok(())

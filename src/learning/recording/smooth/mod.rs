@@ -67,7 +67,7 @@ pub enum SmoothError {
         needed: usize,
     },
     /// A trajectory of another number of coordinates, or without the velocities that the others have.
-    #[error("{track}: positions or velocities are not those of {n} coordinates")]
+    #[error("{track}: expected positions and velocities of {n} coordinates")]
     Shape {
         /// The trajectory.
         track: String,

@@ -22,13 +22,13 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
         }
         if let Some((track, row)) = &c.first_ambiguous {
             all.push(format!(
-                "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: which way is a \
+                "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: the direction is a \
                  guess",
                 pluralize(c.ambiguous_turns, "time", "times")
             ));
         }
         if !c.noise_resolved {
-            all.push(format!("{name}: motion and noise cannot be told apart, the noise is at most what is said"));
+            all.push(format!("{name}: motion and noise cannot be separated, the noise given is an upper bound"));
         }
         if c.samples_per_period < FEW_SAMPLES {
             all.push(format!(

@@ -57,7 +57,7 @@ impl core::fmt::Display for ConstraintError {
             }
             Self::TooMany { independent, coordinates } => write!(
                 f,
-                "{independent} independent constraints leave no motion to {coordinates} coordinates, expected fewer"
+                "{independent} independent constraints leave {coordinates} coordinates no motion, expected fewer"
             ),
             Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected}, found {found}"),
         }

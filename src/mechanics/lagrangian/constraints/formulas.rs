@@ -47,7 +47,7 @@ impl core::fmt::Display for FormulaError {
             Self::Name => f.write_str("constraints: expected names of 1 to 100 characters on one line"),
             Self::Coordinate(name) => write!(
                 f,
-                "constraints: the coordinate {name:?} is no name that a formula can have: expected a letter or _, then letters, digits and _"
+                "constraints: the coordinate {name:?} cannot be a name in a formula: expected a letter or _, then letters, digits and _"
             ),
             Self::Formula { name, error } => write!(f, "constraints.{name}: {error}"),
             Self::Constraints(error) => write!(f, "constraints: {error}"),

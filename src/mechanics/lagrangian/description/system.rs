@@ -165,8 +165,9 @@ impl Description {
         let mut scope = BTreeMap::new();
         let mut add = |key: String, name: &str, meaning: Meaning| {
             if !is_name(name) {
-                let problem =
-                    format!("{name:?} is no name: expected a letter or _, then letters, digits and _, 64 at most");
+                let problem = format!(
+                    "{name:?} is not a valid name: expected a letter or _, then letters, digits and _, 64 at most"
+                );
                 return Err(DescriptionError::new(key, problem));
             }
             if is_reserved(name) {
@@ -220,7 +221,7 @@ impl Description {
             }
             if still.len() == before {
                 let (name, circle) = circle(&still);
-                return Err(DescriptionError::new(key(&name), format!("it needs itself: {circle}")));
+                return Err(DescriptionError::new(key(&name), format!("it depends on itself: {circle}")));
             }
             waiting = still;
         }

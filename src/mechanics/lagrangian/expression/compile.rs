@@ -73,7 +73,7 @@ impl Compiler {
                     let value = self.named(name, scope).map_err(|problem| ExpressionError::new(*column, problem))?;
                     if still && self.moves(value) {
                         let problem =
-                            format!("expected coordinates and parameters alone, `{name}` is or holds a velocity");
+                            format!("expected only coordinates and parameters, but `{name}` is or contains a velocity");
                         return Err(ExpressionError::new(*column, problem));
                     }
                     value

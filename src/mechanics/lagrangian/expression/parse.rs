@@ -156,7 +156,7 @@ impl<'a> Parser<'a> {
                     None => "a product needs a *, as in 2*(a + b)".to_string(),
                 };
                 let shown: String = name.chars().take(40).collect();
-                return Err(ExpressionError::new(column, format!("`{shown}` is no function; {hint}")));
+                return Err(ExpressionError::new(column, format!("`{shown}` is not a function; {hint}")));
             }
         };
         let open = self.next().column;
