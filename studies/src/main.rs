@@ -43,7 +43,7 @@ struct Program {
 enum Study {
     /// Constraints: found in motion, kept, learned under, and what they cost.
     Constraints(constraints::Args),
-    /// Tables and figures of the paper, whole or in shares; without a name, their list.
+    /// Regenerate a table or figure of the paper, or list them.
     Experiment(Box<experiment::Args>),
     /// Formulas found in simulated and in recorded motion.
     Formula(formula::Args),

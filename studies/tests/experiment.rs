@@ -139,10 +139,12 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
     assert_eq!(refused.status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("paper-s-model-seed0: ") && stderr.contains("another configuration"), "{stderr}");
     let curves = format!("x={}", folder.join("curves.csv").display());
-    fs::write(folder.join("curves.csv"), "seconds,validation_loss\n0,1\n1,0.5\n").unwrap();
+    let curve: String = (0..20).map(|k| format!("{k},{}\n", 1.0 / f64::from(k + 1))).collect();
+    fs::write(folder.join("curves.csv"), format!("seconds,validation_loss\n{curve}")).unwrap();
     let refused = lnn(&[&again[..], &["--overwrite", "--beside", &curves]].concat());
     assert_eq!(refused.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("curves.csv: this command reads it"));
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert!(stderr.contains("curves.csv: this command reads it"), "{stderr}");
     assert!(String::from_utf8(read(changed)).unwrap().contains("rate = 0.002"));
     said_by(&lnn(&[&again[..], &["--overwrite"]].concat()));
     assert_eq!(String::from_utf8(read(kept)).unwrap(), marked);

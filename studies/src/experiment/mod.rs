@@ -36,8 +36,8 @@ pub struct Args {
     #[command(flatten)]
     chosen: Chosen,
     /// Threads; as many runs are trained in parallel, and the results do not depend on the number [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=256))]
-    threads: Option<u16>,
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(256))]
+    threads: Option<usize>,
     /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -68,8 +68,8 @@ struct Chosen {
     #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: Scale,
     /// Seeds of every run.
-    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=MOST_SEEDS))]
-    seeds: u16,
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = whole(MOST_SEEDS))]
+    seeds: usize,
     /// Only the runs whose row of the table begins with this text; a later command without it completes the table.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
@@ -178,8 +178,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.list {
         return print_list(all, args.shard, chosen.json);
     }
-    let threads = args.threads.map(usize::from);
-    perform(all, &Orders { threads, shard: args.shard, overwrite: args.overwrite, json: chosen.json })
+    let Args { threads, shard, overwrite, .. } = *args;
+    perform(all, &Orders { threads, shard, overwrite, json: chosen.json })
 }
 
 /// The experiments of a name, or all, with those of their runs that were asked for, if there are any.
@@ -188,9 +188,9 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
         if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
     let own = chosen.own_system()?;
     let runs = |experiment: &Experiment| match &own {
-        None => Ok(experiment.runs(chosen.scale, chosen.seeds.into())),
+        None => Ok(experiment.runs(chosen.scale, chosen.seeds)),
         Some((system, parameters)) => {
-            experiment.runs_of((system, parameters), chosen.scale, chosen.seeds.into()).ok_or_else(|| {
+            experiment.runs_of((system, parameters), chosen.scale, chosen.seeds).ok_or_else(|| {
                 let name = experiment.name;
                 CliError::usage(format_args!("--system: {name} has fixed systems; only black-holes takes another"))
             })
@@ -216,7 +216,15 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
 }
 
 /// Seeds of every run at most: no more than can be listed.
-const MOST_SEEDS: i64 = 10_000;
+const MOST_SEEDS: usize = 10_000;
+
+/// A parser of whole numbers from 1 to `most`.
+fn whole(most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = text.trim().parse().ok().filter(|n| (1..=most).contains(n));
+        number.ok_or_else(|| format!("expected a whole number from 1 to {most}"))
+    }
+}
 
 /// `symbol=value`.
 fn parameter(text: &str) -> Result<(String, String), String> {
