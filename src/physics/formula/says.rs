@@ -5,7 +5,7 @@ use crate::findings::Findings;
 use crate::names::rounded;
 
 impl FoundFormula {
-    /// The verdict, the formula, and a table of its terms; of motion that it does not explain, where it does not.
+    /// The verdict, the formula, and a table of its terms; if the formula does not fit, the residuals by range.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         self.say_verdict(&mut findings);
@@ -56,7 +56,7 @@ impl FoundFormula {
         findings.lines(&self.notes).lines(self.independent());
     }
 
-    /// What moves by itself.
+    /// Groups of coordinates that are decoupled.
     fn independent(&self) -> Vec<String> {
         let Some((first, others)) = self.blocks.split_first() else { return Vec::new() };
         let first = first.join(", ");
