@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time between two reports at least: often enough for a person to see that the search goes on.
+/// Time between two reports at least: often enough for a person to see that the search continues.
 const EVERY: Duration = Duration::from_millis(200);
 
 /// How far a search is.

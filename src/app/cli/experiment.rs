@@ -107,7 +107,7 @@ impl Chosen {
         }
     }
 
-    /// The system that was asked for instead of the experiment's own, with the parameters given.
+    /// The system that was requested instead of the experiment's own, with the parameters given.
     #[allow(clippy::type_complexity)]
     fn own_system(&self) -> Result<Option<(SystemInstance<f64>, BTreeMap<String, f64>)>, CliError> {
         let Some(name) = &self.system else { return Ok(None) };
@@ -320,7 +320,7 @@ pub fn share(all: Vec<Work>, shard: Option<Shard>) -> Vec<Work> {
     all.into_iter().map(of).filter(|work| !work.runs.is_empty()).collect()
 }
 
-/// The experiments of a name, or all, with those of their runs that were asked for, if there are any.
+/// The experiments of a name, or all, with those of their runs that were requested, if there are any.
 fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, Vec<Run>)>, CliError> {
     let named: Vec<&'static Experiment> =
         if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
@@ -356,10 +356,10 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
 /// Seeds of every run at most: no more than can be listed.
 const MOST_SEEDS: usize = 10_000;
 
-/// Tables of an experiment, made anew of the records of its runs.
+/// Tables of an experiment, made again of the records of its runs.
 const WRITTEN: [&str; 4] = ["table.csv", "runs.csv", "curves.csv", "readings.csv"];
 
-/// Refuses a directory with finished runs of other configurations than those asked for; `hint` says what to do then.
+/// Refuses a directory with finished runs of other configurations than those requested; `hint` says what to do then.
 fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
     let store = ExperimentDirectory::new(&work.path);
     let mut others = Vec::new();

@@ -262,7 +262,7 @@ impl Layers {
         }
     }
 
-    /// What is wrong with a value that was refused.
+    /// The fault of a value that was refused.
     fn problem(&self, path: &str, value: &Value, message: &str) -> String {
         let key = find_key(self.keys, path);
         if let Some(name) = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next()) {

@@ -88,7 +88,7 @@ impl<'a> Session<'a> {
                 let on = how_to_go_on(path);
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
-            // There is no model, and nothing to go on from.
+            // There is no model, and nothing to continue from.
             Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
             Err(error) => return Err(keeping(path)(error.into())),
         };

@@ -201,7 +201,7 @@ fn run(command: Command) -> Result<(), CliError> {
     }
 }
 
-/// Help and version go where they are asked for; a wrong argument is one line like any other error.
+/// Help and version go where they are requested; a wrong argument is one line like any other error.
 fn answer(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {

@@ -1,4 +1,4 @@
-//! Options that `lnn train` and `lnn fit` share: where a run's choices come from, where it writes, how it goes on.
+//! Options that `lnn train` and `lnn fit` share: where a run's choices come from, where it writes, how it continues.
 
 use crate::cli::CliError;
 use crate::cli::layers::Layers;

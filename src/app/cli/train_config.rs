@@ -80,7 +80,7 @@ impl Args {
         };
         parameters.extend(layers.numbers("parameters"));
         let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
-        // Of a system that is not known the other keys are looked at beside one that is.
+        // Of a system that is not known the other keys are examined beside one that is.
         let usable = match system {
             Ok(system) => system,
             Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
@@ -226,7 +226,7 @@ impl Args {
     }
 }
 
-/// The system that is asked for, by name or with its description.
+/// The system that is requested, by name or with its description.
 #[derive(Debug)]
 struct Named {
     name: String,

@@ -57,7 +57,7 @@ impl TubeArgs {
         self.tube_data.iter().map(PathBuf::as_path)
     }
 
-    /// The tube of a model for motions from one time to another; none if none was asked for.
+    /// The tube of a model for motions from one time to another; none if none was requested.
     ///
     /// # Errors
     /// A usage error for a system or a motion that runs backwards, a data error for a model without the configuration of a fit beside it, for

@@ -139,7 +139,7 @@ fn make(
     let system = run.config.system()?;
     let (starts, span) = scale.trajectories();
     let began = Instant::now();
-    // A run that was stopped goes on from its checkpoint.
+    // A run that was stopped continues from its checkpoint.
     let checkpoints = Some(output.checkpoints().beginning(Begin::Either));
     let options = RunOptions { threads, starts, span, checkpoints };
     let watch = watch.remarks_alone();

@@ -84,7 +84,7 @@ impl FitHeld {
         Ok((Some(Self { constraints, found, distance: f64::NAN }), remarks))
     }
 
-    /// States brought to the constraints, and how far their positions were away, root mean square.
+    /// States projected onto the constraints, and how far their positions were away, root mean square.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`] for a state from which no way leads there.

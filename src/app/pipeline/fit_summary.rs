@@ -84,7 +84,7 @@ struct ConstraintsSummary<'a> {
     found: bool,
     /// What vanishes, by name.
     formulas: &'a BTreeMap<String, String>,
-    /// Distance of the smoothed positions that are learned from, root mean square: they were brought to the constraints.
+    /// Distance of the smoothed positions that are learned from, root mean square: they were projected onto the constraints.
     distance: f64,
 }
 

@@ -11,9 +11,9 @@ use crate::pipeline::force_errors::{ForceError, judged as judged_by_forces};
 use crate::pipeline::hold_out::{HoldOut, factor, is_better};
 use crate::report::Report;
 
-/// Share of states of wrong signature from which on it is worth a word.
+/// Share of states of wrong signature at and above which it is worth a remark.
 const MOST_WRONG: f64 = 0.01;
-/// Lyapunov times from which on predictions of chaotic motion are good: errors grew e^3 = 20 times.
+/// Lyapunov times at and above which predictions of chaotic motion are good: errors grew e^3 = 20 times.
 const MANY_TIMES: f64 = 3.0;
 /// Share of the time that was tested below which predictions of motion that is not chaotic are bad.
 const FEW: f64 = 0.01;
@@ -241,7 +241,7 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
     Headline { sentence: format!("{name}: {sentence}"), rows }
 }
 
-/// Prediction of held-out motion beside going on at constant velocity, in a sentence that says good or bad.
+/// Prediction of held-out motion beside continuing at constant velocity, in a sentence that says good or bad.
 fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) -> String {
     let (Some(useful), true) = (&found.useful_time, model.median.is_finite()) else {
         return "bad: the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();

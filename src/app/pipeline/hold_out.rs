@@ -46,7 +46,7 @@ pub struct HoldOutOptions<'a> {
     pub threads: usize,
 }
 
-/// Time ahead up to which a prediction is of use: valid, and better than going on at constant velocity.
+/// Time ahead up to which a prediction is of use: valid, and better than continuing at constant velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct UsefulTime {
     /// The time in s; 0 for a prediction that is never of use.
@@ -64,11 +64,11 @@ pub struct CoordinatePredictions {
     pub unit: &'static str,
     /// Errors of the model's motion.
     pub model: Vec<f64>,
-    /// Errors of going on at constant velocity.
+    /// Errors of continuing at constant velocity.
     pub constant_velocity: Vec<f64>,
 }
 
-/// Predictions of motion that was held out, beside going on at constant velocity.
+/// Predictions of motion that was held out, beside continuing at constant velocity.
 #[derive(Clone, Debug, Serialize)]
 pub struct HoldOut {
     /// Unit of the errors of all coordinates together: `rad` of angles, `SI` of others; of both kinds each error is taken over the spread
@@ -88,7 +88,7 @@ pub struct HoldOut {
     pub by_coordinate: Vec<CoordinatePredictions>,
     /// Which predictions were given up and why, in words; empty if none was.
     pub given_up: String,
-    /// Errors of going on at the velocity of the start.
+    /// Errors of continuing at the velocity of the start.
     pub constant_velocity: Vec<PredictionError>,
     /// Fraction of the held-out states whose mass matrix has not the right signature; `NaN` where nothing was held out.
     pub wrong_signature: f64,
@@ -331,7 +331,7 @@ fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> Lin
 /// States evaluated at once.
 const CHUNK: usize = 4096;
 
-/// States whose mass matrix is looked at, about; of more, evenly spaced ones.
+/// States whose mass matrix is examined, about; of more, evenly spaced ones.
 const STATES: usize = 20_000;
 
 /// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.

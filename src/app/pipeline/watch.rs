@@ -32,7 +32,7 @@ pub enum Event<'a> {
     Runs {
         /// Runs that are finished.
         done: usize,
-        /// Runs asked for.
+        /// Runs requested.
         total: usize,
     },
     /// A search for constants, a formula or constraints is under way.

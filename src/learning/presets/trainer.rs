@@ -86,7 +86,7 @@ pub enum TrainerError {
         /// States given.
         found: usize,
     },
-    /// Names of the coordinates that are too many, too few or not distinct; an angle that is no coordinate.
+    /// Names of the coordinates that are too many, too few or not distinct; an angle that is not a coordinate.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// A shape of the network that contradicts itself.

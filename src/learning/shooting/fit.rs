@@ -32,7 +32,7 @@ pub struct Task<'a, S> {
     pub training: &'a [StateEstimate<'a>],
     /// Trajectories that choose the best epoch.
     pub validation: &'a [StateEstimate<'a>],
-    /// Noise of the measurements; where there is none, the accuracy that is asked for.
+    /// Noise of the measurements; where there is none, the accuracy that is requested.
     pub noise: &'a Noise,
     /// Constraints that hold the motion.
     pub constraints: Option<&'a FormulaConstraints>,

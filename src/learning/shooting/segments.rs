@@ -28,9 +28,9 @@ pub(super) struct Segment<S> {
     pub step: S,
     /// Seconds from its start to its end.
     pub duration: f64,
-    /// `true` if the next segment of the list goes on where this one ends.
+    /// `true` if the next segment of the list continues where this one ends.
     pub has_next: bool,
-    /// `true` if the one before ends where this one starts.
+    /// `true` if the previous one ends where this one starts.
     pub has_previous: bool,
     /// `true` if its velocities were measured.
     pub has_velocity: bool,

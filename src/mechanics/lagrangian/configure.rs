@@ -64,7 +64,7 @@ pub enum SystemError {
     Constraints {
         /// The system.
         system: String,
-        /// What is wrong with them.
+        /// The fault of them.
         problem: String,
     },
     /// A state of the wrong length.
@@ -361,7 +361,7 @@ fn unknown_system(name: &str) -> SystemError {
 /// Reads the parameters of a system in the working precision; those not given take their defaults.
 ///
 /// # Errors
-/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
+/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is not a number or out of range.
 pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
     configure_system(resolve(name)?, given)
 }
@@ -369,7 +369,7 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<
 /// [`configure`] for a given system: one of the catalogue, or one made from a [description](super::Description).
 ///
 /// # Errors
-/// [`SystemError`] for an unknown or repeated symbol, a value that is no number or out of range.
+/// [`SystemError`] for an unknown or repeated symbol, a value that is not a number or out of range.
 pub fn configure_system<S: Scalar>(
     system: Cow<'static, System>,
     given: &Given,

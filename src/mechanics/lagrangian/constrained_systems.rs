@@ -70,7 +70,7 @@ pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     single.into_iter().chain((1..=LISTED_BOBS).map(chain))
 }
 
-/// The listed systems under constraints, made anew.
+/// The listed systems under constraints, made again.
 pub fn constrained_systems() -> Vec<System> {
     // Formulas of this file, which a test compiles.
     constrained_descriptions().filter_map(|description| description.compile().ok()).collect()
@@ -141,7 +141,7 @@ fn on_ellipse() -> Description {
     )
 }
 
-/// Bobs on rods of equal length, each hanging from the one before.
+/// Bobs on rods of equal length, each hanging from the previous one.
 fn chain(bobs: usize) -> Description {
     let name = |axis: char, k: usize| format!("{axis}{k}");
     let names: Vec<String> = (1..=bobs).flat_map(|k| [name('x', k), name('y', k)]).collect();

@@ -215,7 +215,7 @@ impl LearningAdvice {
 pub(crate) struct StateAdvice {
     /// Coordinates of which half are drawn uniform in their logarithm; empty for none.
     pub log_uniform: Vec<bool>,
-    /// Size, over the mean one, of accelerations from which on residuals count relatively; 0 for none.
+    /// Size, over the mean one, of accelerations at and above which residuals count relatively; 0 for none.
     pub acceleration_weighting: f64,
     /// Share of the states that lie along motions of the trajectory test.
     pub trajectory_fraction: f64,

@@ -113,7 +113,7 @@ pub(super) fn run<S: Integrable>(
             let y = on.as_slice();
             // An interpolated state may still cross a bound by less than the tolerance.
             valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
-            // The samples behind an invalid one are not taken, the motion goes on to its end.
+            // The samples behind an invalid one are not taken, the motion continues to its end.
             !valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
         };
         let (t0, backwards) = (options.t0, motion.backwards());

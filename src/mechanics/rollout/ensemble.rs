@@ -128,7 +128,7 @@ struct Round<S> {
     q: Vec<S>,
     v: Vec<S>,
     terms: Terms<S>,
-    /// All that was asked for.
+    /// All that was requested.
     request: Request,
     /// `true` unless the round failed for a reason that is not that of single states.
     has_row_failures: bool,

@@ -8,7 +8,7 @@
 //! - Backward integration is fragile: the elapsed time always runs upwards from 0 (the caller flips the sign).
 //! - Statistics are lost on errors: calls are counted here.
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
-//! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
+//! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the previous one.
 
 use super::dense::{Interpolant, Rhs, Step};
 use super::gauss::Tableau;
@@ -23,7 +23,7 @@ use ode_solvers::dop_shared::{FloatNumber, IntegrationError};
 use ode_solvers::{DVector, Dop853, Dopri5, OutputType, SVector, System};
 use std::cell::RefCell;
 
-/// Receives sample `k` with its state, and says whether to go on.
+/// Receives sample `k` with its state, and says whether to continue.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 
 /// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
@@ -184,7 +184,7 @@ struct Observer<'a, 'f, S, E> {
     earlier: Option<E>,
     /// An accepted step failed at its end: try again with this size.
     retry: Option<S>,
-    /// The state was projected: go on from it, beginning with this size.
+    /// The state was projected: continue from it, beginning with this size.
     restart: Option<S>,
     /// The time does not advance any more.
     stuck: bool,

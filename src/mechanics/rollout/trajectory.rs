@@ -41,7 +41,7 @@ pub struct Trajectory<S> {
     pub q: Vec<S>,
     /// Velocities, `(len, n)`.
     pub v: Vec<S>,
-    /// Energy at each time by the model that moved, if asked for; `NaN` where it could not be computed.
+    /// Energy at each time by the model that moved, if requested; `NaN` where it could not be computed.
     pub energy: Option<Vec<S>>,
 }
 
@@ -242,7 +242,7 @@ impl<S: Scalar> Samples<S> {
     }
 }
 
-/// Samples `first..after` in time elapsed since `start`, and, if it is none of them, the end of their stretch.
+/// Samples `first..after` in time elapsed since `start`, and, if it is not one of them, the end of their stretch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part<S> {
     pub(super) all: Samples<S>,

@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn a_factor_alone_has_no_summand() {
-        // A constant target says nothing of a slope, but a factor it has.
+        // A constant target gives no information about a slope, but a factor it has.
         let fit = factor_fit(&[2.0, 2.0, 4.0], &[-1.0, -1.0, -2.0]).unwrap();
         assert_eq!((fit.a, fit.b, fit.r2, fit.rms), (-0.5, 0.0, 1.0, 0.0));
         let fit = factor_fit(&[1.0, 3.0], &[2.0, 2.0]).unwrap();

@@ -36,10 +36,10 @@ pub struct Arena {
     blamed: Cell<u64>,
 }
 
-/// Numbers side by side, with the functions of them that were asked for.
+/// Numbers side by side, with the requested functions of them.
 struct Pack {
     layout: Layout,
-    /// Functions of all its numbers that were asked for.
+    /// Functions of all its numbers that were requested.
     functions: Vec<(Function, u32)>,
 }
 

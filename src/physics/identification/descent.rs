@@ -29,7 +29,7 @@ const ELIMINATION: f64 = 1e-14;
 const LIKE_STARTS: f64 = 1e-8;
 /// Effect of an unknown on the motion, over the motion itself and squared, that is rounding alone.
 const NO_EFFECT: f64 = 1e-22;
-/// The same while the search goes on, where a constant may be far smaller than it is to be.
+/// The same while the search continues, where a constant may be far smaller than it is to be.
 pub(super) const SILENT: f64 = 1e-26;
 const FIRST_DAMPING: f64 = 1e-4;
 pub(super) const LEAST_DAMPING: f64 = 1e-10;
@@ -211,7 +211,7 @@ impl Problem<'_> {
         own.iter().zip(followed).map(|(own, followed)| own - followed).collect()
     }
 
-    /// Moves the starts alone, each segment for itself; `false` if they could go on gaining.
+    /// Moves the starts alone, each segment for itself; `false` if they could continue gaining.
     pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
         let still = vec![0.0; self.unknowns()];
         let mut best = self.all(x, segments);

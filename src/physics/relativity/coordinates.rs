@@ -310,7 +310,7 @@ pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: 
     acting_groups(4, (&q, &v), &accelerations, &[noise; 4]).contains(&vec![chart.time])
 }
 
-/// Later and earlier times at which a metric is looked at, in parts of the span that matters.
+/// Later and earlier times at which a metric is examined, in parts of the span that matters.
 const TIMES: [f64; 3] = [0.31, -0.57, 1.0];
 /// Differences of the components, over the largest of them, that are rounding.
 const ROUNDING: f64 = 1e-9;

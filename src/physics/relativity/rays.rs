@@ -39,7 +39,7 @@ pub const TOLERANCES: (f64, f64) = (1e-12, 0.01);
 /// | name | default | purpose | range |
 /// |---|---|---|---|
 /// | `tolerance` | 1e-6 | relative error of place and tangent in a step | 1e-12 to 0.01 |
-/// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
+/// | `far` | twice the distance of the camera | distance at and above which a ray that leaves has escaped | above 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
 /// | `growth` | 1e5 | growth of the Euclidean length of `k` at which a ray is captured | above 1 |
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |

@@ -26,9 +26,9 @@ pub struct Algebra {
     pub name: Option<String>,
 }
 
-/// Fields whose algebra is looked at, at most: beyond, their commutators take minutes.
+/// Fields whose algebra is examined, at most: beyond, their commutators take minutes.
 pub(crate) const MOST_FIELDS: usize = 200;
-/// States at which commutators are looked at, at most, and products of numbers that are worth it: seconds.
+/// States at which commutators are examined, at most, and products of numbers that are worth it: seconds.
 const STATES: (usize, usize) = (400, 10_000_000_000);
 
 impl Algebra {
@@ -288,7 +288,7 @@ fn euclidean(c: &Constants, derived: &Orthonormal, tolerance: f64) -> Option<Str
 fn bracket(c: &Constants, x: &[f64], y: &[f64]) -> Vec<f64> {
     let m = c.len();
     let mut result = vec![0.0; m];
-    // Most elements that are asked for have few components.
+    // Most elements that are requested have few components.
     for (a, x) in x.iter().enumerate().filter(|(_, x)| **x != 0.0) {
         for (b, y) in y.iter().enumerate().filter(|(_, y)| **y != 0.0) {
             super::null_space::add(&mut result, &c[a][b], x * y);

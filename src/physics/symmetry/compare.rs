@@ -156,7 +156,7 @@ impl Fit {
         let mut gauge = plain.given(&plain.along(&rest), columns.len());
         let mut known_gauge = null_space::significant(&columns, &rest, DEPENDENT);
         let whole = norm(&target);
-        // Roundings are no terms.
+        // Roundings are not terms.
         for (k, column) in columns.iter().enumerate() {
             for c in [&mut gauge[k], &mut known_gauge[k]] {
                 if (*c * norm(column)).abs() <= ROUNDING * whole {
@@ -340,7 +340,7 @@ fn factors(
     let plain = orthonormal(&columns, DEPENDENT);
     let mut solution = plain.given(&plain.along(&target), columns.len());
     let whole = norm(&target);
-    // Roundings are no terms.
+    // Roundings are not terms.
     for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
         if (*c * norm(column)).abs() <= ROUNDING * whole {
             *c = 0.0;

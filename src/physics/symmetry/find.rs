@@ -33,7 +33,7 @@ pub struct Symmetries {
     pub fields: Vec<Field>,
     /// The Lie algebra that they form; `None` without symmetries and of more than 200.
     pub algebra: Option<Algebra>,
-    /// States that were looked at, and those of them at which the mass matrix is singular to working precision. There `L` is
+    /// States that were examined, and those of them at which the mass matrix is singular to working precision. There `L` is
     /// degenerate: it determines no motion, and whatever function multiplies a null direction of it may be a symmetry.
     pub states: usize,
     /// See `states`.
@@ -202,7 +202,7 @@ struct Unknowns<'a> {
 }
 
 impl Unknowns<'_> {
-    /// Change of `L` along the field `function d_i` at all states, and its part that is no gauge.
+    /// Change of `L` along the field `function d_i` at all states, and its part that is not a gauge.
     fn change(&self, i: usize, f: usize) -> Vec<f64> {
         let n = self.sample.n;
         let rows = self.columns.values[f].iter().zip(&self.columns.rates[f]).zip(self.weight).enumerate();

@@ -90,7 +90,7 @@ pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact
     all
 }
 
-/// States that are looked at for so many unknown coefficients, of a Lagrangian that is written down or of a model.
+/// States that are examined for so many unknown coefficients, of a Lagrangian that is written down or of a model.
 pub fn enough(unknowns: usize, exact: bool) -> usize {
     (2 * unknowns).max(if exact { 400 } else { 1000 })
 }
@@ -120,7 +120,7 @@ pub fn most_symmetries(
 
 /// Brings `rows` into reduced echelon form, in place: every row has a pivot 1, which the others have 0.
 ///
-/// Columns are weighed by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots,
+/// Columns are weighted by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots,
 /// as long as their entry is not much smaller than the largest that is left. What is below `noise` of the largest weighed entry of
 /// its row becomes 0. Rows are ordered by their pivots. The first `fixed` rows take part before the others. Entries beyond the
 /// weighed columns are carried along.

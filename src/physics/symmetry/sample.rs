@@ -1,4 +1,4 @@
-//! States at which a Lagrangian is asked for its terms, with the size of motion and of terms there.
+//! States at which a Lagrangian is requested its terms, with the size of motion and of terms there.
 
 use super::SymmetryError;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -271,7 +271,7 @@ impl Region {
     }
 }
 
-/// Part of every range of its training that a model is looked at: near the edges it is worst.
+/// Part of every range of its training that a model is examined: near the edges it is worst.
 const INNER: f64 = 0.8;
 
 /// The middle of a range.

@@ -1,4 +1,4 @@
-//! What is said of symmetries.
+//! Report of symmetries.
 
 use super::{Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
@@ -46,7 +46,7 @@ pub struct SymmetrySummary {
     pub basis: Degrees,
     /// Functions of the basis.
     pub functions: usize,
-    /// States that were looked at.
+    /// States that were examined.
     pub points: usize,
     /// Seed of the states.
     pub seed: u64,
@@ -113,7 +113,7 @@ impl Symmetries {
 }
 
 impl SymmetrySummary {
-    /// The number of symmetries, the fields, their algebra, and what was looked at.
+    /// The number of symmetries, the fields, their algebra, and what was examined.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         self.say_count(&mut findings);

@@ -1,4 +1,4 @@
-//! Memory that the machine has left, and threads: as many as were asked for, or as many as the system starts.
+//! Memory that the machine has left, and threads: as many as were requested, or as many as the system starts.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};

@@ -16,7 +16,7 @@ const DECADES: f64 = 1e-18;
 const WIDTHS: (f64, f64) = (1.1, 3.4);
 /// Width of each of several lines that swing so often that they would fill the picture.
 const DENSE: f64 = 0.7;
-/// Points from which on a line may be one of these.
+/// Points at and above which a line may be one of these.
 const MANY: usize = 500;
 /// The colour of a line that another is drawn over.
 const UNDER: &str = "#7FB8DC";

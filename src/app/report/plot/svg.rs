@@ -105,7 +105,7 @@ impl Panel {
     pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], colour: &str, width: f64) {
         let mut d = String::new();
         for line in lines {
-            // Tenths of a pixel, each point relative to the one before.
+            // Tenths of a pixel, each point relative to the previous one.
             let mut points = simplify(line, TOLERANCE).into_iter();
             let tenths = |(x, y): (f64, f64)| ((10.0 * x).round() as i64, (10.0 * y).round() as i64);
             let Some(mut before) = points.next().map(tenths) else { continue };

@@ -32,7 +32,7 @@ impl std::fmt::Display for Stillness {
     }
 }
 
-/// Samples that are looked at for copies, about; of more, evenly spaced ones.
+/// Samples that are examined for copies, about; of more, evenly spaced ones.
 const SAMPLES: usize = 1 << 16;
 /// Part of a coordinate's motion below which what others leave of it is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -47,7 +47,7 @@ pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, St
     found
 }
 
-/// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be told from noise may
+/// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be distinguished from noise may
 /// move.
 fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<Stillness> {
     let n = recording.n();

@@ -13,7 +13,7 @@ const STATE: &str = "state";
 /// Counts above this are refused: no training reaches it, and adding to what passes cannot overflow.
 const MOST: u64 = 1 << 52;
 
-/// What is said of a checkpoint without reading its state.
+/// Report of a checkpoint without reading its state.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Header {

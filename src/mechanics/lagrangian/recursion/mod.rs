@@ -186,7 +186,7 @@ impl<R: Real> Link<R> {
     }
 }
 
-/// Where a link is, seen from the one before: sines and cosines of twist and angle, and the place of its origin.
+/// Where a link is, seen from the previous one: sines and cosines of twist and angle, and the place of its origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame<R> {
     twist: [R; 2],
@@ -202,7 +202,7 @@ impl<R: Real> Frame<R> {
         [c * x + s * y, c * y - s * x, z]
     }
 
-    /// `R x`: a vector of this frame in the one before.
+    /// `R x`: a vector of this frame in the previous one.
     fn outward(&self, [x, y, z]: Vector<R>) -> Vector<R> {
         let ([sa, ca], [s, c]) = (self.twist, self.turn);
         let (x, y) = (c * x - s * y, s * x + c * y);

@@ -41,7 +41,7 @@ pub(crate) struct Derivatives<R> {
     pub value: R,
     /// By every input.
     pub first: Vec<R>,
-    /// By every input and along the directions that were asked for.
+    /// By every input and along the directions that were requested.
     pub second: Vec<Sparse<R>>,
 }
 
@@ -314,7 +314,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         Curve { long: vec![(self.tangents.len() - 1, None)], short: Vec::new() }
     }
 
-    /// The tangents of the adjoint of row `x` as they go on to so many operands: added now where that takes no more products than later.
+    /// The tangents of the adjoint of row `x` as they continue to so many operands: added now where that takes no more products than later.
     fn passed_on(&mut self, z: Curve<R>, x: usize, ways: usize) -> Curve<R> {
         let is_plain = z.long.iter().all(|(_, factor)| factor.is_none());
         let later = match z.long.len() {

@@ -20,7 +20,7 @@ enum VelocityFactor {
 struct Change {
     kind: VelocityFactor,
     function: usize,
-    /// Its usual size before the data are looked at.
+    /// Its usual size before the data are examined.
     size: f64,
 }
 

@@ -207,7 +207,7 @@ impl Data {
     }
 }
 
-/// Share of the deviation before the data that is left after them, from which on they leave a number open.
+/// Share of the deviation before the data that is left after them, at and above which they leave a number open.
 const OPEN: f64 = 0.5;
 /// Fewest states of a group.
 const LEAST: usize = 5;
