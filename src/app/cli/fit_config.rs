@@ -1,4 +1,4 @@
-//! Arguments of `lnn fit` and the configuration they come to.
+//! Arguments of `lnn fit` and the resulting configuration.
 
 use crate::cli::CliError;
 use crate::cli::constraints::formulas;
@@ -49,11 +49,11 @@ impl Args {
 /// Path of the training in the configuration of a fit.
 const TRAINING: &str = "training.";
 
-/// What files and arguments say of a fit, before its data are read.
+/// Settings of a fit from files and arguments, before its data are read.
 pub struct Plan<'a> {
     /// The arguments.
     pub args: &'a Args,
-    /// The configuration, as far as it is known without the data.
+    /// The configuration as far as it is known without the data.
     pub config: FitConfig,
     layers: Layers,
     /// The fit that continues.

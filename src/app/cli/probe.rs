@@ -1,4 +1,4 @@
-//! A Lagrangian that is looked into: a system or a model, the states on which it is examined, functions of its coordinates.
+//! A system or a model under investigation, the states at which it is evaluated, and functions of its coordinates.
 
 use crate::cli::CliError;
 use crate::cli::learned::{Learned, held};
@@ -57,7 +57,7 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     if wide && !name.trim().is_empty() { Ok((name.trim().to_string(), [low, high])) } else { Err(wrong()) }
 }
 
-/// Reads the singular value up to which a field counts as a symmetry.
+/// Reads the largest singular value at which a field counts as a symmetry.
 ///
 /// # Errors
 /// The range.
@@ -67,7 +67,7 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no longer a symmetry)"))
 }
 
-/// `true` for a file or directory that is none of a system.
+/// `true` for a file or directory that does not describe a system.
 fn is_model(text: &str) -> bool {
     Path::new(text).exists() && !system_arg::is_file(text)
 }
@@ -257,7 +257,7 @@ impl Probe {
         Ok((Basis::new(self.coordinates(), &charts, degrees), degrees))
     }
 
-    /// Number of states that are examined for so many unknown coefficients: as asked for, or the usual one, as far as there is room.
+    /// Number of states that are examined for so many unknown coefficients: as requested, or the usual one, as far as there is room.
     ///
     /// # Errors
     /// A usage error for more than there is room for.
@@ -285,7 +285,7 @@ impl Probe {
         most_symmetries(self.model.as_ref(), bases, states, (tolerance, self.exact)).map_err(CliError::data)
     }
 
-    /// States that are examined for so many unknown coefficients.
+    /// States that are examined for a number of unknown coefficients.
     pub fn enough(&self, unknowns: usize) -> usize {
         enough(unknowns, self.exact)
     }

@@ -30,7 +30,7 @@ impl Learner {
 
 /// A directory of a training or a fit.
 enum Found {
-    /// It can continue; what its checkpoint says.
+    /// It can continue; the contents of its checkpoint.
     Unfinished(String),
     /// It has finished; `config.toml` and `summary.json`.
     Finished(String, String),
@@ -107,7 +107,7 @@ fn kind_of(text: &str) -> Learner {
 
 /// The run that left its summary and no checkpoint.
 fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
-    /// The part of `summary.json` that tells.
+    /// The part of `summary.json` that describes the end.
     #[derive(Deserialize)]
     struct Summary {
         ended: String,
@@ -128,7 +128,7 @@ fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
     }
 }
 
-/// What the text of a run says.
+/// The contents of the text of a run.
 ///
 /// # Errors
 /// A data error naming the file.

@@ -7,7 +7,7 @@ use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Attempts to find a name that nobody has.
+/// Attempts to find an unused name.
 const ATTEMPTS: usize = 100;
 
 /// A temporary file, removed at the end.

@@ -120,7 +120,7 @@ impl Args {
         Ok(Work { experiment: &SWEEP, scale: Scale::Paper, path: self.out.clone(), runs, merge, list })
     }
 
-    /// The command with the options that say which runs there are.
+    /// The command with the options that define the runs.
     fn words(&self) -> String {
         let mut words = format!("lnn sweep {}", self.file.display());
         words.extend(self.vary.iter().map(|one| format!(" --vary '{}={}'", one.key, one.values.join(","))));

@@ -1,4 +1,4 @@
-//! `lnn train`: learns, judges, writes.
+//! `lnn train`: trains a model, tests it, writes the results.
 
 use crate::cli::learn::{Learned, Session, open};
 use crate::cli::resume::{Learner, Text, parse, reopen, require_same};

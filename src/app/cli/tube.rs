@@ -163,7 +163,7 @@ impl MotionTube {
         text
     }
 
-    /// For JSON.
+    /// The JSON form.
     pub fn facts(&self) -> TubeFacts<'_> {
         let n = self.coordinates.len();
         let half_widths = self.coordinates.iter().enumerate().map(|(i, name)| {

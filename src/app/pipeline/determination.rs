@@ -74,7 +74,7 @@ const MISFIT_OF_ENERGY: f64 = 0.5;
 const OUTSIDE: f64 = 0.1;
 /// The same, at and above which held-out motion is another motion than the learned one and judges nothing.
 const MOSTLY: f64 = 0.5;
-/// Names of quantities and of what is said of them.
+/// Names of quantities and of statements about them.
 const ENERGY: &str = "rms E about its mean";
 const UNIT: &str = "the unit";
 const NOT: &str = "not";
@@ -94,7 +94,7 @@ impl Quantity {
 }
 
 impl Determined {
-    /// Looks at a model of recorded motion that was judged by `hold_out`.
+    /// Analyses a model of recorded motion that was tested by `hold_out`.
     ///
     /// # Errors
     /// [`PipelineError::Recording`] if the states that were learned from cannot be had again.
@@ -176,7 +176,7 @@ impl Determined {
         self.outside.filter(|share| *share > MOSTLY)
     }
 
-    /// A remark on standard error, if the data ask for friction.
+    /// A remark on standard error, if the data indicate friction.
     pub fn suggestion(&self) -> Option<String> {
         if let Some(decay) = self.decay.filter(Decay::is_certain) {
             return Some(format!(

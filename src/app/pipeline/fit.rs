@@ -1,4 +1,4 @@
-//! A fit of recorded motion: learning, judgement by motion that was held out, files.
+//! A fit of recorded motion: training, test on held-out motion, files.
 
 use crate::cancellation::Cancellation;
 use crate::configuration::Precision;
@@ -283,7 +283,7 @@ fn fit_in<S: Scalar>(
     Ok(FitReport { stop, unfinished, header, network, history, hold_out, others, json, text })
 }
 
-/// What held-out motion says of a model.
+/// Results of a model on held-out motion.
 ///
 /// # Errors
 /// [`PipelineError::Interrupted`].

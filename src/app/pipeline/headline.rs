@@ -113,7 +113,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     Headline { sentence, rows }
 }
 
-/// Predictions beside the exact motion over a test of `tested`, in words.
+/// Predictions compared with the exact motion over a test of `tested`, in words.
 fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     let time = valid_time(valid, unit);
     let (until, tested) = (tested, format!("{} {unit}", number(tested)));
@@ -150,7 +150,7 @@ pub(crate) fn of_hold_out(
     Headline { sentence, ..of_network }
 }
 
-/// What a model is not good for, each a clause.
+/// Weaknesses of a model, each a clause.
 fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     let mut all = Vec::new();
     if let Some(error) = found.model.last() {
@@ -186,7 +186,7 @@ fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     all
 }
 
-/// A sentence that says good or limited, with what speaks against it.
+/// A sentence with a verdict and the weaknesses.
 fn with_failures(sentence: String, failures: &[String]) -> String {
     let all = failures.join("; ");
     match (sentence.strip_prefix("good: "), sentence.strip_prefix("limited: ")) {
@@ -241,7 +241,7 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
     Headline { sentence: format!("{name}: {sentence}"), rows }
 }
 
-/// Prediction of held-out motion beside continuing at constant velocity, in a sentence that says good or bad.
+/// Prediction of held-out motion compared with constant velocity, as a sentence with a verdict.
 fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) -> String {
     let (Some(useful), true) = (&found.useful_time, model.median.is_finite()) else {
         return "bad: the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();

@@ -1,4 +1,4 @@
-//! Predictions of held-out windows in bounded time, and why some were given up.
+//! Predictions of held-out windows in bounded time, and the reasons for failures.
 
 use crate::analysis::{Predictions, Window, follow};
 use crate::lagrangian::EulerLagrange;
@@ -22,7 +22,7 @@ pub(crate) struct HeldOutPredictions {
     pub predictions: Predictions,
     /// Windows there were.
     pub all: usize,
-    /// Why predictions were given up, and how many.
+    /// Numbers of failed predictions by reason.
     pub given_up: BTreeMap<&'static str, usize>,
 }
 

@@ -14,7 +14,7 @@ use crate::recording::{LoadedRecording, Targets};
 use crate::scalar::Scalar;
 use std::time::Instant;
 
-/// Recorded motion with its derivatives, divided into what is learned from, what chooses the best epoch and what judges.
+/// Recorded motion with its derivatives, divided into training, validation and test states.
 #[derive(Debug)]
 pub struct PreparedFit<'a> {
     pub(crate) reading: &'a LoadedRecording,
@@ -23,7 +23,7 @@ pub struct PreparedFit<'a> {
     pub(crate) targets: Targets,
     /// Constraints that hold the motion.
     pub(crate) held: Option<FitHeld>,
-    /// What is to be said of them.
+    /// Remarks on them.
     pub(crate) remarks: Vec<String>,
     /// Time at which the work began, for the time that the summary states.
     pub started: Instant,

@@ -21,7 +21,7 @@ pub enum Fit {
 pub struct GridComparison {
     /// Name of the quantity, such as `L` or `det M`.
     pub quantity: String,
-    /// What the picture shows, above it.
+    /// Title of the picture.
     pub heading: String,
     /// Beginning of the file name.
     pub file: String,

@@ -29,7 +29,7 @@ pub(crate) use table::{READING_HEADER, reading_table};
 pub struct Figure {
     /// File name without directory, with `.svg`.
     pub file: String,
-    /// What the picture shows, in a few words above it; may be empty.
+    /// Title of the picture; may be empty.
     pub heading: String,
     /// The drawing.
     pub picture: Picture,

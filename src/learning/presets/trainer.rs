@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// Share of the states that chooses the best epoch, and share that judges the result.
+/// Shares of the states that choose the best epoch and that test the result.
 const HELD_OUT: f64 = 0.1;
 
 /// A training on states with accelerations.
@@ -72,7 +72,7 @@ pub struct Learned {
     pub test_loss: f64,
     /// Why the training ended.
     pub stop: StopReason,
-    /// What the model's file says beside the weights.
+    /// Contents of the model's file besides the weights.
     pub header: Header,
 }
 

@@ -22,7 +22,7 @@ pub struct Columns {
     pub time: Option<String>,
     /// Samples per second of data without times.
     pub rate: Option<f64>,
-    /// A column whose value tells the trajectories of one file apart.
+    /// A column whose value distinguishes the trajectories of one file.
     pub trajectory: Option<String>,
     /// Coordinates that are angles, in rad after conversion.
     pub periodic: Vec<String>,

@@ -1,4 +1,4 @@
-//! Where recorded samples stand in the files they come from, and what was left out.
+//! The files and rows that recorded samples come from, and what was left out.
 
 use crate::recording::Recording;
 use crate::recording::smooth::{Chosen, Smoothing, noise};
@@ -26,7 +26,7 @@ impl Rows {
         }
     }
 
-    /// The rows of samples `start..end`, counted anew from 0.
+    /// The rows of samples `start..end`, counted from 0.
     pub(crate) fn part(&self, start: usize, end: usize) -> Self {
         let mut rows = Self(vec![(0, self.row(start))]);
         for (first, row) in self.0.iter().filter(|(first, _)| *first > start && *first < end) {

@@ -113,7 +113,7 @@ fn pieces(times: &[f64], per_segment: usize) -> Vec<Piece> {
 impl<S: Scalar> Segments<S> {
     /// Cuts trajectories for a network of this shape; each segment is integrated over `steps` equal steps.
     ///
-    /// Samples that stand alone between pauses are left out. Shapes must have been checked.
+    /// Samples that are isolated between pauses are left out. Shapes must have been checked.
     pub fn new(
         architecture: &Architecture,
         trajectories: &[StateEstimate<'_>],

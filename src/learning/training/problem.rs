@@ -7,7 +7,7 @@ use crate::training::objective::{BatchReport, Objective};
 use argmin::core::{CostFunction, Error, Gradient};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Problem of an argmin run: a network's parameters, the states it learns from and those it is judged by.
+/// Problem of an argmin run: a network's parameters, its training states and its validation states.
 ///
 /// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among
 /// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's or of

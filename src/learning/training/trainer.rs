@@ -28,7 +28,7 @@ pub struct Trained<S> {
     pub history: Vec<Epoch>,
     /// Best validation loss, paper convention.
     pub validation_loss: f64,
-    /// Loss on fresh states that chose nothing, paper convention.
+    /// Loss on fresh states that were not used for any choice, paper convention.
     pub test: BatchReport<S>,
     /// Why training ended.
     pub stop: StopReason,

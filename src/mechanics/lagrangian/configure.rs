@@ -64,7 +64,7 @@ pub enum SystemError {
     Constraints {
         /// The system.
         system: String,
-        /// The fault of them.
+        /// What is wrong with them.
         problem: String,
     },
     /// A state of the wrong length.

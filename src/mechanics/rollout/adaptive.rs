@@ -63,7 +63,7 @@ impl<S: Scalar> MotionEquations<'_, S> {
     }
 }
 
-/// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
+/// Integrates from `(q, v)` to the end of the options, or as far as possible; arguments are checked.
 pub(super) fn run<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,

@@ -68,7 +68,7 @@ impl<S: Scalar> Stepper<S> {
     }
 }
 
-/// Where a roll-out stands.
+/// Progress of a roll-out.
 struct Position<'a, S> {
     state: PhasePoint<S>,
     /// A velocity near that of the state.

@@ -72,7 +72,7 @@ pub enum EarlyEnd<E> {
     Underflow,
     /// No attempts left.
     TooManySteps,
-    /// The receiver of the samples takes no more.
+    /// The receiver accepts no more samples.
     Stopped,
 }
 

@@ -314,7 +314,7 @@ mod tests {
         let q = [0.0, 0.0, 1.0, 0.0, 3.0, 0.0];
         // By `c` the coordinates act on each other.
         let exact = model(1.0, 0.5, 0.1);
-        // What vanishes at rest does not count.
+        // A difference that vanishes at rest does not count.
         let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);
         assert_eq!((same.factor, same.error.max, same.error.count, same.error.failed), (-0.25, 0.0, 3, 0));
         let other = mass_matrix_error(&exact, &model(1.0, 0.0, 0.0), &q);

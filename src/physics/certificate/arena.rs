@@ -54,7 +54,7 @@ struct Layout {
     lanes: usize,
 }
 
-/// Places side by side for so many numbers.
+/// Slots side by side for a count of numbers.
 pub fn width(lanes: usize) -> usize {
     if lanes == 1 { 1 } else { LANES }
 }

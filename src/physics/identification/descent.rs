@@ -211,7 +211,7 @@ impl Problem<'_> {
         own.iter().zip(followed).map(|(own, followed)| own - followed).collect()
     }
 
-    /// Moves the starts alone, each segment for itself; `false` if they could continue gaining.
+    /// Moves only the initial states, each segment separately; `false` if they could still gain.
     pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
         let still = vec![0.0; self.unknowns()];
         let mut best = self.all(x, segments);

@@ -1,4 +1,4 @@
-//! The camera: where it stands, how it moves, and the direction of every pixel.
+//! The camera: its position and motion, and the direction of every pixel.
 
 use super::coordinates::{Chart, depends_on_time};
 use super::orbits::{along, dot, lower, norm, product, times};

@@ -16,7 +16,7 @@ pub enum RayOutcome {
     Captured,
     /// It came from far away: the place on the sky, a unit vector of space.
     Escaped([f64; 3]),
-    /// Neither, within the steps allowed, or it met a place where the metric is none.
+    /// Neither, within the steps allowed, or it reached a point where the metric is invalid.
     Unfinished,
 }
 
@@ -39,7 +39,7 @@ pub const TOLERANCES: (f64, f64) = (1e-12, 0.01);
 /// | name | default | purpose | range |
 /// |---|---|---|---|
 /// | `tolerance` | 1e-6 | relative error of place and tangent in a step | 1e-12 to 0.01 |
-/// | `far` | twice the distance of the camera | distance at and above which a ray that leaves has escaped | above 0 |
+/// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
 /// | `growth` | 1e5 | growth of the Euclidean length of `k` at which a ray is captured | above 1 |
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
@@ -171,7 +171,7 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    /// Accelerations of states, one by one `NaN` where the metric is none.
+    /// Accelerations of states, each `NaN` where the metric is invalid.
     fn accelerations(&mut self, q: &[[f64; 4]], k: &[[f64; 4]], to: &mut Vec<[f64; 4]>) -> Result<(), RelativityError> {
         let outcome = self.model.terms(q.as_flattened(), k.as_flattened(), Request::ACCELERATION, &mut self.terms);
         let (found, []) = self.terms.acceleration.as_chunks::<4>() else { return Err(no_accelerations(outcome)) };

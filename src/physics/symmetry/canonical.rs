@@ -108,7 +108,7 @@ fn positive<S: Scalar>(n: usize, matrix: &[S], signs: Inertia) -> bool {
     if signs.positive != signs.negative {
         return signs.positive > signs.negative;
     }
-    // What is below the root of the rounding beside its row is zero for one of two equal matrices and not for the other.
+    // A number below the root of the rounding, relative to its row, can be zero for one of two equal matrices and not for the other.
     let rounding = Real::sqrt(S::epsilon());
     let counts = |&(i, j): &(usize, usize)| {
         let largest = matrix[i * n..(i + 1) * n].iter().fold(zero, |most, x| Real::max(most, Real::abs(*x)));

@@ -24,7 +24,7 @@ pub struct Comparison {
     pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,
-    /// `F` as a formula, without functions whose coefficients the states do not tell.
+    /// `F` as a formula, without functions whose coefficients the states do not determine.
     pub gauge_formula: String,
     /// The constant, in the unit of `A`.
     pub constant: f64,
@@ -106,7 +106,7 @@ struct Fit {
     factors: Vec<f64>,
     on_shell: bool,
     gauge: Vec<f64>,
-    /// The same without what the states do not tell.
+    /// The same without what the states do not determine.
     known_gauge: Vec<f64>,
     constant: f64,
     rest: f64,

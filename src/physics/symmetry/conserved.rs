@@ -222,7 +222,7 @@ fn search(
     let found = singular(&plain.mixed(&rates)).ok_or(SymmetryError::NotFinite { what: "the rate of a quantity" })?;
     let separation = Separation::new(&found.values, tolerance);
     let zero = &found.vectors[..separation.count.unwrap_or(0)];
-    // What of every conserved quantity is no combination of known ones.
+    // The part of every conserved quantity that is not a combination of known ones.
     let mix = |share: &[f64], columns: &[Vec<f64>]| {
         let mut total = vec![0.0; columns.first().map_or(0, Vec::len)];
         share.iter().zip(columns).for_each(|(x, column)| super::null_space::add(&mut total, column, *x));

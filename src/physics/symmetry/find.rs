@@ -8,10 +8,10 @@ use super::{Algebra, Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
 
-/// Functions of which less is left beside the others count as their combinations, as `sin^2` beside `1` and `cos 2x`.
+/// Functions with a smaller part independent of the others count as combinations of them, as `sin^2` beside `1` and `cos 2x`.
 const DEPENDENT: f64 = 1e-7;
 
-/// Growth of the noise of a field that fewer functions are worth.
+/// Largest factor by which the noise of a field may grow to need fewer functions.
 const WORSE: f64 = 3.0;
 
 /// Fields times the cube of their unknown coefficients up to which fields of few functions are sought, half a minute.
@@ -38,7 +38,7 @@ pub struct Symmetries {
     pub states: usize,
     /// See `states`.
     pub singular_states: usize,
-    /// What is conserved because `L` does not depend on the parameter of the motion.
+    /// The quantity that is conserved because `L` does not depend on the parameter of the motion.
     pub invariant: Invariant,
     /// For every field, whether its charge is conserved: forces beside those of `L`, such as friction, do no work along the field.
     pub conserved: Vec<bool>,
@@ -209,7 +209,7 @@ impl Unknowns<'_> {
         rows.map(|(k, ((x, dx), w))| w * (self.sample.g[k * n + i] * x + self.sample.p[k * n + i] * dx)).collect()
     }
 
-    /// Takes out of rows of coefficients what is noise of functions that nearly depend on each other.
+    /// Removes the noise of nearly dependent functions from rows of coefficients.
     fn refine(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
         let (n, functions) = (self.sample.n, self.columns.values.len());
         let column = |place: usize| match (place / functions, place % functions) {

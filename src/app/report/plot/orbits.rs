@@ -135,7 +135,7 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
     let piece = longest.div_ceil(PIECES).max(2);
     let mut panels = Vec::new();
     for path in &trace.paths {
-        // What leaves the window is a gap.
+        // Points outside the window form a gap.
         let gap = (f64::NAN, f64::NAN);
         let points: Vec<(f64, f64)> = path.points.iter().map(|p| if inside(p) { *p } else { gap }).collect();
         let Some(&first) = points.iter().find(|p| fine(p.0) && fine(p.1)) else { continue };

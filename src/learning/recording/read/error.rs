@@ -142,20 +142,20 @@ pub enum Problem {
         /// A possible reason.
         hint: &'static str,
     },
-    /// A standard deviation that is none.
+    /// An invalid standard deviation.
     #[error("row {row}, column {column}: expected a standard deviation above 0, found {found}")]
     Error {
         /// The row.
         row: u64,
         /// The column.
         column: String,
-        /// What stands there.
+        /// The text found there.
         found: f64,
     },
     /// A header and nothing below.
     #[error("no rows of numbers")]
     NoRows,
-    /// Too little to learn from.
+    /// Too few rows for a fit.
     #[error("expected at least {least} rows without a gap in time, found {found}")]
     TooFew {
         /// Fewest samples of a trajectory.

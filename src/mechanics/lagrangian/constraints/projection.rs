@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 /// Steps of Newton's method.
 const MAX_STEPS: usize = 60;
-/// Defects below this many roundings of the state are none.
+/// Defects below this many roundings of the state count as zero.
 const ROUNDINGS: f64 = 1024.0;
 
 /// A state from which no way to the constraints was found.

@@ -283,7 +283,7 @@ pub(super) struct Load<R> {
 }
 
 impl<R: Real> Load<R> {
-    /// In and about the frame before.
+    /// In and about the previous frame.
     fn seen(&self, frame: &Frame<R>) -> Self {
         let force = frame.outward(self.force);
         Self { force, moment: add(frame.outward(self.moment), cross(frame.place, force)) }
@@ -291,7 +291,7 @@ impl<R: Real> Load<R> {
     fn with(&self, other: Self) -> Self {
         Self { force: add(self.force, other.force), moment: add(self.moment, other.moment) }
     }
-    /// What the joint has to bear.
+    /// Forces and moments that the joint transmits.
     fn along(&self, slides: bool) -> R {
         if slides { self.force[2] } else { self.moment[2] }
     }

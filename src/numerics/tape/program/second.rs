@@ -18,7 +18,7 @@ use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// Numbers by rising direction; those left out are zero.
+/// Numbers by increasing direction; those left out are zero.
 type Sparse<R> = Vec<(u32, R)>;
 
 /// Directions along which second derivatives are taken, and which of them are wanted.
@@ -29,7 +29,7 @@ pub(crate) struct Directions<R> {
     /// Inputs by which the second derivative is taken, and the direction that is the input's own: of two such inputs the derivative
     /// stands with the later one.
     pub rows: Vec<Option<u32>>,
-    /// Directions from here on are nobody's own: derivatives along them stand with every input.
+    /// Directions from here on belong to no single input: derivatives along them are kept with every input.
     pub shared: u32,
     /// Numbers of tangents at most.
     pub budget: usize,
@@ -92,7 +92,7 @@ const LISTS: usize = 8;
 enum Partials<R> {
     /// `y = f(a)`, `f'`.
     One(Unary, R),
-    /// `y = f(a, b)`, both first ones.
+    /// `y = f(a, b)` with both first derivatives.
     Two(Binary, (R, R)),
 }
 
