@@ -11,7 +11,7 @@ use crate::recording::{LARGE_ERROR, Targets};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Jitter that is rounding of the times.
+/// Largest jitter that counts as rounding of the times.
 const ROUNDING: f64 = 1e-9;
 /// Lines of a table that can be long.
 const LINES: usize = 20;

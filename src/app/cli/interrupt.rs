@@ -26,7 +26,7 @@ pub fn watch() -> io::Result<()> {
     }
     let flag = FLAG.get_or_init(|| Arc::new(AtomicBool::new(true)));
     for (signal, code) in SIGNALS {
-        // What is ignored from the start, as SIGHUP is under nohup, stays ignored.
+        // A signal that is ignored from the start, as SIGHUP under nohup, stays ignored.
         if signal == SIGHUP && !ends(signal, std::fs::read_to_string("/proc/self/status").ok().as_deref()) {
             continue;
         }

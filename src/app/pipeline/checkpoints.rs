@@ -74,7 +74,7 @@ impl Checkpoints {
         remove_checkpoints(self.files.as_ref(), &self.directory).map_err(cannot)
     }
 
-    /// Who writes them, and the one to continue from, or none, with old checkpoints out of the way.
+    /// The writer of checkpoints, and the checkpoint to continue from, if any, after old ones were removed.
     ///
     /// # Errors
     /// [`PipelineError::Checkpoint`] for one that must be there and is not, or that is of another run.

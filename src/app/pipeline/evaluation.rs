@@ -336,7 +336,7 @@ fn grids(
             fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
         };
-        // A model that is finite nowhere on the grid has no picture; the tables say so.
+        // A model that is nowhere finite on the grid has no picture; the tables report this.
         figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
             figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
             figure

@@ -111,7 +111,7 @@ impl From<Recording> for LoadedRecording {
     }
 }
 
-/// Relative error of accelerations by smoothing above which the motion itself is the better teacher.
+/// Relative error of accelerations by smoothing above which a fit should learn from the motion itself.
 pub const LARGE_ERROR: f64 = 0.1;
 
 /// Share of the spread of a known force that is taken to accelerate, where the size of an inertia is looked for.

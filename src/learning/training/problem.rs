@@ -60,7 +60,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         self.validation
     }
 
-    /// Moments before the first step of an update rule, with the weight matrices that SOAP turns.
+    /// Moments before the first step of an update rule, with the weight matrices in whose eigenbases SOAP works.
     pub fn moments(&mut self, method: Method) -> Moments<S> {
         let model = self.objective().model();
         Moments::for_method(method, model.parameters(), model.matrices())

@@ -339,7 +339,7 @@ fn differentiated<S: Scalar>(
         terms.force.resize(n, S::nan());
         Rayleigh(friction).force(q, v, &mut terms.force);
     }
-    // A row that fails has the acceleration NaN, which is what there is to say of one state.
+    // A row that fails has the acceleration NaN, which is all that can be reported for one state.
     let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
     terms.acceleration
 }

@@ -70,7 +70,7 @@ pub enum Size {
         least: usize,
         /// Largest value.
         most: usize,
-        /// What stands at so many places.
+        /// Values at a number of states.
         layout: Layout,
     },
 }
@@ -92,7 +92,7 @@ impl Layout {
             Self::Net => 3 * chosen * chosen,
         }
     }
-    /// The integer that gives so many coordinates.
+    /// The integer that gives a number of coordinates.
     pub(crate) const fn chosen(self, coordinates: usize) -> usize {
         match self {
             Self::Line => coordinates,
@@ -282,7 +282,7 @@ pub struct System {
     pub(crate) validation: PerSize<Bounds>,
     /// Trajectory test.
     pub(crate) trajectory: PerSize<TrajectoryTest>,
-    /// Where the coordinates make sense; the error says what is demanded.
+    /// Domain of the coordinates; the error states the condition.
     pub(crate) domain: Option<Domain>,
     /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
     pub(crate) plane: Option<Plane>,

@@ -77,7 +77,7 @@ struct Position<'a, S> {
     since: S,
     steps: usize,
     h: S,
-    /// What is known of the rows of constraints.
+    /// Knowledge about the rows of constraints.
     regular: Option<Regularity<'a, S>>,
 }
 

@@ -29,7 +29,7 @@ pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 /// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
 pub(super) type StepNodes<'a, S> = dyn FnMut(S, S, &[S]) + 'a;
 
-/// What an integration hands its results to.
+/// The receiver of an integration's results.
 pub(super) type Receivers<'a, 'f, S> = (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>);
 
 /// Parts of a step that have three nodes of Gauss each.

@@ -21,7 +21,7 @@ const HALVINGS: (usize, usize) = (52, 12);
 const PLACES: usize = 16;
 const DIVISIONS: usize = 40;
 
-/// What is known of the rows so far.
+/// Knowledge about the rows so far.
 pub(super) struct Regularity<'a, S> {
     manifold: &'a dyn Manifold<S>,
     /// 1, or -1 for a motion backwards in time.

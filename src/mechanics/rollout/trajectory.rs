@@ -82,7 +82,7 @@ impl<S: Scalar> Trajectory<S> {
         (&self.q[rows.clone()], &self.v[rows])
     }
 
-    /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot say.
+    /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot evaluate it.
     #[doc(hidden)]
     pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
         let size = CHUNK * self.coordinates.max(1);
@@ -192,7 +192,7 @@ impl<S: Copy> Times<S> for Vec<S> {
     }
 }
 
-/// The samples that options ask for: `t0 + k dt`, and `t_end` as the last.
+/// The samples of the options: `t0 + k dt`, and `t_end` as the last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples<S> {
     t0: S,

@@ -84,7 +84,7 @@ pub enum TapeError {
         /// Nodes it may hold.
         limit: u32,
     },
-    /// A result was asked of a tape for a variable that it did not record.
+    /// A result was requested from a tape for a variable that it did not record.
     Foreign,
     /// A slice has the wrong length.
     Shape {

@@ -94,7 +94,7 @@ pub struct Survey {
     pub(crate) held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
-    /// Names of coordinates that stand still: nothing can be learned from them.
+    /// Names of coordinates that stand still: nothing can be learned about them.
     pub motionless: Vec<String>,
     /// Names of coordinates that follow from those before them: nothing can be learned of both.
     pub copies: Vec<String>,

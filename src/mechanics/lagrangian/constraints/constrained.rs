@@ -37,7 +37,7 @@ pub enum ConstraintError {
     },
     /// Constraints of another number of coordinates or parameters.
     Shape {
-        /// What there is of them.
+        /// What is constrained.
         what: &'static str,
         /// Number expected.
         expected: usize,

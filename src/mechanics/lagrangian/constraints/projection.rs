@@ -59,7 +59,7 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
     Ok([moved(&before[0], q), moved(&before[1], v)])
 }
 
-/// What a state misses of some rows: the values of functions of the coordinates, or the rates of all rows.
+/// Defects of a state in some rows: the values of functions of the coordinates, or the rates of all rows.
 struct Defects<'a, S: Scalar> {
     manifold: &'a dyn Manifold<S>,
     of_rates: bool,

@@ -49,9 +49,9 @@ pub(super) struct Row {
     pub slides: bool,
     /// Where the ten constants of the link stand among the parameters: `m`, `h`, `Ixx`, `Ixy`, `Ixz`, `Iyy`, `Iyz`, `Izz`.
     pub inertia: [usize; 10],
-    /// Where the inertia of the drive stands.
+    /// Index of the inertia of the drive.
     pub armature: Option<usize>,
-    /// Where viscous and dry friction stand.
+    /// Indices of viscous and dry friction.
     pub friction: Option<[usize; 2]>,
 }
 
@@ -99,7 +99,7 @@ struct Link<R> {
     dry: R,
 }
 
-/// What a recursion knows of each link on its way: its frame, and what the link alone takes to move.
+/// Data of each link during a recursion: its frame, and the forces that the link alone needs to move.
 pub(super) type Passes<R> = Vec<(Frame<R>, Load<R>)>;
 
 /// A chain of links with its constants.

@@ -173,7 +173,7 @@ impl<S: Scalar> Operation<S> {
 }
 
 impl<S: Scalar> MixedReverse<'_, S> {
-    /// `true` if adjoints of a value lead to anything asked for.
+    /// `true` if adjoints of a value lead to a requested result.
     pub fn wants(&self, value: usize) -> bool {
         let value = &self.kept.values[value];
         value.trainable || (self.inputs.is_some() && value.kind != Dependence::Constant)
