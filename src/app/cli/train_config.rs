@@ -243,7 +243,7 @@ enum Unusable {
 }
 
 impl Unusable {
-    /// As a mistake of a configuration.
+    /// The error as a mistake in a configuration.
     fn mistake(&self) -> Mistake {
         match self {
             Self::System(error) => Mistake::new("system", error),

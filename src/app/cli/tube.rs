@@ -120,7 +120,7 @@ impl TubeArgs {
     }
 }
 
-/// The beginning of every motion that lasts this long, from the first state that is known well.
+/// The beginning of every motion of at least this length, from the first accurate state.
 fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
     let n = part.recording.n();
     let estimated = part.estimated();

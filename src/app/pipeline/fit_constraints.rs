@@ -23,7 +23,7 @@ pub(crate) struct FitHeld {
 }
 
 impl FitHeld {
-    /// The constraints that the options ask for, those of them that are independent, if there are any; and remarks.
+    /// The independent constraints that the options request, if any, and remarks.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`].

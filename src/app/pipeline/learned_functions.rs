@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 const CURVE: usize = 161;
 /// Step of the differences of momenta over the range of a coordinate.
 const STEP: f64 = 1e-4;
-/// Components of a matrix that have a picture, at most.
+/// Largest number of components of a matrix that get a picture.
 pub(super) const MAPS: usize = 10;
 /// Components off the diagonal that have a picture exceed this part of those on it, root mean squares.
 const SHOWN: f64 = 0.02;

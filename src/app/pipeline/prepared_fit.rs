@@ -60,7 +60,7 @@ impl<'a> PreparedFit<'a> {
         self.held.as_ref().map(|held| &held.constraints)
     }
 
-    /// States that are learned from, that choose the best epoch and that judge; projected onto the constraints if there are any.
+    /// Training, validation and test states; projected onto the constraints if there are any.
     ///
     /// # Errors
     /// As of [`RecordingSplit::datasets`]; [`PipelineError::Constraints`] for a state from which no way leads to the constraints.

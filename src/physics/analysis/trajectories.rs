@@ -42,7 +42,7 @@ const LEARNED_STEPS: usize = 30_000;
 /// atol 1e-8.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryTest<S> {
-    /// Where motions start.
+    /// The initial states of motions.
     pub bounds: StartBox,
     /// Number of starts; the paper takes 4.
     pub starts: usize,

@@ -24,7 +24,7 @@ pub struct Reading {
     pub learned: Option<f64>,
     /// Error, relative where there is an exact value; none if it has no learned one.
     pub error: Option<f64>,
-    /// Error that is aimed at.
+    /// Target error.
     pub aim: f64,
 }
 

@@ -60,7 +60,7 @@ impl<S: Scalar> CanonicalForm<S> {
         action.fold(-self.lagrangian, |sum, x| sum + x)
     }
 
-    /// Terms of `L` at velocities `(batch, n)` turned into those of `L'`, whichever there are.
+    /// Turns the given terms of `L` at velocities `(batch, n)` into those of `L'`.
     fn apply(&self, v: &[S], terms: &mut Terms<S>) {
         let (s, n, energy) = (self.factor, self.momentum.len().max(1), self.energy());
         for (value, v) in terms.lagrangian.iter_mut().zip(v.chunks_exact(n)) {

@@ -223,7 +223,7 @@ pub(crate) fn orthonormal(given: &[Vec<f64>], least: f64) -> Orthonormal {
 }
 
 impl Orthonormal {
-    /// The columns of the kept `given`, mixed as the orthonormal ones are.
+    /// The kept columns of `given`, combined like the orthonormal ones.
     pub fn mixed(&self, given: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let one = |mix: &Vec<f64>| {
             let mut sum = vec![0.0; given.first().map_or(0, Vec::len)];
