@@ -36,7 +36,7 @@ enum Found {
     Finished(String, String),
 }
 
-/// The text of a run that is there.
+/// The text of an existing run.
 #[derive(Clone, Copy, Debug)]
 pub enum Text<'a> {
     /// That of its checkpoint.

@@ -38,7 +38,7 @@ const FAST: f64 = 0.99;
 pub struct Evaluation {
     /// Error of the accelerations of fresh states, one entry per coordinate.
     pub accelerations: Vec<ErrorDistribution>,
-    /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
+    /// Fraction of the fresh states whose mass matrix lacks the signature of the exact one.
     pub wrong_signature: f64,
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states; under constraints at the fresh
     /// states themselves, within the directions that the constraints leave.

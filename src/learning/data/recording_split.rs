@@ -160,7 +160,7 @@ fn is_complete(track: &RecordedTrajectory, targets: Targets) -> bool {
     targets.takes_measured() && !track.a.is_empty() && !track.v.is_empty()
 }
 
-/// Recorded motion, ready to learn from.
+/// Recorded motion, ready for training.
 #[derive(Clone, Debug)]
 pub struct RecordingSplit {
     /// Noise and windows.

@@ -72,7 +72,7 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
     for over in [false, true] {
         for (index, orbit) in orbits.iter().enumerate().filter(|(_, orbit)| orbit.over == over) {
             let (colour, width) = if over { (LINES[index % LINES.len()], OVER_WIDTH) } else { BELOW_LINE };
-            // Far outside is as good as anywhere outside.
+            // Any position outside will do.
             let near =
                 |(x, y): (f64, f64)| (x.clamp(-area.width, 2.0 * area.width), y.clamp(-area.height, 2.0 * area.height));
             let lines = stretches(&orbit.points).into_iter().filter(|stretch| stretch.len() > 1);

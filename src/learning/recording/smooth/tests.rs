@@ -58,7 +58,7 @@ fn relative_errors(smoothed: &Smoothed, i: usize, biased: f64) -> [Vec<f64>; 3] 
     })
 }
 
-/// Share of the errors that are no larger than so many times what is said.
+/// Share of the errors within a multiple of the stated ones.
 fn within(relative: &[f64], times: f64) -> f64 {
     relative.iter().filter(|x| x.abs() <= times).count() as f64 / relative.len() as f64
 }
