@@ -30,7 +30,7 @@ use rand::Rng;
 pub enum SystemError {
     /// No system of this name.
     UnknownSystem {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// Names there are.
         known: Vec<String>,

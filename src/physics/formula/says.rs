@@ -17,7 +17,9 @@ impl FoundFormula {
         findings.gap().table(&headers, self.terms.iter().map(FoundTerm::row));
         if let Some(Rival { terms, cost }) = &self.rival {
             let (terms, cost) = (terms.join(", "), rounded(*cost, 3));
-            findings.gap().line(format!("next best: {terms}; its cost is {cost} higher (sum of squares over the noise variance, plus 30 per term)"));
+            findings.gap().line(format!(
+                "next best: {terms}; its cost is {cost} higher (sum of squares over the noise variance, plus 30 per term)"
+            ));
         }
         if self.verdict == Verdict::NotInLibrary && !self.left.is_empty() {
             let rows = self.left.iter().map(|left| {
@@ -42,7 +44,7 @@ impl FoundFormula {
         findings.line(if self.of_model {
             format!("{verdict}: accelerations differ from the model's by {residual} of their size")
         } else {
-            let bound = if self.noise_resolved { "" } else { ", an upper bound of which was assumed" };
+            let bound = if self.noise_resolved { "" } else { " (the noise is an upper bound)" };
             format!("{verdict}: the residual of held-out motion is {residual} times its noise{bound}")
         });
         findings.lines(self.doubts.iter().map(|doubt| format!("in doubt: {doubt}")));

@@ -164,7 +164,7 @@ impl Data {
             .into_iter()
             .zip(&self.observed)
             .map(|(square, [size, _, independent])| {
-                // Nothing is known better than numbers have digits.
+                // No number is known more accurately than its digits.
                 let square = square.max(1e-20 * size).max(f64::MIN_POSITIVE.sqrt());
                 independent / (square * self.states() as f64)
             })
