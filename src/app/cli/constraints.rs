@@ -132,7 +132,7 @@ pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
     if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
 }
 
-/// The tables of a file that contain its constraints.
+/// Lines of the constraints of a file, by name.
 fn lines(file: &Path) -> Result<impl Fn(&str) -> usize, CliError> {
     let lines = config::lines(&config::read_text(file)?.1);
     Ok(move |name: &str| lines.get(&format!("constraints.{name}")).copied().unwrap_or(usize::MAX))

@@ -456,7 +456,7 @@ mod tests {
         expected.lbfgs = Some(Lbfgs { memory: 3, ..Lbfgs::default() });
         expected.parameters.insert("m1".to_string(), 2.0);
         assert_eq!(config, expected);
-        // There are as many phases as in the file; those beyond the base's take its last one as their base.
+        // There are as many phases as in the file; those beyond the base's default to its last one.
         let (config, mistakes) = file("double-pendulum", "[[phase]]\nepochs = 3\n[[phase]]\nrate = 1\n");
         assert_placed(&mistakes, &[]);
         assert_eq!(config.phases.len(), 2);

@@ -30,7 +30,7 @@ pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
     Ok(pipeline::model_file(path)?)
 }
 
-/// Error message of a command that does not support constraints.
+/// The error of a command that does not support the constraints of a motion.
 pub fn held(name: &dyn std::fmt::Display) -> CliError {
     CliError::usage(format_args!("{name}: {}", pipeline::CONSTRAINTS_UNSUPPORTED))
 }

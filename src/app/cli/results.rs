@@ -137,7 +137,7 @@ pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
         let path = entry.path();
         if numbered && entry.file_type().is_ok_and(|kind| kind.is_dir()) && path.join(EVALUATED[0]).is_file() {
             remove(&path, &EVALUATED)?;
-            // The directory and its other contents stay.
+            // A directory with other contents stays.
             let _ = fs::remove_dir(&path);
         }
     }

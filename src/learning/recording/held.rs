@@ -59,7 +59,7 @@ pub(crate) fn filled(recording: &Recording) -> Option<Filled> {
     held.iter().flatten().any(|held| *held).then_some(Filled { recording: filled, held })
 }
 
-/// The smallest difference that a sensor resolves.
+/// The resolution of a sensor.
 struct Scale {
     /// Smallest change of a reading.
     smallest: f64,

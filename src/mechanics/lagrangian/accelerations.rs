@@ -48,7 +48,7 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Solved<'a, S> {
-    /// The original, for a model that adds to these equations.
+    /// The motion that was recorded, for a model that adds to these equations.
     motion: Arc<dyn RecordMotion<S>>,
     program: Arc<Program<S>>,
     parameters: Vec<S>,
@@ -71,7 +71,7 @@ impl<'a, S: Scalar> Solved<'a, S> {
         Self { flag: other.flag, ..self }
     }
 
-    /// The original and the values of its parameters.
+    /// The motion that was recorded, and the values of its parameters.
     pub(super) fn motion(&self) -> (&Arc<dyn RecordMotion<S>>, &[S]) {
         (&self.motion, &self.parameters)
     }

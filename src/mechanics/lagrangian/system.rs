@@ -70,7 +70,7 @@ pub enum Size {
         least: usize,
         /// Largest value.
         most: usize,
-        /// Values at a number of states.
+        /// The coordinates and parameters for a given integer.
         layout: Layout,
     },
 }

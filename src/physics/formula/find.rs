@@ -396,7 +396,7 @@ impl Judged<'_> {
         (self.square / self.count.max(1.0)).sqrt()
     }
 
-    /// Standard deviation of the residual that a small count causes.
+    /// Three standard deviations of the residual, which matter if its count is small.
     fn scatter(&self) -> f64 {
         3.0 / (2.0 * self.count.max(1.0)).sqrt()
     }

@@ -65,7 +65,7 @@ impl LearnedHole<'_> {
         Reading { quantity: quantity.into(), exact: None, learned: None, error, aim }
     }
 
-    /// A quantity of both metrics.
+    /// A quantity of both metrics; none where the learned one does not have it.
     fn both<T>(
         &self,
         of: impl Fn(&dyn EulerLagrange<f64>) -> Result<T, GeometryError>,

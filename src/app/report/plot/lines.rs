@@ -62,7 +62,7 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
     }
 
     let mut inner = Panel::new(area.width, area.height);
-    // The lines that others are drawn over come first.
+    // Lines that are drawn over others come last.
     let mut order: Vec<usize> = (0..series.len()).collect();
     order.sort_by_key(|&index| series[index].over);
     for index in order {
