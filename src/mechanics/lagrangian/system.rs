@@ -70,7 +70,7 @@ pub enum Size {
         least: usize,
         /// Largest value.
         most: usize,
-        /// The coordinates and parameters for a given integer.
+        /// The arrangement of that many parts: along a line or in a net.
         layout: Layout,
     },
 }
