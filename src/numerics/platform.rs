@@ -1,4 +1,4 @@
-//! What the standard library gives, and what stands in for it without: locks, values made once, maps, functions of floats.
+//! The standard library's services, and replacements without it: locks, values made once, maps, functions of floats.
 //!
 //! With the feature `std` these are the standard library's own. Without it locks spin, maps are ordered, and functions of floats are those of `libm`.
 
@@ -59,7 +59,7 @@ mod without_std {
         mutex.lock()
     }
 
-    /// A value that is made when it is first asked for.
+    /// A value that is made on first use.
     #[derive(Debug)]
     pub struct OnceLock<T>(spin::Once<T>);
 

@@ -1,4 +1,4 @@
-//! What is read off a Lagrangian, learned or written down.
+//! Analyses of a Lagrangian, learned or given.
 //!
 //! | module | contents |
 //! |---|---|

@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time between two reports at least: often enough for a person to see that the search goes on.
+/// Shortest time between two reports: often enough to show that the search continues.
 const EVERY: Duration = Duration::from_millis(200);
 
 /// How far a search is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct SearchProgress {
-    /// What is done at present, such as `short segments`.
+    /// The current stage, such as `short segments`.
     pub stage: &'static str,
     /// Iterations of this stage.
     pub iteration: usize,

@@ -1,4 +1,4 @@
-//! What a result says, in sentences and tables: written by the result, shown by whoever has a terminal, a page or a notebook.
+//! Reports of results, as sentences and tables: a result writes its report, and a terminal, a page or a notebook shows it.
 
 use crate::names::{WIDTH, cut, cut_hard, width};
 use alloc::string::{String, ToString};
@@ -22,7 +22,7 @@ pub enum Finding {
     },
 }
 
-/// What a result says, in the order in which it is read.
+/// The report of a result, in reading order.
 ///
 /// [`Display`] writes it for a terminal; the parts are there for other media.
 ///
@@ -92,7 +92,7 @@ impl Display for Findings {
 
 /// Blanks between two columns.
 const GAP: usize = 2;
-/// Least width of a column of words that is narrowed.
+/// Smallest width to which a column of words is narrowed.
 const LEAST: usize = 24;
 
 /// Text of a table with aligned columns: numbers to the right, words to the left, no trailing blanks, lines of at most
@@ -164,7 +164,7 @@ impl Column {
     }
 }
 
-/// Widths of columns that stand beside each other.
+/// Widths of adjacent columns.
 fn widths(columns: &[&Column]) -> Vec<usize> {
     let most = WIDTH.saturating_sub(GAP * (columns.len() - 1));
     let natural: Vec<usize> = columns.iter().map(|column| column.natural()).collect();
@@ -194,13 +194,13 @@ fn widths(columns: &[&Column]) -> Vec<usize> {
     }
 }
 
-/// Columns that stand beside each other.
+/// Adjacent columns.
 fn block_text(columns: &[&Column]) -> String {
     let widths = widths(columns);
     let mut text = String::new();
     let headers: Vec<Vec<String>> = columns.iter().zip(&widths).map(|(column, &at)| column.header(at)).collect();
     let lines = headers.iter().map(Vec::len).max().unwrap_or(1);
-    // Headers of fewer lines stand at the bottom.
+    // Headers of fewer lines are at the bottom.
     let header =
         |k: usize, line: usize| (line + headers[k].len()).checked_sub(lines).map(|line| headers[k][line].as_str());
     for line in 0..lines {
@@ -269,7 +269,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 4, "{text}");
         assert!(lines[2].starts_with("---") && lines[3].split_whitespace().count() == 8, "{text}");
-        // A header of fewer lines stands at the bottom.
+        // A header of fewer lines is at the bottom.
         let text = text_table(&[&headers[..], &["n".to_string()]].concat(), &[vec!["0.0123"; 9]]);
         assert!(text.lines().nth(2).unwrap().ends_with(" n") && widest(&text) <= WIDTH, "{text}");
     }

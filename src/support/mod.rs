@@ -1,4 +1,4 @@
-//! What every floor above needs and none is about: cancellation, names in messages, files, memory.
+//! Common ground of all floors above: cancellation, names in messages, files, memory.
 //!
 //! | module | contents |
 //! |---|---|

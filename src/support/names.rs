@@ -79,7 +79,7 @@ fn without_error_numbers(text: &str) -> String {
     })
 }
 
-/// Digits from which on a number is written with an exponent; the largest whole number of 64 bits has one fewer.
+/// Digits at and above which a number is written with an exponent; the largest whole number of 64 bits has one fewer.
 const MOST_DIGITS: usize = 21;
 
 /// A text whose long decimal numbers have exponents; digits inside words and paths stay.

@@ -70,7 +70,7 @@ fn signature(text: &str) -> Result<Signature, String> {
     found.ok_or_else(|| "expected P,N, the numbers of positive and of negative eigenvalues".to_string())
 }
 
-/// What was proven, and of which columns.
+/// The certificate and the columns that it is about.
 #[derive(Serialize)]
 struct Named {
     system: String,

@@ -11,7 +11,7 @@ use crate::recording::{LARGE_ERROR, Targets};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Jitter that is rounding of the times.
+/// Largest jitter that counts as rounding of the times.
 const ROUNDING: f64 = 1e-9;
 /// Lines of a table that can be long.
 const LINES: usize = 20;
@@ -33,7 +33,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let reading = args.recording.read()?;
     let survey = survey(&reading, &SurveyOptions::default()).map_err(CliError::data)?;
-    // What a fit would begin with says whether it can begin.
+    // A fit is possible if its preparation succeeds.
     let prepared = PreparedFit::new(&reading, &FitOptions::default());
     let obstacle = prepared.and_then(|prepared| prepared.suggest("", Precision::F64)).err();
     let found = Found { survey, obstacle: obstacle.map(|error| error.to_string()) };
@@ -134,7 +134,7 @@ fn section(table: &str) -> String {
     format!("\n{table}")
 }
 
-/// A sentence that says how well a fit can learn.
+/// A sentence about how well a fit can learn.
 fn headline(found: &Survey) -> String {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let looked = match (found.warnings.len(), found.suspicious_count) {

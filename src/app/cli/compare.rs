@@ -29,10 +29,10 @@ pub struct Args {
     /// by the coordinates if not given.
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
     basis: Option<Degrees>,
-    /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; what both have in common if not given.
+    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3; what both have in common if not given.
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are looked at; two for every unknown coefficient if not given.
+    /// States that are examined; two for every unknown coefficient if not given.
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.

@@ -40,7 +40,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Columns are those of data; a Lagrangian has none.
+/// Column options apply only to data, not to a Lagrangian.
 fn optional(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.value_name("DATA|MODEL|SYSTEM").help(
@@ -101,7 +101,7 @@ fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), Cli
     out.write(text.as_bytes())
 }
 
-/// What a system or a model says of its constraints and of its degeneracy.
+/// Prints the constraints and degenerate directions of a system or a model.
 fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if args.out.is_some() {
         return Err(CliError::usage("--out needs recorded motion; a system already lists its constraints in its file"));
@@ -132,7 +132,7 @@ pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
     if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
 }
 
-/// Where the constraints of a file stand in it.
+/// Lines of the constraints of a file, by name.
 fn lines(file: &Path) -> Result<impl Fn(&str) -> usize, CliError> {
     let lines = config::lines(&config::read_text(file)?.1);
     Ok(move |name: &str| lines.get(&format!("constraints.{name}")).copied().unwrap_or(usize::MAX))

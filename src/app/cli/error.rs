@@ -50,11 +50,11 @@ impl CliError {
     pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
         Self::data(format_args!("{}: {problem}", path.display()))
     }
-    /// A signal; says what was kept.
+    /// A signal; the message names what was kept.
     pub fn interrupted(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Interrupted, message: one_line(&message.to_string()) }
     }
-    /// A signal during a search, of which a part is worth nothing.
+    /// A signal during a search whose partial results are worthless.
     pub fn nothing_written() -> Self {
         Self::interrupted("interrupted: nothing was found and nothing was written")
     }

@@ -1,4 +1,4 @@
-//! `lnn fit`: learns from recorded motion, judges by motion that was held out, writes.
+//! `lnn fit`: learns from recorded motion, tests the model on held-out motion, writes the results.
 
 use crate::cli::fit_config::{Args, Plan, Saved};
 use crate::cli::learn::{Learned, Session, open};

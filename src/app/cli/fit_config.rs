@@ -1,4 +1,4 @@
-//! Arguments of `lnn fit` and the configuration they come to.
+//! Arguments of `lnn fit` and the resulting configuration.
 
 use crate::cli::CliError;
 use crate::cli::constraints::formulas;
@@ -49,18 +49,18 @@ impl Args {
 /// Path of the training in the configuration of a fit.
 const TRAINING: &str = "training.";
 
-/// What files and arguments say of a fit, before its data are read.
+/// Settings of a fit from files and arguments, before its data are read.
 pub struct Plan<'a> {
     /// The arguments.
     pub args: &'a Args,
-    /// The configuration, as far as it is known without the data.
+    /// The configuration as far as it is known without the data.
     pub config: FitConfig,
     layers: Layers,
-    /// The fit that goes on.
+    /// The fit that continues.
     saved: Option<Saved>,
 }
 
-/// A fit that goes on: its configuration, and the directory in which it was started.
+/// A fit that continues: its configuration, and the directory in which it was started.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Saved {
     directory: PathBuf,
@@ -103,7 +103,7 @@ impl Saved {
 }
 
 impl<'a> Plan<'a> {
-    /// Reads the file that the arguments name, if they do, and looks for everything that is wrong; beside a fit that goes on the
+    /// Reads the file that the arguments name, if they do, and looks for all mistakes; beside a fit that continues the
     /// arguments may say nothing else than it does, but for the files.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ impl<'a> Plan<'a> {
         Ok(Self { config, ..plan })
     }
 
-    /// The configuration of a fit that goes on, with the files of the arguments.
+    /// The configuration of a fit that continues, with the files of the arguments.
     fn beside(&self, saved: &Saved) -> Result<FitConfig, CliError> {
         let (mut config, mistakes) = self.layers.over(&saved.fit)?;
         self.layers.check(mistakes)?;

@@ -83,7 +83,7 @@ pub enum Format {
     Rust,
 }
 
-/// Columns are those of motion: a model has its own.
+/// Column options apply only to recorded motion, not to a model.
 fn motion_or_model(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.value_name("DATA|MODEL").help(

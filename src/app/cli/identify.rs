@@ -86,7 +86,7 @@ impl From<Met> for Targets {
     }
 }
 
-/// Columns are those of the system unless others are named.
+/// Columns have the names of the system's coordinates unless others are given.
 fn of_the_system(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "coords" => {

@@ -270,7 +270,7 @@ impl<S: Scalar> Slopes<S> {
     }
 }
 
-/// Everything there is to say about state `k` of a batch; `factor` is that of a canonical form.
+/// All results for state `k` of a batch; `factor` is that of a canonical form.
 fn fields<'a, S>(
     n: usize,
     k: usize,

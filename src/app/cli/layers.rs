@@ -16,7 +16,7 @@ use toml::{Table, Value};
 /// Wrong values that are listed at most: each is looked for in the whole configuration.
 const MOST_MISTAKES: usize = 100;
 
-/// The key that says of which kind a table is.
+/// The key that names the kind of a table.
 const KIND: &str = "kind";
 
 /// A wrong value of a key.
@@ -262,7 +262,7 @@ impl Layers {
         }
     }
 
-    /// What is wrong with a value that was refused.
+    /// The problem with a value that was refused.
     fn problem(&self, path: &str, value: &Value, message: &str) -> String {
         let key = find_key(self.keys, path);
         if let Some(name) = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next()) {
@@ -369,7 +369,7 @@ fn put(root: &mut Value, path: &[Step], value: &Value) -> Result<(), &'static st
     const NOWHERE: &str = "there is no such key or element";
     let Some((first, rest)) = path.split_first() else {
         match (&mut *root, value) {
-            // An empty table says that it is there.
+            // An empty table means that the key is present.
             (Value::Table(_), Value::Table(new)) if new.is_empty() => {}
             // Of a list of tables the number; those beyond the base's are as its last.
             (Value::Array(old), Value::Array(new)) if is_list_of_tables(old) && is_list_of_tables(new) => {
@@ -456,7 +456,7 @@ mod tests {
         expected.lbfgs = Some(Lbfgs { memory: 3, ..Lbfgs::default() });
         expected.parameters.insert("m1".to_string(), 2.0);
         assert_eq!(config, expected);
-        // Phases are as many as the file's; those beyond the base's are as its last.
+        // There are as many phases as in the file; those beyond the base's default to its last one.
         let (config, mistakes) = file("double-pendulum", "[[phase]]\nepochs = 3\n[[phase]]\nrate = 1\n");
         assert_placed(&mistakes, &[]);
         assert_eq!(config.phases.len(), 2);

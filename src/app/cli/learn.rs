@@ -1,4 +1,4 @@
-//! What `lnn train` and `lnn fit` do around their learning: a directory, checkpoints, the result on standard output, the end.
+//! Common parts of `lnn train` and `lnn fit` around the training: directory, checkpoints, results on standard output, end.
 
 use crate::cli::folder::Folder;
 use crate::cli::learned::model_file;
@@ -76,7 +76,7 @@ impl<'a> Session<'a> {
         watch(&self.stop)
     }
 
-    /// Prints what was learned, removes the checkpoints of a run that is over, and says how it ended.
+    /// Prints the results, removes the checkpoints of a finished run, and reports how it ended.
     ///
     /// # Errors
     /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
@@ -88,7 +88,7 @@ impl<'a> Session<'a> {
                 let on = how_to_go_on(path);
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
-            // There is no model, and nothing to go on from.
+            // There is no model, and nothing to continue from.
             Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
             Err(error) => return Err(keeping(path)(error.into())),
         };

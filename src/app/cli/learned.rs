@@ -30,7 +30,7 @@ pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
     Ok(pipeline::model_file(path)?)
 }
 
-/// What a command that knows no constraints says of a motion that is held by some.
+/// The error of a command that does not support the constraints of a motion.
 pub fn held(name: &dyn std::fmt::Display) -> CliError {
     CliError::usage(format_args!("{name}: {}", pipeline::CONSTRAINTS_UNSUPPORTED))
 }
@@ -48,7 +48,7 @@ impl<S: Scalar> Learned<S> {
         Ok(Self { header, network })
     }
 
-    /// The same of a command that knows no constraints.
+    /// The same for a command that does not support constraints.
     ///
     /// # Errors
     /// As [`Learned::load`]; a usage error for a model whose motion is held by constraints.

@@ -194,10 +194,10 @@ pub struct Facts<'a> {
     pub energy_defect: Option<f64>,
     /// Where the motion left the training range.
     pub left_training_range: Option<&'a Leaving>,
-    /// Charges of the symmetries along the motion, if asked for.
+    /// Charges of the symmetries along the motion, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charges: Option<&'a Charges>,
-    /// The tube around the coordinates, if asked for.
+    /// The tube around the coordinates, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tube: Option<TubeFacts<'a>>,
     /// The file of the samples.

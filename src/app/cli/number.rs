@@ -55,7 +55,7 @@ pub fn whole(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String
     }
 }
 
-/// A relative tolerance of an integration in double precision, which keeps no finer one; a coarser one than 1 is none.
+/// A relative tolerance of an integration in double precision: not finer than rounding, not coarser than 1.
 pub fn tolerance(text: &str) -> Result<f64, String> {
     number(Options::<f64>::least_tolerance(), 1.0)(text)
 }

@@ -22,10 +22,10 @@ pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
 }
 
-/// A result as one JSON object, or as what it says.
+/// A result as one JSON object or as text.
 ///
 /// # Errors
-/// A data error for numbers that JSON cannot say.
+/// A data error for numbers that JSON cannot represent.
 pub fn shown<T: Serialize>(result: &T, json: bool, findings: impl FnOnce(&T) -> Findings) -> Result<String, CliError> {
     if json { self::json(result) } else { Ok(findings(result).to_string()) }
 }
@@ -33,7 +33,7 @@ pub fn shown<T: Serialize>(result: &T, json: bool, findings: impl FnOnce(&T) -> 
 /// A result as a line of JSON.
 ///
 /// # Errors
-/// A data error for numbers that JSON cannot say.
+/// A data error for numbers that JSON cannot represent.
 pub fn json(result: &impl Serialize) -> Result<String, CliError> {
     Ok(serde_json::to_string(result).map_err(CliError::data)? + "\n")
 }

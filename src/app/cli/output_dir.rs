@@ -1,4 +1,4 @@
-//! Where a command writes: the directory that was asked for, or the first of `NAME`, `NAME-2`, `NAME-3`, .. that is free.
+//! Where a command writes: the directory that was requested, or the first of `NAME`, `NAME-2`, `NAME-3`, .. that is free.
 
 use crate::cli::folder::{Attempt, Folder};
 use crate::cli::results::{Writer, found, require_no_input, require_room};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// A directory that is wanted.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// Directory asked for, if one was.
+    /// Directory requested, if one was.
     pub out: Option<&'a Path>,
     /// Directory that serves if none was.
     pub usual: &'a Path,

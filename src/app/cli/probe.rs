@@ -1,4 +1,4 @@
-//! A Lagrangian that is looked into: a system or a model, the states on which it is looked at, functions of its coordinates.
+//! A system or a model under investigation, the states at which it is evaluated, and functions of its coordinates.
 
 use crate::cli::CliError;
 use crate::cli::learned::{Learned, held};
@@ -38,7 +38,7 @@ pub struct Probe {
 /// `NAME=LOW:HIGH`, the bounds of a column.
 pub type Bound = (String, [f64; 2]);
 
-/// Width of a range relative to its larger end, at the least: functions of a column that hardly moves are not told apart.
+/// Width of a range relative to its larger end, at the least: functions of a column that hardly moves are not distinguished.
 const NARROWEST: f64 = 1e-6;
 
 /// Reads [`Bound`].
@@ -57,7 +57,7 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     if wide && !name.trim().is_empty() { Ok((name.trim().to_string(), [low, high])) } else { Err(wrong()) }
 }
 
-/// Reads the singular value up to which a field counts as a symmetry.
+/// Reads the largest singular value at which a field counts as a symmetry.
 ///
 /// # Errors
 /// The range.
@@ -67,7 +67,7 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no longer a symmetry)"))
 }
 
-/// `true` for a file or directory that is none of a system.
+/// `true` for a file or directory that does not describe a system.
 fn is_model(text: &str) -> bool {
     Path::new(text).exists() && !system_arg::is_file(text)
 }
@@ -202,7 +202,7 @@ impl Probe {
             let both = [own[0].max(beside[0]), own[1].min(beside[1])];
             // The velocity that a mass shell fixes has no bounds.
             let both = match (own[0] < own[1], beside[0] < beside[1]) {
-                // Ranges that touch have nothing in common on which functions could be told apart.
+                // Ranges that touch have nothing in common on which functions could be distinguished.
                 (true, true) if both[0] >= both[1] => {
                     let [a, b] = [own, beside].map(|range| format!("{}:{}", range[0], range[1]));
                     let problem =
@@ -257,7 +257,7 @@ impl Probe {
         Ok((Basis::new(self.coordinates(), &charts, degrees), degrees))
     }
 
-    /// Number of states that are looked at for so many unknown coefficients: as asked for, or the usual one, as far as there is room.
+    /// Number of states that are examined for so many unknown coefficients: as requested, or the usual one, as far as there is room.
     ///
     /// # Errors
     /// A usage error for more than there is room for.
@@ -285,7 +285,7 @@ impl Probe {
         most_symmetries(self.model.as_ref(), bases, states, (tolerance, self.exact)).map_err(CliError::data)
     }
 
-    /// States that are looked at for so many unknown coefficients.
+    /// States that are examined for a number of unknown coefficients.
     pub fn enough(&self, unknowns: usize) -> usize {
         enough(unknowns, self.exact)
     }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Files that evaluations write; trainings and fits have the last three as well.
 const EVALUATED: [&str; 4] = ["evaluation.json", "report.html", CAPTIONS, PLAY];
-/// Longest file that is read to say what is there, in bytes.
+/// Size in bytes of the longest file that is read to describe a directory.
 const MAX_BYTES: u64 = 1 << 26;
 
 /// Who wants to write into a directory.
@@ -24,7 +24,7 @@ pub enum Writer {
     Evaluator,
 }
 
-/// Contents of a directory, in words; `None` if a run can be written there and nothing is lost.
+/// Contents of a directory, in words; `None` if a run can be written there without losing anything.
 pub fn found(directory: &Path) -> Option<String> {
     if has_checkpoint(directory) {
         return Some(format!("an unfinished run (continue it by: {})", command(directory)));
@@ -60,9 +60,9 @@ fn listed(names: &[String]) -> String {
     format!("{}{more}", names[..names.len().min(SHOWN)].join(", "))
 }
 
-/// A run as its summary tells.
+/// The description of a run from its summary.
 fn described(directory: &Path) -> Option<String> {
-    /// The part of the summaries that tells.
+    /// The part of a summary that describes a run.
     #[derive(Deserialize)]
     struct Summary {
         system: String,
@@ -105,7 +105,7 @@ pub fn require_no_input(directory: &Path, inputs: &[&Path]) -> Result<(), CliErr
 /// Refuses a directory that holds a run, unless it may be replaced; an evaluation is refused where a model is in any case.
 ///
 /// # Errors
-/// A data error that says what is there.
+/// A data error that names the contents.
 pub fn require_room(directory: &Path, writer: Writer, overwrite: bool) -> Result<(), CliError> {
     let Some(what) = found(directory) else { return Ok(()) };
     let other = "choose another directory (--out)";
@@ -137,7 +137,7 @@ pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
         let path = entry.path();
         if numbered && entry.file_type().is_ok_and(|kind| kind.is_dir()) && path.join(EVALUATED[0]).is_file() {
             remove(&path, &EVALUATED)?;
-            // What else is in it stays, and so does it.
+            // A directory with other contents stays.
             let _ = fs::remove_dir(&path);
         }
     }

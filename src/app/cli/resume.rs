@@ -30,13 +30,13 @@ impl Learner {
 
 /// A directory of a training or a fit.
 enum Found {
-    /// It can go on; what its checkpoint says.
+    /// It can continue; the contents of its checkpoint.
     Unfinished(String),
     /// It has finished; `config.toml` and `summary.json`.
     Finished(String, String),
 }
 
-/// The text of a run that is there.
+/// The text of an existing run.
 #[derive(Clone, Copy, Debug)]
 pub enum Text<'a> {
     /// That of its checkpoint.
@@ -45,7 +45,7 @@ pub enum Text<'a> {
     Configuration(&'a str),
 }
 
-/// Opens the directory of a run to go on with, and what `read` makes of its text; `None` if there is nothing left to do, which is
+/// Opens the directory of a run to continue with, and what `read` makes of its text; `None` if there is nothing left to do, which is
 /// said then.
 ///
 /// # Errors
@@ -71,12 +71,12 @@ pub fn reopen<T>(
     }
 }
 
-/// `true` if a directory holds a training that can go on.
+/// `true` if a directory holds a training that can continue.
 pub fn has_checkpoint(directory: &Path) -> bool {
     [LATEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
 }
 
-/// Looks for a run of this kind to go on with.
+/// Looks for a run of this kind to continue with.
 ///
 /// # Errors
 /// A data error if there is none, if it ended with an error, if it is of the other kind, or if what is there is damaged.
@@ -107,7 +107,7 @@ fn kind_of(text: &str) -> Learner {
 
 /// The run that left its summary and no checkpoint.
 fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
-    /// The part of `summary.json` that tells.
+    /// The part of `summary.json` that describes the end.
     #[derive(Deserialize)]
     struct Summary {
         ended: String,
@@ -128,7 +128,7 @@ fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
     }
 }
 
-/// What the text of a run says.
+/// The contents of the text of a run.
 ///
 /// # Errors
 /// A data error naming the file.
@@ -138,7 +138,7 @@ pub fn parse<T: DeserializeOwned>(directory: &Path, name: &str, text: &str) -> R
     })
 }
 
-/// Refuses to go on with another configuration than that of the directory.
+/// Refuses to continue with another configuration than that of the directory.
 ///
 /// # Errors
 /// A usage error naming what differs.
@@ -150,7 +150,7 @@ pub fn require_same<T: Serialize>(directory: &Path, saved: &T, asked: &T) -> Res
     }
 }
 
-/// The command that goes on with the run whose checkpoint is in a directory.
+/// The command that continues with the run whose checkpoint is in a directory.
 pub fn command(directory: &Path) -> String {
     let learner = saved(&Disk, directory).map_or(Learner::Train, |found| kind_of(&found.content.config));
     let (verb, text) = (learner.verb(), directory.display().to_string());

@@ -297,7 +297,7 @@ impl Args {
 /// Says how much of the motion is a choice.
 fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     let mut terms = Terms::default();
-    // What fails is said by the motion itself.
+    // The motion itself reports failures.
     let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
     let open = ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix);
     let open = open.map_or(0, |reduced| reduced.null_directions(1024.0).len());

@@ -1,4 +1,4 @@
-//! Options that `lnn train` and `lnn fit` share: where a run's choices come from, where it writes, how it goes on.
+//! Options that `lnn train` and `lnn fit` share: where a run's choices come from, where it writes, how it continues.
 
 use crate::cli::CliError;
 use crate::cli::layers::Layers;
@@ -115,7 +115,7 @@ pub fn imply(layers: &mut Layers, path: &str, timed: bool) {
         let mut also = vec![at("network.factor", factor)];
         if structure.is_some_and(|structure| structure != Structure::BlackBox) {
             also.extend([at("penalty.kind", "none".into()), at("network.learn_alpha", false.into())]);
-            // The states of a fit are those of its recording.
+            // The states of a fit come from its recording.
             also.extend(path.is_empty().then(|| at("data.rescaled_fraction", 0.0.into())));
         }
         also

@@ -218,7 +218,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             0 => Ok(None),
             edges => outline(&model, &camera, &tracing, edges),
         };
-        // An edge between rays that were not followed is none.
+        // An edge between rays that were not followed does not count.
         let outline = if stop.load(Ordering::Relaxed) { None } else { edge.map_err(refused)? };
         views.push(View { name, shadow, outline, seconds });
     }

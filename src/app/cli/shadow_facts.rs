@@ -12,7 +12,7 @@ pub struct View<'a> {
     pub name: &'a str,
     /// Its rays.
     pub shadow: Shadow,
-    /// The edge of the shadow, if it was asked for and there is one around the centre.
+    /// The edge of the shadow, if it was requested and there is one around the centre.
     pub outline: Option<Outline>,
     /// Seconds that the picture took.
     pub seconds: f64,

@@ -26,7 +26,7 @@ impl Shard {
     /// number and take steps; of a list such as `1,4,5` it is not known which share is whose.
     ///
     /// # Errors
-    /// What is wrong with the variables.
+    /// The problem with the variables.
     pub fn of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Option<Self>, String> {
         let number = |part: &str| {
             let name = format!("SLURM_ARRAY_TASK_{part}");

@@ -7,7 +7,7 @@ use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Attempts to find a name that nobody has.
+/// Attempts to find an unused name.
 const ATTEMPTS: usize = 100;
 
 /// A temporary file, removed at the end.
@@ -39,7 +39,7 @@ impl Drop for Spool {
     }
 }
 
-/// Reads files of which one may be `-`, standard input; what is found says so by that name.
+/// Reads files of which one may be `-`, standard input; results use that name.
 pub fn read_spooled(
     files: &[PathBuf],
     read: impl FnOnce(&[PathBuf]) -> Result<LoadedRecording, DataError>,

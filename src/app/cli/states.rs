@@ -15,7 +15,7 @@ pub struct States<S> {
     pub q: Vec<S>,
     /// Velocities `(states, n)` in physical units.
     pub v: Vec<S>,
-    /// Line of the file, from 1, that each state stands on.
+    /// Line of the file, from 1, that each state is on.
     pub rows: Vec<usize>,
 }
 
@@ -36,7 +36,7 @@ pub enum StatesError {
         /// Names of the columns.
         names: String,
     },
-    /// A column stands twice in the header.
+    /// A column appears twice in the header.
     #[error("row {row}: duplicate column {name}")]
     Duplicate {
         /// Row of the header.
@@ -79,7 +79,7 @@ pub enum StatesError {
         row: usize,
         /// Name of the column.
         column: String,
-        /// Text that stands there.
+        /// Text found there.
         found: String,
     },
     /// A header and nothing below.
@@ -109,12 +109,12 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
     Ok(States { q, v, rows })
 }
 
-/// Columns of a file, in the order they were asked for.
+/// Columns of a file, in the order they were requested.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table<S> {
     /// Numbers, `(rows, columns)`.
     pub values: Vec<S>,
-    /// Line of the file, from 1, that each row stands on.
+    /// Line of the file, from 1, that each row is on.
     pub rows: Vec<usize>,
 }
 

@@ -134,7 +134,7 @@ impl Args {
         Ok(Work { experiment: Box::new(Sweep), path: self.out.clone(), runs, merge, list, inputs: Vec::new() })
     }
 
-    /// The command with the options that say which runs there are.
+    /// The command with the options that define the runs.
     fn words(&self) -> String {
         let mut words = format!("lnn sweep {}", self.file.display());
         words.extend(self.vary.iter().map(|one| format!(" --vary '{}={}'", one.key, one.values.join(","))));

@@ -15,11 +15,11 @@ pub struct Args {
     /// coordinates if not given.
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
     basis: Option<Degrees>,
-    /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or the middle of
+    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or the middle of
     /// those the model was trained on, if not given.
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are looked at; two for every unknown coefficient, at least 400 for a system
+    /// States that are examined; two for every unknown coefficient, at least 400 for a system
     /// and 1000 for a model, if not given.
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,

@@ -42,7 +42,7 @@ impl<S: Scalar> Tensor<S> {
     }
 }
 
-/// Everything there is to say about a point with a metric, `(n, n)`, whose geometry was found or not.
+/// All results for a point with a metric, `(n, n)`, whether or not its geometry was found.
 pub fn fields<S: Scalar>(metric: &[S], found: Option<&Geometry<S>>) -> Vec<Field<S>> {
     let n = metric.len().isqrt();
     let field = |name, value: Option<Value<S>>| Field { name, value: value.unwrap_or(Value::Missing) };

@@ -1,4 +1,4 @@
-//! `lnn train`: learns, judges, writes.
+//! `lnn train`: trains a model, tests it, writes the results.
 
 use crate::cli::learn::{Learned, Session, open};
 use crate::cli::resume::{Learner, Text, parse, reopen, require_same};
@@ -11,7 +11,7 @@ use crate::names::percent;
 use crate::pipeline::{Begin, train};
 use crate::training::LATEST;
 
-/// Trains and writes everything into the output directory; goes on with a training that was stopped, if asked to.
+/// Trains and writes everything into the output directory; continues with a training that was stopped, if asked to.
 ///
 /// # Errors
 /// A usage error for arguments and configuration, a data error for files and a training that fails, an interruption;
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }))
 }
 
-/// States that are looked at for a remark on the penalty.
+/// States that are examined for a remark on the penalty.
 const LOOKED_AT: usize = 512;
 
 /// Share of the training states at which the exact metric is what a penalty forbids; `None` without such a penalty, or where it is not

@@ -1,4 +1,4 @@
-//! Arguments of `lnn train` and the configuration they come to.
+//! Arguments of `lnn train` and the resulting configuration.
 
 use crate::cli::flags::Flags;
 use crate::cli::layers::{Entry, Layers, Mistake};
@@ -80,7 +80,7 @@ impl Args {
         };
         parameters.extend(layers.numbers("parameters"));
         let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
-        // Of a system that is not known the other keys are looked at beside one that is.
+        // For an unknown system, the other keys are checked with a known one.
         let usable = match system {
             Ok(system) => system,
             Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
@@ -226,7 +226,7 @@ impl Args {
     }
 }
 
-/// The system that is asked for, by name or with its description.
+/// The requested system, by name or with its description.
 #[derive(Debug)]
 struct Named {
     name: String,
@@ -243,7 +243,7 @@ enum Unusable {
 }
 
 impl Unusable {
-    /// As a mistake of a configuration.
+    /// The error as a mistake in a configuration.
     fn mistake(&self) -> Mistake {
         match self {
             Self::System(error) => Mistake::new("system", error),

@@ -57,7 +57,7 @@ impl TubeArgs {
         self.tube_data.iter().map(PathBuf::as_path)
     }
 
-    /// The tube of a model for motions from one time to another; none if none was asked for.
+    /// The tube of a model for motions from one time to another; none if none was requested.
     ///
     /// # Errors
     /// A usage error for a system or a motion that runs backwards, a data error for a model without the configuration of a fit beside it, for
@@ -120,7 +120,7 @@ impl TubeArgs {
     }
 }
 
-/// The beginning of every motion that lasts this long, from the first state that is known well.
+/// The beginning of every motion of at least this length, from the first accurate state.
 fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
     let n = part.recording.n();
     let estimated = part.estimated();
@@ -163,7 +163,7 @@ impl MotionTube {
         text
     }
 
-    /// For JSON.
+    /// The JSON form.
     pub fn facts(&self) -> TubeFacts<'_> {
         let n = self.coordinates.len();
         let half_widths = self.coordinates.iter().enumerate().map(|(i, name)| {

@@ -16,7 +16,7 @@ enum Stage {
     Search,
 }
 
-/// A watch that shows the stage under way and is ended by a flag.
+/// A watch that shows the current stage and ends when a flag is raised.
 pub fn watch(stop: &Arc<AtomicBool>) -> Watch {
     let bar: Mutex<Option<(Stage, Bar)>> = Mutex::new(None);
     let events = move |event: Event<'_>| {

@@ -1,4 +1,4 @@
-//! Checkpoints of a pipeline: where they are kept, and whether a training goes on from one.
+//! Checkpoints of a pipeline: where they are kept, and whether a training continues from one.
 
 use crate::pipeline::{Event, PipelineError, Watch};
 use crate::scalar::Scalar;
@@ -29,7 +29,7 @@ pub struct Checkpoints {
     directory: PathBuf,
     every: CheckpointInterval,
     begin: Begin,
-    /// Text that is kept in a checkpoint and must be the same when the training goes on; the configuration if none.
+    /// Text that is kept in a checkpoint and must be the same when the training continues; the configuration if none.
     identity: Option<String>,
 }
 
@@ -43,7 +43,7 @@ impl fmt::Debug for Checkpoints {
 }
 
 impl Checkpoints {
-    /// Checkpoints in a directory, of a training that begins anew.
+    /// Checkpoints in a directory, of a training that starts again.
     pub(crate) fn new(directory: &Path, every: CheckpointInterval) -> Self {
         let (files, directory) = (Arc::new(Disk), directory.to_path_buf());
         Self { files, directory, every, begin: Begin::Anew, identity: None }
@@ -54,7 +54,7 @@ impl Checkpoints {
         Self { begin, ..self }
     }
 
-    /// The same with a text that is kept in every checkpoint and must be the same when the training goes on, instead of the
+    /// The same with a text that is kept in every checkpoint and must be the same when the training continues, instead of the
     /// configuration.
     pub(crate) fn identified_by(self, text: String) -> Self {
         Self { identity: Some(text), ..self }
@@ -74,7 +74,7 @@ impl Checkpoints {
         remove_checkpoints(self.files.as_ref(), &self.directory).map_err(cannot)
     }
 
-    /// Who writes them, and the one to go on from, or none, with old checkpoints out of the way.
+    /// The writer of checkpoints, and the checkpoint to continue from, if any, after old ones were removed.
     ///
     /// # Errors
     /// [`PipelineError::Checkpoint`] for one that must be there and is not, or that is of another run.

@@ -34,7 +34,7 @@ pub(crate) fn constraint_figures(
         for c in 0..names.len() {
             let size = rows.matrix[c * q.len()..(c + 1) * q.len()].iter().fold(0.0, |size: f64, x| size.hypot(*x));
             let off = if manifold.is_holonomic(c) { rows.values[c] } else { rows.rates[c] };
-            // What is exact has no place on a logarithmic axis.
+            // Exact values have no place on a logarithmic axis.
             strays[c].push((off.abs() / size).max(f64::EPSILON));
             loads[c].push(if moved { terms.multipliers[c] * size } else { f64::NAN });
         }

@@ -38,7 +38,7 @@ pub struct Group {
     unit_known: bool,
 }
 
-/// Everything there is to say.
+/// The full report.
 #[derive(Clone, Debug, Serialize)]
 pub struct Determined {
     /// Mass matrix, friction and energy with their ranges; empty if nothing can be said.
@@ -70,11 +70,11 @@ pub struct Determined {
 
 /// Largest misfit of a model whose loss of energy says anything of the motion.
 const MISFIT_OF_ENERGY: f64 = 0.5;
-/// Share of held-out states outside of the learned ones that is worth a word.
+/// Share of held-out states outside of the learned ones that is worth a remark.
 const OUTSIDE: f64 = 0.1;
-/// The same, from which on held-out motion is another motion than the learned one and judges nothing.
+/// The same, at and above which held-out motion is another motion than the learned one and judges nothing.
 const MOSTLY: f64 = 0.5;
-/// Names of quantities and of what is said of them.
+/// Names of quantities and of statements about them.
 const ENERGY: &str = "rms E about its mean";
 const UNIT: &str = "the unit";
 const NOT: &str = "not";
@@ -94,7 +94,7 @@ impl Quantity {
 }
 
 impl Determined {
-    /// Looks at a model of recorded motion that was judged by `hold_out`.
+    /// Analyses a model of recorded motion that was tested by `hold_out`.
     ///
     /// # Errors
     /// [`PipelineError::Recording`] if the states that were learned from cannot be had again.
@@ -176,7 +176,7 @@ impl Determined {
         self.outside.filter(|share| *share > MOSTLY)
     }
 
-    /// A remark on standard error, if the data ask for friction.
+    /// A remark on standard error, if the data indicate friction.
     pub fn suggestion(&self) -> Option<String> {
         if let Some(decay) = self.decay.filter(Decay::is_certain) {
             return Some(format!(
@@ -186,7 +186,7 @@ impl Determined {
                 number(decay.error)
             ));
         }
-        // The energy of a model that does not explain the motion says nothing of it.
+        // The energy of a model that does not explain the motion gives no information about it.
         let explained = !self.misfit.is_empty() && self.misfit.values().all(|misfit| *misfit <= MISFIT_OF_ENERGY);
         let loss = self.energy_loss.filter(EnergyLoss::is_steady).filter(|_| explained)?;
         Some(format!(

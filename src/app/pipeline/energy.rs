@@ -1,4 +1,4 @@
-//! Where the energy of held-out motion goes by a model: change, work, friction and what is left.
+//! The energy balance of held-out motion by a model: change, work, friction and remainder.
 
 use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -141,7 +141,7 @@ impl Balance {
     pub fn text(&self) -> String {
         let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();
         let [change, work, friction] = [self.change, self.work, self.friction].map(tenths);
-        // Of the rounded parts, so that they add up as they stand.
+        // Uses the rounded parts, so that they add up as printed.
         let rest = change - work + friction;
         let percent = |tenths: f64| format!("{:.1} %", tenths / 10.0 + 0.0);
         let count = self.trajectories;

@@ -36,10 +36,10 @@ pub enum PipelineError {
     /// Recorded motion without derivatives.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
-    /// Measured accelerations asked for where none were given.
+    /// Measured accelerations requested where none were given.
     #[error("no accelerations were given")]
     NoAccelerations,
-    /// Forces asked for where a coordinate has none.
+    /// Forces requested where a coordinate has none.
     #[error("not every coordinate has a known force that changes")]
     NoForces,
     /// Constraints with a mistake, that contradict each other or leave no motion, or that recorded motion does not obey.
@@ -140,7 +140,7 @@ pub enum PipelineError {
     /// Tables of an experiment none of whose runs is finished.
     #[error("none of {} is finished: there are no records to make tables of", crate::names::pluralize(*total, "run", "runs"))]
     NothingFinished {
-        /// Runs asked for.
+        /// Runs requested.
         total: usize,
     },
     /// Runs of an experiment that another process works on.
@@ -156,7 +156,7 @@ pub enum PipelineError {
     InterruptedRuns {
         /// Runs that are finished.
         finished: usize,
-        /// Runs asked for.
+        /// Runs requested.
         total: usize,
     },
 }

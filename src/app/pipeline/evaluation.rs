@@ -38,7 +38,7 @@ const FAST: f64 = 0.99;
 pub struct Evaluation {
     /// Error of the accelerations of fresh states, one entry per coordinate.
     pub accelerations: Vec<ErrorDistribution>,
-    /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
+    /// Fraction of the fresh states whose mass matrix lacks the signature of the exact one.
     pub wrong_signature: f64,
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states; under constraints at the fresh
     /// states themselves, within the directions that the constraints leave.
@@ -336,7 +336,7 @@ fn grids(
             fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
         };
-        // A model that is finite nowhere on the grid has no picture; the tables say so.
+        // A model that is nowhere finite on the grid has no picture; the tables report this.
         figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
             figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
             figure

@@ -205,7 +205,7 @@ fn make(
     let system = run.config.system()?;
     let (starts, span) = experiment.trajectories();
     let began = Instant::now();
-    // A run that was stopped goes on from its checkpoint.
+    // A run that was stopped continues from its checkpoint.
     let checkpoints = Some(output.checkpoints().beginning(Begin::Either));
     let options = RunOptions { threads, starts, span, checkpoints };
     let watch = watch.remarks_alone();
@@ -332,7 +332,7 @@ mod tests {
         let other = kept("config.toml", &now.replace("seed = 0", "seed = 7"));
         assert!(matches!(other, KeptRecord::OtherConfiguration), "{other:?}");
         let foreign = serde_json::to_string(&Record { run: text_checksum("other"), ..record.clone() }).unwrap();
-        let damaged = [(RECORD, "{\"outcome\""), (RECORD, ""), (RECORD, &foreign), ("config.toml", &now[..40])];
+        let damaged = [(RECORD, "{\"outcome\""), (RECORD, ""), (RECORD, &foreign), ("config.toml", &now[..5])];
         for (file, content) in damaged {
             let found = kept(file, content);
             assert!(matches!(&found, KeptRecord::Damaged(name, _) if *name == file), "{content}: {found:?}");

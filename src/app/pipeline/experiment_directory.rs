@@ -39,7 +39,7 @@ impl ExperimentDirectory {
         entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect()
     }
 
-    /// Locks the directory of a run that begins or goes on.
+    /// Locks the directory of a run that begins or continues.
     ///
     /// # Errors
     /// [`PipelineError::Held`] if another process works in it; [`PipelineError::Output`] if it cannot be written.

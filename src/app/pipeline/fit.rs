@@ -1,4 +1,4 @@
-//! A fit of recorded motion: learning, judgement by motion that was held out, files.
+//! A fit of recorded motion: training, test on held-out motion, files.
 
 use crate::cancellation::Cancellation;
 use crate::configuration::Precision;
@@ -425,7 +425,7 @@ fn labels(recording: &Recording) -> Vec<String> {
     units("").chain(units("/s")).collect()
 }
 
-/// Columns of recorded forces as a model remembers them; numbers of columns are no names.
+/// Columns of recorded forces as a model remembers them; numbers of columns are not names.
 fn named_forces(columns: &[String]) -> Vec<String> {
     if columns.iter().any(|name| name.parse::<f64>().is_ok()) { Vec::new() } else { columns.to_vec() }
 }

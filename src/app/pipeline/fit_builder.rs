@@ -96,7 +96,7 @@ impl Fit {
         self
     }
 
-    /// Column whose value tells the trajectories of a file apart.
+    /// Column whose value distinguishes the trajectories of a file.
     pub fn trajectory(mut self, column: &str) -> Self {
         self.columns.trajectory = Some(column.to_string());
         self

@@ -23,7 +23,7 @@ pub(crate) struct FitHeld {
 }
 
 impl FitHeld {
-    /// The constraints that the options ask for, those of them that are independent, if there are any; and remarks.
+    /// The independent constraints that the options request, if any, and remarks.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`].
@@ -84,7 +84,7 @@ impl FitHeld {
         Ok((Some(Self { constraints, found, distance: f64::NAN }), remarks))
     }
 
-    /// States brought to the constraints, and how far their positions were away, root mean square.
+    /// States projected onto the constraints, and how far their positions were away, root mean square.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`] for a state from which no way leads there.

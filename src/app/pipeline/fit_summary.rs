@@ -82,9 +82,9 @@ struct Summary<'a> {
 struct ConstraintsSummary<'a> {
     /// `true` if they were found in the motion, `false` if they were given.
     found: bool,
-    /// What vanishes, by name.
+    /// The formulas that vanish, by name.
     formulas: &'a BTreeMap<String, String>,
-    /// Distance of the smoothed positions that are learned from, root mean square: they were brought to the constraints.
+    /// Distance of the smoothed positions that are learned from, root mean square: they were projected onto the constraints.
     distance: f64,
 }
 

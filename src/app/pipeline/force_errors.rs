@@ -59,7 +59,7 @@ pub(crate) fn force_errors(
     Ok(names.iter().zip(force_spreads(held_out)).enumerate().map(one).collect())
 }
 
-/// How well the model gives the forces, in a sentence that says good or bad.
+/// How well the model gives the forces, as a sentence with a verdict.
 pub(crate) fn judged(errors: &[ForceError]) -> String {
     let lost: Vec<&str> = errors.iter().filter(|e| e.is_lost()).map(|e| e.name.as_str()).collect();
     let worst = errors.iter().map(|e| e.nmse).fold(0.0, |worst: f64, x| if x.is_nan() { x } else { worst.max(x) });

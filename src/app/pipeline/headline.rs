@@ -11,9 +11,9 @@ use crate::pipeline::force_errors::{ForceError, judged as judged_by_forces};
 use crate::pipeline::hold_out::{HoldOut, factor, is_better};
 use crate::report::Report;
 
-/// Share of states of wrong signature from which on it is worth a word.
+/// Share of states of wrong signature at and above which it is worth a remark.
 const MOST_WRONG: f64 = 0.01;
-/// Lyapunov times from which on predictions of chaotic motion are good: errors grew e^3 = 20 times.
+/// Lyapunov times at and above which predictions of chaotic motion are good: errors grew e^3 = 20 times.
 const MANY_TIMES: f64 = 3.0;
 /// Share of the time that was tested below which predictions of motion that is not chaotic are bad.
 const FEW: f64 = 0.01;
@@ -113,7 +113,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     Headline { sentence, rows }
 }
 
-/// Predictions beside the exact motion over a test of `tested`, in words.
+/// Predictions compared with the exact motion over a test of `tested`, in words.
 fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     let time = valid_time(valid, unit);
     let (until, tested) = (tested, format!("{} {unit}", number(tested)));
@@ -150,7 +150,7 @@ pub(crate) fn of_hold_out(
     Headline { sentence, ..of_network }
 }
 
-/// What a model is not good for, each a clause.
+/// Weaknesses of a model, each a clause.
 fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     let mut all = Vec::new();
     if let Some(error) = found.model.last() {
@@ -186,7 +186,7 @@ fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     all
 }
 
-/// A sentence that says good or limited, with what speaks against it.
+/// A sentence with a verdict and the weaknesses.
 fn with_failures(sentence: String, failures: &[String]) -> String {
     let all = failures.join("; ");
     match (sentence.strip_prefix("good: "), sentence.strip_prefix("limited: ")) {
@@ -241,7 +241,7 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
     Headline { sentence: format!("{name}: {sentence}"), rows }
 }
 
-/// Prediction of held-out motion beside going on at constant velocity, in a sentence that says good or bad.
+/// Prediction of held-out motion compared with constant velocity, as a sentence with a verdict.
 fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) -> String {
     let (Some(useful), true) = (&found.useful_time, model.median.is_finite()) else {
         return "bad: the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();

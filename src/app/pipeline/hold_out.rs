@@ -30,7 +30,7 @@ const POINTS: usize = 40;
 /// Times ahead of a table of them.
 const TIMES: usize = 4;
 
-/// Motion that judges a model, and how.
+/// Held-out motion that tests a model, and the test's settings.
 #[derive(Clone, Copy, Debug)]
 pub struct HoldOutOptions<'a> {
     /// Motion that the model has not seen.
@@ -46,12 +46,12 @@ pub struct HoldOutOptions<'a> {
     pub threads: usize,
 }
 
-/// Time ahead up to which a prediction is of use: valid, and better than going on at constant velocity.
+/// Time ahead up to which a prediction is useful: valid, and better than continuing at constant velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct UsefulTime {
-    /// The time in s; 0 for a prediction that is never of use.
+    /// The time in s; 0 for a prediction that is never useful.
     pub seconds: f64,
-    /// `true` if it is of use to the end of the windows: the true time is longer.
+    /// `true` if it is useful to the end of the windows: the true time is longer.
     pub at_least: bool,
 }
 
@@ -64,11 +64,11 @@ pub struct CoordinatePredictions {
     pub unit: &'static str,
     /// Errors of the model's motion.
     pub model: Vec<f64>,
-    /// Errors of going on at constant velocity.
+    /// Errors of continuing at constant velocity.
     pub constant_velocity: Vec<f64>,
 }
 
-/// Predictions of motion that was held out, beside going on at constant velocity.
+/// Predictions of motion that was held out, beside continuing at constant velocity.
 #[derive(Clone, Debug, Serialize)]
 pub struct HoldOut {
     /// Unit of the errors of all coordinates together: `rad` of angles, `SI` of others; of both kinds each error is taken over the spread
@@ -79,16 +79,16 @@ pub struct HoldOut {
     /// Time for which the model's motion predicts the measured one, median over the windows; at least to their end where the
     /// error stays small. None without windows.
     pub(crate) valid_time: Option<ValidTimes>,
-    /// Time for which its motion is of use. None without windows.
+    /// Time for which its motion is useful. None without windows.
     pub useful_time: Option<UsefulTime>,
     /// Period of the fastest coordinate in s, `2 pi` times the spread of its velocity over that of its acceleration; none of motion that takes
     /// longer than the trajectories, or is noise.
     pub fastest_period: Option<f64>,
     /// Errors of every coordinate at the same times ahead.
     pub by_coordinate: Vec<CoordinatePredictions>,
-    /// Which predictions were given up and why, in words; empty if none was.
+    /// How many predictions failed and why, in words; empty if none did.
     pub given_up: String,
-    /// Errors of going on at the velocity of the start.
+    /// Errors of continuing at the velocity of the start.
     pub constant_velocity: Vec<PredictionError>,
     /// Fraction of the held-out states whose mass matrix has not the right signature; `NaN` where nothing was held out.
     pub wrong_signature: f64,
@@ -100,7 +100,7 @@ pub struct HoldOut {
     /// Pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
-    /// What was predicted.
+    /// The predictions.
     #[serde(skip)]
     pub(crate) predicted: HeldOutPredictions,
     /// Coordinates that are angles, and scales of the coordinates' errors.
@@ -331,7 +331,7 @@ fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> Lin
 /// States evaluated at once.
 const CHUNK: usize = 4096;
 
-/// States whose mass matrix is looked at, about; of more, evenly spaced ones.
+/// States whose mass matrix is examined, about; of more, evenly spaced ones.
 const STATES: usize = 20_000;
 
 /// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.
@@ -458,7 +458,7 @@ impl HoldOut {
         (!self.model.is_empty()).then(|| pairs.any(|(model, straight)| factor(model, straight).is_some()))
     }
 
-    /// `true` if there was nothing to judge by.
+    /// `true` if there was no held-out motion.
     fn is_of_nothing(&self) -> bool {
         self.wrong_signature.is_nan()
     }

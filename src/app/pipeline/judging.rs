@@ -7,7 +7,7 @@ use crate::pipeline::{Event, PipelineError, Watch};
 use crate::training::{Epoch, StopReason};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What was learned where the judgement of it was interrupted.
+/// A trained model whose test was interrupted.
 #[derive(Debug)]
 pub struct Unjudged {
     /// Header of the model.

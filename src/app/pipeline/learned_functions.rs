@@ -12,11 +12,11 @@ use std::f64::consts::{PI, TAU};
 const CURVE: usize = 161;
 /// Step of the differences of momenta over the range of a coordinate.
 const STEP: f64 = 1e-4;
-/// Components of a matrix that have a picture, at most.
+/// Largest number of components of a matrix that get a picture.
 pub(super) const MAPS: usize = 10;
 /// Components off the diagonal that have a picture exceed this part of those on it, root mean squares.
 const SHOWN: f64 = 0.02;
-/// Share of a turn from which on an angle is shown over all of it.
+/// Share of a turn at and above which an angle is shown over all of it.
 const WHOLE_TURN: f64 = 0.9;
 /// Recorded positions that are marked in a map, at most.
 const MARKS: usize = 400;

@@ -7,7 +7,7 @@ use crate::pipeline::PipelineError;
 use crate::scalar::Scalar;
 use crate::training::{Objective, Trained, TrainingError};
 
-/// States that judge a model: those that chose the best epoch, and those that chose nothing.
+/// States on which losses are reported: those that chose the best epoch, and fresh ones.
 pub(crate) struct LossStates<S> {
     /// Validation states.
     pub validation: Dataset<S>,

@@ -186,7 +186,7 @@ impl Members {
         ["model", "seed"].map(String::from).into_iter().chain(times).chain(ends).collect()
     }
 
-    /// What is said below the table.
+    /// The text below the table.
     fn remark(&self) -> String {
         if !self.not_compared.is_empty() {
             return format!("the Lagrangians of the members were not compared: {}\n", self.not_compared);

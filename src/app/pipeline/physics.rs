@@ -35,7 +35,7 @@ const CURVATURE_WORK: usize = 100_000_000;
 const BOXES_WORK: usize = 80_000_000;
 /// Boxes of a certificate, at most.
 const BOXES: usize = 2000;
-/// Seed of the states that are looked at.
+/// Seed of the states that are examined.
 const SEED: u64 = 0;
 
 /// Curvature scalar of the learned metric at rest, times the factor up to which a Lagrangian is determined.
@@ -113,7 +113,7 @@ pub struct ProvenSignature {
 /// Physics of a model over a region of states.
 #[derive(Clone, Debug, Serialize)]
 pub struct Physics {
-    /// Bounds of the states that were looked at, by column.
+    /// Bounds of the states that were examined, by column.
     pub region: BTreeMap<String, [f64; 2]>,
     /// Best factor and gauge term beside the exact Lagrangian, if the system is known, and the differences that remain.
     pub equivalence: Option<Equivalence>,

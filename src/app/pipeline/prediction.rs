@@ -1,4 +1,4 @@
-//! Predictions of held-out windows in bounded time, and why some were given up.
+//! Predictions of held-out windows in bounded time, and the reasons for failures.
 
 use crate::analysis::{Predictions, Window, follow};
 use crate::lagrangian::EulerLagrange;
@@ -22,7 +22,7 @@ pub(crate) struct HeldOutPredictions {
     pub predictions: Predictions,
     /// Windows there were.
     pub all: usize,
-    /// Why predictions were given up, and how many.
+    /// Numbers of failed predictions by reason.
     pub given_up: BTreeMap<&'static str, usize>,
 }
 
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT, PILOT, 400));
         let remarks = found.remarks();
         assert!(remarks.starts_with("40 of 40 predictions were given up: 40 by a singular mass matrix"), "{remarks}");
-        assert!(remarks.contains("of 400 windows only 40 were tried"), "{remarks}");
+        assert!(remarks.contains("only 40 of 400 windows"), "{remarks}");
         let well = HeldOutPredictions::new(&OSCILLATOR, windows(100), 2, &judging).unwrap();
         assert_eq!((well.windows.len(), well.remarks().as_str()), (100, ""));
     }

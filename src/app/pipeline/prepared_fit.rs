@@ -14,7 +14,7 @@ use crate::recording::{LoadedRecording, Targets};
 use crate::scalar::Scalar;
 use std::time::Instant;
 
-/// Recorded motion with its derivatives, divided into what is learned from, what chooses the best epoch and what judges.
+/// Recorded motion with its derivatives, divided into training, validation and test states.
 #[derive(Debug)]
 pub struct PreparedFit<'a> {
     pub(crate) reading: &'a LoadedRecording,
@@ -23,7 +23,7 @@ pub struct PreparedFit<'a> {
     pub(crate) targets: Targets,
     /// Constraints that hold the motion.
     pub(crate) held: Option<FitHeld>,
-    /// What is to be said of them.
+    /// Remarks on them.
     pub(crate) remarks: Vec<String>,
     /// Time at which the work began, for the time that the summary states.
     pub started: Instant,
@@ -35,7 +35,7 @@ impl<'a> PreparedFit<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
-    /// ones are asked for and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has;
+    /// ones are requested and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has;
     /// [`PipelineError::Constraints`] for constraints with a mistake, that contradict each other, or that the motion does not obey.
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
@@ -60,7 +60,7 @@ impl<'a> PreparedFit<'a> {
         self.held.as_ref().map(|held| &held.constraints)
     }
 
-    /// States that are learned from, that choose the best epoch and that judge; brought to the constraints if there are any.
+    /// Training, validation and test states; projected onto the constraints if there are any.
     ///
     /// # Errors
     /// As of [`RecordingSplit::datasets`]; [`PipelineError::Constraints`] for a state from which no way leads to the constraints.

@@ -113,7 +113,7 @@ pub(crate) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
     training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
-/// The end of a training as `summary.json` tells it.
+/// The end of a training in the words of `summary.json`.
 pub(crate) fn ended(stop: &StopReason) -> String {
     match stop {
         StopReason::Finished => "finished".to_string(),

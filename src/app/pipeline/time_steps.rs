@@ -8,11 +8,11 @@ use serde::Serialize;
 /// Part of `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct TimeSteps {
-    /// Short gaps, across which trajectories go on.
+    /// Short gaps, across which trajectories continue.
     bridged: Bridged,
     /// Number of long gaps, which cut trajectories.
     cuts: usize,
-    /// Standard deviation of the steps that are no gaps over the usual one, on the trajectory where it is largest.
+    /// Standard deviation of the steps that are not gaps over the usual one, on the trajectory where it is largest.
     jitter: f64,
     left_out: LeftOut,
 }

@@ -51,7 +51,7 @@ pub struct TrainFigures {
     pub wall_seconds: f64,
     /// Time of the training.
     pub training_seconds: f64,
-    /// Training states that were looked at, over that time.
+    /// Training states that were examined, over that time.
     pub states_per_second: f64,
     /// Reason for which training ended.
     pub ended: String,

@@ -1,4 +1,4 @@
-//! Watches: what a pipeline says while it runs, and the flag that ends it.
+//! Watches: progress reports of a running pipeline, and the flag that ends it.
 
 use crate::cancellation::{Cancellation, SearchProgress};
 use crate::training::{Epoch, Hooks, Progress};
@@ -26,13 +26,13 @@ pub enum Event<'a> {
         /// Pieces of all the work.
         total: usize,
     },
-    /// Evaluations of the model that is judged, so far.
+    /// Evaluations of the model under test, so far.
     Evaluations(u64),
     /// Runs of an experiment that are finished: `done` of `total`.
     Runs {
         /// Runs that are finished.
         done: usize,
-        /// Runs asked for.
+        /// Runs requested.
         total: usize,
     },
     /// A search for constants, a formula or constraints is under way.

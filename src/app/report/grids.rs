@@ -21,7 +21,7 @@ pub enum Fit {
 pub struct GridComparison {
     /// Name of the quantity, such as `L` or `det M`.
     pub quantity: String,
-    /// What the picture shows, above it.
+    /// Title of the picture.
     pub heading: String,
     /// Beginning of the file name.
     pub file: String,
@@ -212,7 +212,7 @@ impl Turn {
     }
 
     /// A path `(angle, other)` with the angle brought into this turn: where it passes an end the path goes up to the end,
-    /// leaves a gap and goes on from the other end.
+    /// leaves a gap and continues from the other end.
     pub fn fold(self, path: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let mut folded: Vec<(f64, f64)> = Vec::with_capacity(path.len());
         let mut before: Option<(f64, f64)> = None;

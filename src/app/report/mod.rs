@@ -26,7 +26,7 @@ pub use table::DataTable;
 pub struct Figure {
     /// File name without directory, with `.svg`.
     pub file: String,
-    /// What the picture shows, in a few words above it; may be empty.
+    /// Title of the picture; may be empty.
     pub heading: String,
     /// The drawing.
     pub picture: Picture,

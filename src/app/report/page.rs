@@ -41,7 +41,7 @@ pub enum PageError {
     /// More weights than a page holds.
     #[error("the page would have {found} bytes, {MOST_BYTES} at most are written: a smaller network has a page")]
     Large {
-        /// Bytes.
+        /// A binary file.
         found: usize,
     },
 }
@@ -144,7 +144,7 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, PageError> {
     })))
 }
 
-/// What vanishes along a motion: the rows of its constraints that do not follow from others.
+/// The rows of constraints that vanish along a motion and do not follow from others.
 fn rows(
     constraints: &ExpressionConstraints,
     motion: &dyn EulerLagrange<f64>,

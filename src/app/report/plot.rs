@@ -220,7 +220,7 @@ mod tests {
         line_plot(&LinePlot { title, x_label, y_label, log_y, series, turn: None, level: None })
     }
 
-    /// `true` if it is drawn and no number in it is none.
+    /// `true` if it is drawn and all its numbers are finite.
     fn is_sound(picture: &Picture) -> bool {
         let svg = picture.to_svg();
         svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf")

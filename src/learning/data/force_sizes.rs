@@ -5,7 +5,7 @@ use crate::network::Sizes;
 use crate::recording::INERTIAL;
 use crate::scalar::Scalar;
 
-/// Share of the spread of a force that counts as its error beside all noise: no model follows it closer.
+/// Share of the spread of a force that is added to its error besides noise: no model is more accurate.
 const MISSED: f64 = 0.1;
 
 /// Mean, standard deviation and root mean square of column `i` of `(states, n)` numbers.

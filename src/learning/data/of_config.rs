@@ -37,7 +37,7 @@ impl Config {
     /// The penalty, its time-like coordinate looked up in the system if it names one.
     ///
     /// # Errors
-    /// Unknown system or parameter, or a name that is no coordinate of it.
+    /// Unknown system or parameter, or a name that is not a coordinate of it.
     pub fn penalty(&self) -> Result<Penalty, SamplingError> {
         let coordinates = if self.penalty.time().is_some() {
             let system = self.system()?;
@@ -51,7 +51,7 @@ impl Config {
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
     ///
     /// # Errors
-    /// A name in the configuration that is no coordinate of the system.
+    /// A name in the configuration that is not a coordinate of the system.
     pub fn architecture(&self, system: &SystemInstance<f64>, scale: Vec<f64>) -> Result<Architecture, ConfigError> {
         let coordinates = system.system.coordinates(system.coordinates);
         let names = coordinates.iter().map(|c| c.name.as_ref());
@@ -62,7 +62,7 @@ impl Config {
     /// configuration scales), both of length `n`.
     ///
     /// # Errors
-    /// A name in the configuration that is none of them.
+    /// A name in the configuration that is not one of them.
     pub fn architecture_with<'a>(
         &self,
         names: impl Iterator<Item = &'a str> + Clone,

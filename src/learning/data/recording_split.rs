@@ -1,4 +1,4 @@
-//! Learning from recorded motion: what is trained on, what chooses the best epoch, what judges.
+//! Learning from recorded motion: the training, validation and test parts.
 //!
 //! Whole trajectories are held out, never rows: neighbouring samples are nearly the same state. Derivatives come from
 //! local polynomials ([`Smoothing`]) unless they were measured; accelerations so obtained start a network that may then
@@ -160,7 +160,7 @@ fn is_complete(track: &RecordedTrajectory, targets: Targets) -> bool {
     targets.takes_measured() && !track.a.is_empty() && !track.v.is_empty()
 }
 
-/// Recorded motion, ready to learn from.
+/// Recorded motion, ready for training.
 #[derive(Clone, Debug)]
 pub struct RecordingSplit {
     /// Noise and windows.
@@ -169,9 +169,9 @@ pub struct RecordingSplit {
     pub training: Split,
     /// The part that chooses the best epoch.
     pub validation: Split,
-    /// The part that judges.
+    /// The test part.
     pub test: Split,
-    /// Which part of the recording judges.
+    /// Which part of the recording is the test part.
     pub(crate) held_out: HeldOut,
     /// Most states of a supervised training.
     most_states: usize,
@@ -315,7 +315,7 @@ impl RecordingSplit {
     }
 }
 
-/// Least noise that is believed, beside the size of the data.
+/// Smallest noise that is assumed, relative to the size of the data.
 const LEAST_NOISE: f64 = 1e-6;
 
 #[cfg(test)]

@@ -424,7 +424,7 @@ mod tests {
                 }
             }
         }
-        // Constraints that no state of the bounds comes to.
+        // Constraints that no state within the bounds can be projected onto.
         let mut description = system.system.description().unwrap().clone();
         description.name = "unreachable".to_string();
         description.constraints.insert("far".to_string(), "x1 + 5*l".to_string());

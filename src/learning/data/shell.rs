@@ -9,7 +9,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::sync::atomic::AtomicBool;
 
-/// Draws `states` states, as [`Shell`] says; coordinates that are not of the shell are uniform within `position`.
+/// Draws `states` states by [`Shell`]; coordinates outside the shell are uniform within `position`.
 ///
 /// # Errors
 /// [`SamplingError::Config`] for a system without a time or coordinates that it does not have; [`SamplingError::Domain`] if more than nine in

@@ -10,7 +10,7 @@ use crate::storage::container::state::numbers;
 use serde::{Deserialize, Serialize};
 use soap::{Eigenbasis, Step};
 
-/// What tells one update rule from another; all keep running means of gradient and squared gradient.
+/// The differences between update rules; all keep running means of gradient and squared gradient.
 #[derive(Clone, Copy)]
 struct Traits {
     /// Decay of the two means.

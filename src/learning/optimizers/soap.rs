@@ -143,7 +143,7 @@ fn rotate<S: Scalar>(block: Block, [left, right]: &[Side<S>; 2], choice: Choice,
 /// The threads to work on: a pool, or the caller's own. Never rayon's global pool, which belongs to the application.
 pub(crate) type Threads<'a> = Option<&'a rayon::ThreadPool>;
 
-/// Does both, side by side if the caller is a thread of a pool.
+/// Runs both, in parallel if the caller is a thread of a pool.
 fn both(parallel: bool, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
     if parallel {
         rayon::join(a, b);

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// Share of the states that chooses the best epoch, and share that judges the result.
+/// Shares of the states that choose the best epoch and that test the result.
 const HELD_OUT: f64 = 0.1;
 
 /// A training on states with accelerations.
@@ -72,7 +72,7 @@ pub struct Learned {
     pub test_loss: f64,
     /// Why the training ended.
     pub stop: StopReason,
-    /// What the model's file says beside the weights.
+    /// Contents of the model's file besides the weights.
     pub header: Header,
 }
 
@@ -86,7 +86,7 @@ pub enum TrainerError {
         /// States given.
         found: usize,
     },
-    /// Names of the coordinates that are too many, too few or not distinct; an angle that is no coordinate.
+    /// Names of the coordinates that are too many, too few or not distinct; an angle that is not a coordinate.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// A shape of the network that contradicts itself.

@@ -3,7 +3,7 @@
 use crate::recording::statistics::{median, quantile, robust_deviation};
 use std::ops::Range;
 
-/// Steps that are looked at of one trajectory for their quantiles.
+/// Steps that are examined of one trajectory for their quantiles.
 const MOST: usize = 1 << 17;
 /// Gaps of more usual steps than this cut a trajectory; half a step is for rounding and jitter.
 const REACH: f64 = 10.5;
@@ -11,11 +11,11 @@ const REACH: f64 = 10.5;
 /// Steps of increasing times, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
-    /// Usual step: of equal steps their median, of uneven ones the mean of those that are no gaps.
+    /// Usual step: of equal steps their median, of uneven ones the mean of those that are not gaps.
     pub step: f64,
-    /// Standard deviation of the steps that are no gaps; of equal ones a robust one, which is rounding.
+    /// Standard deviation of the steps that are not gaps; of equal ones a robust one, which is rounding.
     pub spread: f64,
-    /// Longest step that is no gap.
+    /// Longest step that is not a gap.
     pub longest: f64,
     /// `true` if steps are equal to within the rounding of the times.
     pub even: bool,
@@ -55,12 +55,12 @@ impl Clock {
         if self.even { 0.0 } else { self.spread / self.step }
     }
 
-    /// Rows that are missing in a step; 0 if it is no gap.
+    /// Rows that are missing in a step; 0 if it is not a gap.
     pub fn missing(&self, seconds: f64) -> usize {
         if seconds > self.longest { ((seconds / self.step).round() as usize).saturating_sub(1) } else { 0 }
     }
 
-    /// `true` if a trajectory goes on across a gap of this length.
+    /// `true` if a trajectory continues across a gap of this length.
     pub fn reaches_across(&self, seconds: f64) -> bool {
         seconds <= (REACH * self.step).max(self.longest)
     }
@@ -143,7 +143,7 @@ mod tests {
         let missing: usize = dropped.windows(2).map(|pair| clock.missing(pair[1] - pair[0])).sum();
         assert_eq!(missing, 300 - dropped.len());
         assert!(clock.reaches_across(0.1) && !clock.reaches_across(0.11));
-        // Steps of one, two and three frames in turn are no gaps.
+        // Steps of one, two and three frames in turn are not gaps.
         let uneven = frames(600, |k| [0, 1, 3].contains(&(k % 6)));
         let clock = Clock::of(&uneven);
         assert!((clock.step - 0.02).abs() < 1e-4 && (clock.spread / 0.00816 - 1.0).abs() < 0.02, "{clock:?}");

@@ -22,7 +22,7 @@ pub struct Columns {
     pub time: Option<String>,
     /// Samples per second of data without times.
     pub rate: Option<f64>,
-    /// A column whose value tells the trajectories of one file apart.
+    /// A column whose value distinguishes the trajectories of one file.
     pub trajectory: Option<String>,
     /// Coordinates that are angles, in rad after conversion.
     pub periodic: Vec<String>,
@@ -76,7 +76,7 @@ impl Columns {
     ///
     /// # Errors
     /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations, forces or errors than of coordinates, a
-    /// column used twice, an angle that is no coordinate, an unknown unit, a unit of a column that is not used, time and
+    /// column used twice, an angle that is not a coordinate, an unknown unit, a unit of a column that is not used, time and
     /// rate both given, a rate that is not positive.
     pub(crate) fn validate(&self) -> Result<(), ColumnsError> {
         let wrong = |text: String| Err(ColumnsError(text));

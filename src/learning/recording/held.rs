@@ -1,22 +1,22 @@
 //! Readings that a sensor held while the motion went on.
 //!
-//! A driver that misses a new reading repeats the one before, digit by digit. Such a reading is late by a step, an error of the motion's
+//! A driver that misses a new reading repeats the previous one, digit by digit. Such a reading is late by a step, an error of the motion's
 //! velocity times the step, which no average takes out. It is taken for missing and filled in from the readings around it.
 
 use super::{Recording, quantile};
 
-/// Repetitions in a row from which on a motion may rest, and at most.
+/// Repetitions in a row at and above which a motion may rest, and at most.
 const MANY: usize = 4;
 const MOST_HELD: usize = 12;
-/// Change after many repetitions over that of a motion that goes on as it did before.
+/// Change after many repetitions over that of a motion that continues as it did before.
 const GOES_ON: f64 = 0.5;
-/// Change of a reading over the smallest one of its sensor from which on a reading between does not stay the same.
+/// Change of a reading over the smallest one of its sensor at and above which a reading between does not stay the same.
 const MOVING: f64 = 3.0;
-/// The usual change over the smallest one from which on readings are hardly ever the same by chance, and the share of repetitions from which
+/// The usual change over the smallest one at and above which readings are hardly ever the same by chance, and the share of repetitions from which
 /// on it was not chance.
 const FINE: f64 = 20.0;
 const OFTEN: f64 = 0.01;
-/// Marks up to which changes are looked at, how far a whole number of them may be off, so many changes at least, and the share that is whole: others
+/// Marks up to which changes are examined, how far a whole number of them may be off, so many changes at least, and the share that is whole: others
 /// are readings that were filled in.
 const FEW_MARKS: f64 = 8.0;
 const WHOLE: f64 = 0.05;
@@ -59,7 +59,7 @@ pub(crate) fn filled(recording: &Recording) -> Option<Filled> {
     held.iter().flatten().any(|held| *held).then_some(Filled { recording: filled, held })
 }
 
-/// What a sensor tells apart.
+/// The resolution of a sensor.
 struct Scale {
     /// Smallest change of a reading.
     smallest: f64,

@@ -38,7 +38,7 @@ pub enum HoldOutError {
     Short {
         /// Samples of the trajectory.
         samples: usize,
-        /// Share asked for.
+        /// Share requested.
         fraction: f64,
         /// The gap in samples.
         gap: usize,
@@ -222,7 +222,7 @@ mod tests {
         for seed in 0..10 {
             assert_eq!(hold_out(&recording(&[100, 20, 100]), 0.1, 1, seed).unwrap().1.samples() % 100, 20);
         }
-        // Even if nearly all is asked for, something is left to learn from.
+        // Even if nearly all is requested, something remains for training.
         assert_eq!(hold_out(&recording(&[9, 9]), 0.99, 1, 0).unwrap().0.tracks.len(), 1);
     }
 

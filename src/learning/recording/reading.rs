@@ -1,16 +1,16 @@
-//! Where recorded samples stand in the files they come from, and what was left out.
+//! The files and rows that recorded samples come from, and what was left out.
 
 use crate::recording::Recording;
 use crate::recording::smooth::{Chosen, Smoothing, noise};
 use crate::recording::statistics::deviation;
 use serde::{Deserialize, Serialize};
 
-/// Line of the file of every sample, run-length: from sample `.0` on, sample `k` stands on line `k - .0 + .1`.
+/// Line of the file of every sample, run-length: from sample `.0` on, sample `k` is on line `k - .0 + .1`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rows(Vec<(usize, u64)>);
 
 impl Rows {
-    /// Notes that sample `sample` stands on line `row`; samples come in order.
+    /// Notes that sample `sample` is on line `row`; samples come in order.
     pub(crate) fn note(&mut self, sample: usize, row: u64) {
         if self.0.is_empty() || self.row(sample) != row {
             self.0.push((sample, row));
@@ -26,7 +26,7 @@ impl Rows {
         }
     }
 
-    /// The rows of samples `start..end`, counted anew from 0.
+    /// The rows of samples `start..end`, counted from 0.
     pub(crate) fn part(&self, start: usize, end: usize) -> Self {
         let mut rows = Self(vec![(0, self.row(start))]);
         for (first, row) in self.0.iter().filter(|(first, _)| *first > start && *first < end) {
@@ -51,7 +51,7 @@ pub struct Cut {
     pub steps: f64,
 }
 
-/// Short gaps in time, across which trajectories go on.
+/// Short gaps in time, across which trajectories continue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Bridged {
     /// Their number.
@@ -92,7 +92,7 @@ pub struct LoadedRecording {
     pub cuts: Vec<Cut>,
     /// Stretches left out.
     pub dropped: Vec<Dropped>,
-    /// Short gaps, across which trajectories go on.
+    /// Short gaps, across which trajectories continue.
     pub bridged: Bridged,
     /// Standard deviations of the positions of every trajectory, `(samples, n)` each; empty if they are in no columns.
     pub errors: Vec<Vec<f64>>,
@@ -111,7 +111,7 @@ impl From<Recording> for LoadedRecording {
     }
 }
 
-/// Relative error of accelerations by smoothing above which the motion itself is the better teacher.
+/// Relative error of accelerations by smoothing above which a fit should learn from the motion itself.
 pub const LARGE_ERROR: f64 = 0.1;
 
 /// Share of the spread of a known force that is taken to accelerate, where the size of an inertia is looked for.

@@ -9,7 +9,7 @@ pub struct RecordedTrajectory {
     pub name: String,
     /// Times of the samples in s, strictly increasing, `(samples)`.
     pub times: Vec<f64>,
-    /// Coordinates, `(samples, n)` row-major; angles are unwrapped: they go on past a full turn.
+    /// Coordinates, `(samples, n)` row-major; angles are unwrapped: they continue past a full turn.
     pub q: Vec<f64>,
     /// Velocities, `(samples, n)`; empty if they were not measured.
     pub v: Vec<f64>,

@@ -32,7 +32,7 @@ pub struct Task<'a, S> {
     pub training: &'a [StateEstimate<'a>],
     /// Trajectories that choose the best epoch.
     pub validation: &'a [StateEstimate<'a>],
-    /// Noise of the measurements; where there is none, the accuracy that is asked for.
+    /// Noise of the measurements; without noise, the required accuracy.
     pub noise: &'a Noise,
     /// Constraints that hold the motion.
     pub constraints: Option<&'a FormulaConstraints>,
@@ -49,7 +49,7 @@ pub struct Fitted<S> {
     pub history: Vec<Epoch>,
     /// Validation loss of the parameters given.
     pub start_loss: f64,
-    /// Best validation loss, 1 where only noise is left.
+    /// Best validation loss, 1 where only noise remains.
     pub validation_loss: f64,
     /// Why fitting ended.
     pub stop: StopReason,
@@ -110,7 +110,7 @@ impl<S: Scalar> Task<'_, S> {
     fn check(&self) -> Result<(), ShootingError> {
         self.architecture.validate()?;
         let n = self.architecture.coordinates;
-        // Parameters of other terms of the motion may stand behind those of the network.
+        // Parameters of other terms of the motion may follow those of the network.
         let (expected, found) = (Layout::new(self.architecture).parameters, self.weights.len());
         if found < expected {
             return Err(NetworkError::Weights { expected, found }.into());

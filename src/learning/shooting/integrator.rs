@@ -145,7 +145,7 @@ impl<S: Scalar> SegmentIntegrator<S> {
             let range = row * n..(row + 1) * n;
             let (q, v) = (&mut q[range.clone()], &mut v[range.clone()]);
             let (q_start, v_start) = (&q_start[range.clone()], &v_start[range]);
-            // What is not a number is in no range.
+            // `NaN` is in no range.
             *alive &= (0..n).all(|i| (q[i] - q_start[i]).abs() <= reach[i] && v[i].abs() <= speed[i]);
             if !*alive {
                 q.copy_from_slice(q_start);

@@ -85,7 +85,7 @@ impl<S: Scalar> ShootingLearner<S> {
     }
 }
 
-/// What moves beside the weights, between two steps, as a checkpoint keeps it.
+/// State besides the weights that changes between steps, as a checkpoint keeps it.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 struct ShootingState<S> {

@@ -28,9 +28,9 @@ pub(super) struct Segment<S> {
     pub step: S,
     /// Seconds from its start to its end.
     pub duration: f64,
-    /// `true` if the next segment of the list goes on where this one ends.
+    /// `true` if the next segment of the list continues where this one ends.
     pub has_next: bool,
-    /// `true` if the one before ends where this one starts.
+    /// `true` if the previous one ends where this one starts.
     pub has_previous: bool,
     /// `true` if its velocities were measured.
     pub has_velocity: bool,
@@ -113,7 +113,7 @@ fn pieces(times: &[f64], per_segment: usize) -> Vec<Piece> {
 impl<S: Scalar> Segments<S> {
     /// Cuts trajectories for a network of this shape; each segment is integrated over `steps` equal steps.
     ///
-    /// Samples that stand alone between pauses are left out. Shapes must have been checked.
+    /// Samples that are isolated between pauses are left out. Shapes must have been checked.
     pub fn new(
         architecture: &Architecture,
         trajectories: &[StateEstimate<'_>],

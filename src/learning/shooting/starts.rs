@@ -12,7 +12,7 @@ use crate::scalar::{Real, Scalar};
 use crate::shooting::loss::Huber;
 use crate::shooting::segments::Segments;
 
-/// Weight, beside the observations, of a start that stays where it is: keeps `H` regular where data say nothing.
+/// Weight, relative to the observations, of keeping an initial state unchanged: it keeps `H` regular where data do not determine it.
 const DAMPING: f64 = 1e-2;
 /// A correction is at most this part of the range that a state may move in.
 const LONGEST: f64 = 1e-2;
@@ -185,7 +185,7 @@ impl<S: Scalar> Curvature<S> {
             if g.iter().all(|g| *g == zero) {
                 continue;
             }
-            // A start whose curvature says nothing stays.
+            // An initial state whose curvature carries no information stays.
             let step = match &segments.allowed {
                 Some(allowed) => allowed.step(start, h, g, &mut self.workspace),
                 None => {

@@ -27,7 +27,7 @@ pub(crate) struct Start {
     pub last: (usize, usize),
     /// Time since training began.
     pub clock: Clock,
-    /// Who watches.
+    /// The observer.
     pub hooks: Hooks,
 }
 

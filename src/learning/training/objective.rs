@@ -80,7 +80,7 @@ pub(crate) fn threads(count: usize) -> Result<Arc<rayon::ThreadPool>, ThreadsErr
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cannot start {threads} threads: {problem}")]
 pub struct ThreadsError {
-    /// Number asked for.
+    /// Number requested.
     pub threads: usize,
     /// Message of the operating system.
     pub problem: String,

@@ -7,7 +7,7 @@ use crate::training::objective::{BatchReport, Objective};
 use argmin::core::{CostFunction, Error, Gradient};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Problem of an argmin run: a network's parameters, the states it learns from and those it is judged by.
+/// Problem of an argmin run: a network's parameters, its training states and its validation states.
 ///
 /// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among
 /// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's or of
@@ -60,7 +60,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         self.validation
     }
 
-    /// Moments before the first step of an update rule, with the weight matrices that SOAP turns.
+    /// Moments before the first step of an update rule, with the weight matrices in whose eigenbases SOAP works.
     pub fn moments(&mut self, method: Method) -> Moments<S> {
         let model = self.objective().model();
         Moments::for_method(method, model.parameters(), model.matrices())

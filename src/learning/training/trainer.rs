@@ -28,7 +28,7 @@ pub struct Trained<S> {
     pub history: Vec<Epoch>,
     /// Best validation loss, paper convention.
     pub validation_loss: f64,
-    /// Loss on fresh states that chose nothing, paper convention.
+    /// Loss on fresh states that were not used for any choice, paper convention.
     pub test: BatchReport<S>,
     /// Why training ended.
     pub stop: StopReason,
@@ -41,7 +41,7 @@ pub struct Trained<S> {
 }
 
 impl<S: Scalar> Trained<S> {
-    /// The end of this training as a checkpoint holds it, for what goes on from there, such as
+    /// The end of this training as a checkpoint holds it, for what continues from there, such as
     /// [`shooting::resume`](crate::shooting::resume).
     #[doc(hidden)]
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
@@ -84,7 +84,7 @@ pub enum TrainingError {
     NothingLearned(Option<StepError>),
 }
 
-/// Where a training keeps its checkpoints and what it goes on from.
+/// Where a training keeps its checkpoints and what it continues from.
 pub struct ResumeOptions<S> {
     /// Checkpoint writer, if enabled.
     pub checkpoints: Option<Arc<CheckpointManager>>,

@@ -13,14 +13,14 @@ use alloc::vec::Vec;
 use core::fmt::Debug;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Products of an elimination that are always worth recording: it takes less time than the call of a solver.
+/// Number of products of an elimination that is always worth recording: it takes less time than a call of a solver.
 pub(super) const SMALL: usize = 60;
 
 /// Coordinates of a Lagrangian at most for which one program of the linearization takes less time than programs of its parts: in turns by
 /// `cargo bench --bench hessians -- linearization`, 0.4 times at two, 0.6 at four, the same at six and eight.
 const WHOLE: usize = 4;
 
-/// What records the equations of motion of a model, at a state and with parameters that are being recorded.
+/// Records the equations of motion of a model, at a state and with parameters that are being recorded.
 pub(super) trait RecordMotion<S>: Debug + Send + Sync {
     /// The equations; `None` if they are too large.
     fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>>;
@@ -35,7 +35,7 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
         None
     }
 
-    /// Coordinates at most for which the linearization is worth a program of its own.
+    /// Largest number of coordinates for which the linearization has a separate program.
     fn whole_coordinates(&self) -> usize {
         0
     }
@@ -48,7 +48,7 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Solved<'a, S> {
-    /// What it was recorded from, for a model that adds to these equations.
+    /// The motion that was recorded, for a model that adds to these equations.
     motion: Arc<dyn RecordMotion<S>>,
     program: Arc<Program<S>>,
     parameters: Vec<S>,
@@ -71,7 +71,7 @@ impl<'a, S: Scalar> Solved<'a, S> {
         Self { flag: other.flag, ..self }
     }
 
-    /// What it was recorded from, and the values of its parameters.
+    /// The motion that was recorded, and the values of its parameters.
     pub(super) fn motion(&self) -> (&Arc<dyn RecordMotion<S>>, &[S]) {
         (&self.motion, &self.parameters)
     }

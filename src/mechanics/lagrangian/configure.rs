@@ -30,7 +30,7 @@ use rand::Rng;
 pub enum SystemError {
     /// No system of this name.
     UnknownSystem {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// Names there are.
         known: Vec<String>,
@@ -339,7 +339,7 @@ fn differentiated<S: Scalar>(
         terms.force.resize(n, S::nan());
         Rayleigh(friction).force(q, v, &mut terms.force);
     }
-    // A row that fails has the acceleration NaN, which is what there is to say of one state.
+    // A row that fails has the acceleration NaN, which is all that can be reported for one state.
     let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
     terms.acceleration
 }
@@ -361,7 +361,7 @@ fn unknown_system(name: &str) -> SystemError {
 /// Reads the parameters of a system in the working precision; those not given take their defaults.
 ///
 /// # Errors
-/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
+/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is not a number or out of range.
 pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
     configure_system(resolve(name)?, given)
 }
@@ -369,7 +369,7 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<
 /// [`configure`] for a given system: one of the catalogue, or one made from a [description](super::Description).
 ///
 /// # Errors
-/// [`SystemError`] for an unknown or repeated symbol, a value that is no number or out of range.
+/// [`SystemError`] for an unknown or repeated symbol, a value that is not a number or out of range.
 pub fn configure_system<S: Scalar>(
     system: Cow<'static, System>,
     given: &Given,

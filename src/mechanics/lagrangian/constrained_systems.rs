@@ -15,7 +15,7 @@ const MOST_BOBS: usize = 500;
 /// Name of a chain, before the number of its bobs.
 const CHAIN: &str = "cartesian-chain-";
 
-/// What the system of a name is; chains that are too long for the list have names as well.
+/// The system with a given name; chains that are too long for the list have names as well.
 pub(super) fn constrained_description(name: &str) -> Option<Description> {
     let bobs = name.strip_prefix(CHAIN).and_then(|bobs| bobs.parse().ok());
     match bobs.filter(|bobs| (1..=MOST_BOBS).contains(bobs)).map(chain) {
@@ -24,7 +24,7 @@ pub(super) fn constrained_description(name: &str) -> Option<Description> {
     }
 }
 
-/// What the listed systems are.
+/// Kinds of the listed systems.
 pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     let single = [
         on_surface("particle-on-sphere", "Heavy particle on a sphere", &["R"], "x^2 + y^2 + z^2 - R^2", 1.0),
@@ -70,7 +70,7 @@ pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     single.into_iter().chain((1..=LISTED_BOBS).map(chain))
 }
 
-/// The listed systems under constraints, made anew.
+/// The listed systems under constraints, built on each call.
 pub fn constrained_systems() -> Vec<System> {
     // Formulas of this file, which a test compiles.
     constrained_descriptions().filter_map(|description| description.compile().ok()).collect()
@@ -141,7 +141,7 @@ fn on_ellipse() -> Description {
     )
 }
 
-/// Bobs on rods of equal length, each hanging from the one before.
+/// Bobs on rods of equal length, each hanging from the previous one.
 fn chain(bobs: usize) -> Description {
     let name = |axis: char, k: usize| format!("{axis}{k}");
     let names: Vec<String> = (1..=bobs).flat_map(|k| [name('x', k), name('y', k)]).collect();

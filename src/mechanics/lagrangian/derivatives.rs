@@ -53,7 +53,7 @@ const fn may_be<L: Lagrangian>(n: usize) -> bool {
     }
 }
 
-/// `true` if a Lagrangian can have more coordinates than jets serve.
+/// `true` if a Lagrangian can have too many coordinates for jets.
 const fn may_be_large<L: Lagrangian>() -> bool {
     match L::COORDINATES {
         Some(declared) => declared > 4,

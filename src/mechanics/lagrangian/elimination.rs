@@ -9,7 +9,7 @@ pub(super) type Lists<R> = Vec<Vec<(usize, R)>>;
 
 /// A linear system of equations of motion, `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, without constraints `M a = f`.
 pub(super) struct Balance<R> {
-    /// Number of coordinates; the equations behind them are those of constraints.
+    /// Number of coordinates; the equations after them are those of constraints.
     pub coordinates: usize,
     /// The lower triangle, the diagonal with it.
     pub lower: Lists<R>,
@@ -24,7 +24,7 @@ pub(super) struct Eliminated<R> {
     steps: Vec<(usize, Vec<(usize, R)>)>,
     /// By row.
     pivots: Vec<R>,
-    /// What every pivot was before it was reduced.
+    /// The value of every pivot before reduction.
     diagonal: Vec<R>,
 }
 

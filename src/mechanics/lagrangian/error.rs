@@ -259,7 +259,7 @@ mod tests {
         let failed = terms.drain_failures(Err(MechanicsError::Uncertified { row: 2 }));
         assert_eq!(failed, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
         assert_eq!(terms.outcome(), Ok(()));
-        // What an earlier batch left behind does not count.
+        // Remains of an earlier batch do not count.
         terms.failures.push(MechanicsError::Uncertified { row: 2 });
         assert_eq!(terms.drain_failures(Ok(())), Ok(Vec::new()));
         assert_eq!(terms.outcome(), Ok(()));

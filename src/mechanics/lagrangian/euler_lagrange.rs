@@ -121,7 +121,7 @@ impl<S: Scalar> Terms<S> {
             self.sum_constraint_forces(n);
             workspace.give_vector(right);
         }
-        // What was not finite before the solve is named rather than the solve.
+        // Reports a number that was not finite before the solve rather than the solve.
         let m = self.constraints;
         let fields: [(&'static str, &[S], usize); 10] = [
             ("Lagrangian", &self.lagrangian, 1),
@@ -261,7 +261,7 @@ pub fn inverse_dynamics<S: Scalar>(
 pub struct ForceParts<S> {
     /// `M a`.
     pub inertial: Vec<S>,
-    /// What the velocities add: the Coriolis and centrifugal forces.
+    /// Coriolis and centrifugal forces.
     pub coriolis: Vec<S>,
     /// `-dL/dq` at rest: what holds the state where it is, against gravity and springs.
     pub gravity: Vec<S>,

@@ -5,7 +5,7 @@ use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{components, dot};
 use crate::scalar::Scalar;
 
-/// States that show what acts on what, at most.
+/// Largest number of states that are used to detect couplings.
 const STATES: usize = 64;
 
 /// Accelerations of states, `(states, n)` each.
@@ -40,7 +40,7 @@ pub(crate) fn acting_groups<S: Scalar>(
                 .collect::<Vec<_>>()
         })
         .collect();
-    // What cannot be evaluated may act.
+    // Couplings that cannot be evaluated are assumed.
     let acts = |&(j, i): &(usize, usize)| changes[j * n + i] > noise[i] || changes[j * n + i].is_nan();
     components(n, pairs(n).filter(acts))
 }

@@ -325,7 +325,7 @@ impl<S: Scalar> Terms<S> {
         [lagrangian, momentum, dl_dq, mass_matrix, coriolis]
     }
 
-    /// Gives those that are asked for their sizes, to be overwritten.
+    /// Resizes the requested fields, to be overwritten.
     fn make_room(&mut self, n: usize, batch: usize, request: Request) {
         let needs = [
             (Request::LAGRANGIAN, 1),

@@ -9,7 +9,7 @@ use core::fmt;
 #[cfg(feature = "serde")]
 use serde::Serialize;
 
-/// What is known of an element before any state is.
+/// Knowledge about an element before any state is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize), serde(rename_all = "lowercase"))]
 pub enum Element {

@@ -33,7 +33,7 @@ struct Buffers<'a, S: Scalar> {
     accelerations: Accelerations<'a, S>,
     /// Made on first use.
     linearizer: Option<Linearizer<'a, S>>,
-    /// Where it linearized last: solvers ask for one product after the other.
+    /// State of the last linearization: solvers request one product after the other.
     place: Vec<S>,
     error: Option<MechanicsError>,
 }

@@ -70,7 +70,7 @@ pub enum Size {
         least: usize,
         /// Largest value.
         most: usize,
-        /// What stands at so many places.
+        /// The arrangement of that many parts: along a line or in a net.
         layout: Layout,
     },
 }
@@ -92,7 +92,7 @@ impl Layout {
             Self::Net => 3 * chosen * chosen,
         }
     }
-    /// The integer that gives so many coordinates.
+    /// The integer that gives a number of coordinates.
     pub(crate) const fn chosen(self, coordinates: usize) -> usize {
         match self {
             Self::Line => coordinates,
@@ -215,7 +215,7 @@ impl LearningAdvice {
 pub(crate) struct StateAdvice {
     /// Coordinates of which half are drawn uniform in their logarithm; empty for none.
     pub log_uniform: Vec<bool>,
-    /// Size, over the mean one, of accelerations from which on residuals count relatively; 0 for none.
+    /// Size, over the mean one, of accelerations at and above which residuals count relatively; 0 for none.
     pub acceleration_weighting: f64,
     /// Share of the states that lie along motions of the trajectory test.
     pub trajectory_fraction: f64,
@@ -282,7 +282,7 @@ pub struct System {
     pub(crate) validation: PerSize<Bounds>,
     /// Trajectory test.
     pub(crate) trajectory: PerSize<TrajectoryTest>,
-    /// Where the coordinates make sense; the error says what is demanded.
+    /// Domain of the coordinates; the error states the condition.
     pub(crate) domain: Option<Domain>,
     /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
     pub(crate) plane: Option<Plane>,

@@ -1,4 +1,4 @@
-//! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
+//! Euler-Lagrange terms of a batch of states: what may be requested, where it is stored, how the rest follows.
 
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
@@ -62,7 +62,7 @@ impl Request {
         }
     }
 
-    /// `true` if all of `other` is asked for.
+    /// `true` if all of `other` is requested.
     #[inline]
     pub const fn includes(self, other: Self) -> bool {
         self.0 & other.0 == other.0
@@ -76,7 +76,7 @@ impl BitOr for Request {
     }
 }
 
-/// Euler-Lagrange terms of `batch` states; a field is filled if it was asked for and empty otherwise.
+/// Euler-Lagrange terms of `batch` states; a field is filled if it was requested and empty otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct Terms<S> {
     /// `L`, `(batch)`.

@@ -1,4 +1,4 @@
-//! Friction of every coordinate by itself, as the joints of a machine have it: beside a Rayleigh dissipation, or alone.
+//! Friction of every coordinate individually, as in the joints of a machine: with a Rayleigh dissipation, or alone.
 //!
 //! With the scaled velocity `w` of a coordinate and the size `F` of its friction, [`Sizes::friction`](super::Sizes), it is the dissipation
 //!
@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Friction that every coordinate has by itself.
+/// Friction of every coordinate individually.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]

@@ -87,7 +87,7 @@ pub struct Layout {
     pub features: usize,
     /// Parameters of the dissipation, behind those of all branches.
     pub dissipation: Option<DissipationLayout>,
-    /// Parameters of the structure that stand beside the network, as `alpha` of a black box that learns it.
+    /// Parameters of the structure outside the network, such as `alpha` of a black box that learns it.
     pub constants: Range<usize>,
     /// Parameters of the joint friction, `(rows, n)`.
     pub joint_friction: Range<usize>,
@@ -284,7 +284,7 @@ fn draw_direction<S: Scalar>(rng: &mut impl Rng, direction: &mut [S]) {
     }
 }
 
-/// Where a dense layer stands in its branch.
+/// Position of a dense layer in its branch.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
     /// Hidden layer, counted from 0.

@@ -80,7 +80,7 @@ impl Architecture {
     /// Checks that the lists fit each other and that nothing is empty or not finite.
     ///
     /// # Errors
-    /// The first thing that does not fit, in words.
+    /// The first mismatch, in words.
     #[doc(hidden)]
     pub fn validate(&self) -> Result<(), NetworkError> {
         let n = self.coordinates;

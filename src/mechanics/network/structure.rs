@@ -110,7 +110,7 @@ pub struct Form {
     /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub known: Option<Box<Description>>,
-    /// Friction of every coordinate by itself; files without this key have none.
+    /// Friction of every coordinate individually; files without this key have none.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "JointFriction::is_none"))]
     pub joint_friction: JointFriction,
     /// Sizes of the parts; files without this key have all of size 1.
@@ -203,7 +203,7 @@ impl Form {
         }
     }
 
-    /// Name and initial values of the parameters that stand beside the network; `alpha` is the factor of the added term.
+    /// Name and initial values of the parameters outside the network; `alpha` is the factor of the added term.
     pub(super) fn constants(&self, n: usize, alpha: f64) -> Option<(&'static str, Vec<f64>)> {
         match self.structure {
             Structure::BlackBox => self.learn_alpha.then(|| ("alpha", vec![alpha])),
@@ -262,13 +262,13 @@ impl Form {
     }
 }
 
-/// What a Lagrangian is made of beside the network.
+/// Parts of a Lagrangian besides the network.
 pub(super) struct LagrangianInputs<'a, R> {
     /// Input features made of the coordinates.
     pub positions: &'a [R],
     /// Scaled velocities `v_i/s_i`.
     pub velocities: &'a [R],
-    /// The parameters that stand beside the network.
+    /// The parameters outside the network.
     pub constants: &'a [R],
     /// Factor of the added term of a black box that does not learn it.
     pub alpha: f64,

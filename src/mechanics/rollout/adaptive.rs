@@ -19,9 +19,9 @@ struct MotionEquations<'a, S> {
     force: Option<&'a dyn Force<S>>,
     options: &'a Options<S>,
     n: usize,
-    /// What moves without a force from outside.
+    /// The model that moves without a force from outside.
     accelerations: Accelerations<'a, S>,
-    /// What a force from outside is added to.
+    /// The model to which a force from outside is added.
     terms: Terms<S>,
     external: Vec<S>,
     workspace: Workspace<S>,
@@ -63,7 +63,7 @@ impl<S: Scalar> MotionEquations<'_, S> {
     }
 }
 
-/// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
+/// Integrates from `(q, v)` to the end of the options, or as far as possible; arguments are checked.
 pub(super) fn run<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -84,7 +84,7 @@ pub(super) fn run<S: Integrable>(
     let (mut start, mut first, mut first_step) = (zero, 0, zero);
     let nodes_are_asked_for = nodes.is_some();
     for piece in pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end) {
-        // The samples of this piece; its end is integrated to even if it is none.
+        // The samples of this piece; it is integrated to its end even if that is not a sample.
         let last = piece.end >= all.elapsed(all.len() - 1);
         let after = if last { all.len() } else { all.count_until(piece.end) };
         let end = (!last && (after == first || all.elapsed(after - 1) < piece.end)).then_some(piece.end);
@@ -113,7 +113,7 @@ pub(super) fn run<S: Integrable>(
             let y = on.as_slice();
             // An interpolated state may still cross a bound by less than the tolerance.
             valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
-            // The samples behind an invalid one are not taken, the motion goes on to its end.
+            // The samples after an invalid one are dropped; the motion continues to its end.
             !valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
         };
         let (t0, backwards) = (options.t0, motion.backwards());

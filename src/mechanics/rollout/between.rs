@@ -37,7 +37,7 @@ impl Between {
     }
 
     /// Hands over the samples, at ascending `times`, that make the value at the share `x` of the interval that ends at `sample`, each
-    /// with its weight. Beyond the ends the first and the last sample go on.
+    /// with its weight. Beyond the ends the first and the last sample continue.
     pub(crate) fn weigh<S: Scalar>(self, times: &[S], (sample, x): (usize, S), mut take: impl FnMut(usize, S)) {
         let (before, one) = (sample.saturating_sub(1), <S as Real>::one());
         let last = times.len() as isize - 1;

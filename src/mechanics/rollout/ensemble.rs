@@ -1,4 +1,4 @@
-//! Many motions: each by itself, or groups of them evaluated together.
+//! Many motions, integrated individually or in groups that are evaluated together.
 //!
 //! In a group the motions wait for each other, so that the states they all ask for are evaluated as one batch.
 //! Every motion keeps its own steps and error control. Each runs until it needs its model, and waits there for the others;
@@ -116,7 +116,7 @@ pub(super) struct Group<'a, S> {
     evaluated: Condvar,
 }
 
-/// Requests of the members, until the last one has asked, and the answer.
+/// Requests of the members, until the last one has arrived, and the answer.
 struct Round<S> {
     /// Rounds evaluated so far.
     number: u64,
@@ -128,7 +128,7 @@ struct Round<S> {
     q: Vec<S>,
     v: Vec<S>,
     terms: Terms<S>,
-    /// All that was asked for.
+    /// Union of all requests.
     request: Request,
     /// `true` unless the round failed for a reason that is not that of single states.
     has_row_failures: bool,
@@ -165,7 +165,7 @@ impl<'a, S: Scalar> Group<'a, S> {
         self.round.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Evaluates the states of all who asked, in the order of the members.
+    /// Evaluates the states of all requests, in the order of the members.
     fn evaluate(&self, round: &mut Round<S>) {
         let n = self.model.coordinates();
         let mut request = Request::default();
@@ -231,7 +231,7 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
             }
         }
         drop(round);
-        // What failed may be what only the others had asked for.
+        // A failure may concern only what the others requested.
         self.group.model.terms(q, v, request, terms)
     }
 }
@@ -286,7 +286,7 @@ mod tests {
         }
     }
 
-    /// A model that counts how often it is asked.
+    /// A model that counts its evaluations.
     struct Counted {
         model: Box<dyn EulerLagrange<f64>>,
         calls: AtomicUsize,
@@ -303,7 +303,7 @@ mod tests {
         }
     }
 
-    /// Outcomes of two members who ask at once, and the evaluations that took.
+    /// Outcomes of two members with simultaneous requests, and the evaluations that took.
     fn ask(requests: [Request; 2]) -> ([Result<(), MechanicsError>; 2], usize) {
         let model = configure::<f64>("spring-pendulum", &[]).unwrap().build().unwrap();
         let model = Counted { model, calls: AtomicUsize::new(0) };
@@ -330,7 +330,7 @@ mod tests {
         let (outcomes, calls) = ask([Request::ACCELERATION; 2]);
         assert!(matches!(outcomes, [Ok(()), Err(MechanicsError::Singular { row: 0, .. })]), "{outcomes:?}");
         assert_eq!(calls, 1);
-        // What only the other had asked for does not fail a member.
+        // A term that only the other member requested does not fail a member.
         let (outcomes, calls) = ask([Request::ACCELERATION, Request::ENERGY]);
         assert_eq!((outcomes, calls), ([Ok(()), Ok(())], 2));
     }

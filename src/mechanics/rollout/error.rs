@@ -2,7 +2,7 @@
 
 use crate::lagrangian::MechanicsError;
 
-/// Why steps became too small to go on although every evaluation of the model succeeded or failed for no other reason.
+/// Why steps became too small to continue although every evaluation of the model succeeded or failed for no other reason.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnderflowCause {

@@ -68,7 +68,7 @@ impl<S: Scalar> Stepper<S> {
     }
 }
 
-/// Where a roll-out stands.
+/// Progress of a roll-out.
 struct Position<'a, S> {
     state: PhasePoint<S>,
     /// A velocity near that of the state.
@@ -77,7 +77,7 @@ struct Position<'a, S> {
     since: S,
     steps: usize,
     h: S,
-    /// What is known of the rows of constraints.
+    /// Knowledge about the rows of constraints.
     regular: Option<Regularity<'a, S>>,
 }
 

@@ -115,7 +115,7 @@ impl<S: Scalar> Force<S> for SampledForce<S> {
 pub(super) struct Piece<S> {
     /// Elapsed time `|t - t0|` at its end.
     pub(super) end: S,
-    /// Times at which the force is asked; the latter lies just before a break.
+    /// Times at which the force is evaluated; the latter lies just before a break.
     lower: S,
     upper: S,
 }

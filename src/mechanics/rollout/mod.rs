@@ -9,7 +9,7 @@
 //! a model that needs them wrapped wraps them itself.
 //!
 //! Of a model under constraints the motion stays on them: the adaptive methods project their states and samples, the symplectic ones have
-//! their constrained forms. A start is brought to the constraints if it lies within a thousandth of its size, and refused otherwise.
+//! their constrained forms. A start is projected onto the constraints if it lies within a thousandth of its size, and refused otherwise.
 //!
 //! [`rollout_in_pieces`] hands the samples over instead of keeping them, for motions longer than the memory.
 //!

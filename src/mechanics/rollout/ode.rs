@@ -8,7 +8,7 @@
 //! - Backward integration is fragile: the elapsed time always runs upwards from 0 (the caller flips the sign).
 //! - Statistics are lost on errors: calls are counted here.
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
-//! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
+//! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the previous one.
 
 use super::dense::{Interpolant, Rhs, Step};
 use super::gauss::Tableau;
@@ -23,13 +23,13 @@ use ode_solvers::dop_shared::{FloatNumber, IntegrationError};
 use ode_solvers::{DVector, Dop853, Dopri5, OutputType, SVector, System};
 use std::cell::RefCell;
 
-/// Receives sample `k` with its state, and says whether to go on.
+/// Receives sample `k` with its state, and says whether to continue.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 
 /// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
 pub(super) type StepNodes<'a, S> = dyn FnMut(S, S, &[S]) + 'a;
 
-/// What an integration hands its results to.
+/// The receiver of an integration's results.
 pub(super) type Receivers<'a, 'f, S> = (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>);
 
 /// Parts of a step that have three nodes of Gauss each.
@@ -72,7 +72,7 @@ pub enum EarlyEnd<E> {
     Underflow,
     /// No attempts left.
     TooManySteps,
-    /// The receiver of the samples takes no more.
+    /// The receiver accepts no more samples.
     Stopped,
 }
 
@@ -184,7 +184,7 @@ struct Observer<'a, 'f, S, E> {
     earlier: Option<E>,
     /// An accepted step failed at its end: try again with this size.
     retry: Option<S>,
-    /// The state was projected: go on from it, beginning with this size.
+    /// The state was projected: continue from it, beginning with this size.
     restart: Option<S>,
     /// The time does not advance any more.
     stuck: bool,

@@ -80,7 +80,7 @@ impl<S: Scalar> Defect<S> {
         self.relative <= S::epsilon()
     }
 
-    /// As far as rounding errors of the model may explain.
+    /// Up to the rounding errors of the model.
     pub(super) fn is_small(self) -> bool {
         self.overall <= S::epsilon().ldexp(12)
     }

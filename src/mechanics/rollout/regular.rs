@@ -17,11 +17,11 @@ const PARTS: usize = 8;
 /// Halvings of an interval around the smallest singular value: of one that is to be known to rounding, and of one that others are compared
 /// with.
 const HALVINGS: (usize, usize) = (52, 12);
-/// Places of a step that are looked at first, and divisions of the interval around the least of them.
+/// Places of a step that are examined first, and divisions of the interval around the least of them.
 const PLACES: usize = 16;
 const DIVISIONS: usize = 40;
 
-/// What is known of the rows so far.
+/// Knowledge about the rows so far.
 pub(super) struct Regularity<'a, S> {
     manifold: &'a dyn Manifold<S>,
     /// 1, or -1 for a motion backwards in time.

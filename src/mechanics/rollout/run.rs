@@ -118,7 +118,7 @@ fn collected<S: Scalar>(
     Rollout { trajectory, statistics, stop }
 }
 
-/// The motion by any method, every sample and, if asked for, every node handed over and none kept.
+/// The motion by any method, every sample and, if requested, every node handed over and none kept.
 pub(super) fn integrate<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -270,7 +270,7 @@ impl StepFailure {
     }
 }
 
-/// Receives the time, coordinates and velocities of every sample in order, and says whether to go on.
+/// Receives the time, coordinates and velocities of every sample in order, and says whether to continue.
 pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
 /// Receives time, weight, coordinates and velocities at the nodes of a quadrature over time along a motion, beside the samples.

@@ -132,7 +132,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         }
         let Buffers { after, q, p, g, .. } = &mut *self.buffers;
         phase.momenta_and_forces(q, v, after, (p, g))?;
-        // What each node adds to the momenta of the stages and of the end.
+        // Contribution of each node to the momenta of the stages and of the end.
         let mut wanted = vec![zero; s * n];
         let mut push = vec![zero; n];
         let mut sizes = Vec::with_capacity(multipliers.len());
@@ -221,7 +221,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         Ok(())
     }
 
-    /// Impulses are whatever the velocities ask for.
+    /// The velocities determine the impulses.
     fn rounding(&self, n: usize, x: &[S], i: usize) -> S {
         let velocities = self.tableau.nodes.len() * n;
         if i < velocities { rounding(&self.state.q.high, self.h, x, i) } else { S::infinity() }

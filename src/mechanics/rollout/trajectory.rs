@@ -41,7 +41,7 @@ pub struct Trajectory<S> {
     pub q: Vec<S>,
     /// Velocities, `(len, n)`.
     pub v: Vec<S>,
-    /// Energy at each time by the model that moved, if asked for; `NaN` where it could not be computed.
+    /// Energy at each time by the model that moved, if requested; `NaN` where it could not be computed.
     pub energy: Option<Vec<S>>,
 }
 
@@ -82,7 +82,7 @@ impl<S: Scalar> Trajectory<S> {
         (&self.q[rows.clone()], &self.v[rows])
     }
 
-    /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot say.
+    /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot evaluate it.
     #[doc(hidden)]
     pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
         let size = CHUNK * self.coordinates.max(1);
@@ -192,7 +192,7 @@ impl<S: Copy> Times<S> for Vec<S> {
     }
 }
 
-/// The samples that options ask for: `t0 + k dt`, and `t_end` as the last.
+/// The samples of the options: `t0 + k dt`, and `t_end` as the last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples<S> {
     t0: S,
@@ -242,7 +242,7 @@ impl<S: Scalar> Samples<S> {
     }
 }
 
-/// Samples `first..after` in time elapsed since `start`, and, if it is none of them, the end of their stretch.
+/// Samples `first..after` in time elapsed since `start`, and, if it is not one of them, the end of their stretch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part<S> {
     pub(super) all: Samples<S>,

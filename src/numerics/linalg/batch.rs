@@ -15,7 +15,7 @@ pub(super) type Lane<S, const W: usize> = [S; W];
 pub struct Workspace<S> {
     /// A block of matrices too large for the stack.
     pub(super) block: Buffer<S>,
-    /// Scratch of the second look at a block.
+    /// Scratch memory for the second pass over a block.
     pub(super) second: Retry<S>,
     /// Scratch of determinants.
     pub(super) minors: Minors<S>,

@@ -52,7 +52,7 @@ pub(super) fn by_blocks<S: Scalar>(
 /// The coordinates of a matrix in groups, by its upper triangle.
 fn groups<S: Scalar>(n: usize, matrix: &[S]) -> Vec<Vec<usize>> {
     let is_element = |i: usize, j: usize| matrix[i * n + j] != <S as Real>::zero();
-    // The first row of a full matrix says all.
+    // The first row of a full matrix is enough.
     if (1..n).all(|j| is_element(0, j)) {
         return vec![(0..n).collect()];
     }
@@ -69,7 +69,7 @@ fn apart<S: Scalar>(
     vectors: &mut [S],
     buffer: &mut Buffer<S>,
 ) -> bool {
-    // Below the diagonal an element outside of the blocks may be anything.
+    // An element outside the blocks, below the diagonal, may have any value.
     let mut finite = are_finite(matrices);
     vectors.fill(<S as Real>::zero());
     let mut first = 0;

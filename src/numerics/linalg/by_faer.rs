@@ -170,7 +170,7 @@ fn refine<F: Scalar>(m: usize, x: &mut [F], step: &[F]) {
     }
 }
 
-/// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix; `NaN` if they are not found.
+/// Eigenvalues, ascending, and eigenvectors as rows (if requested) of one symmetric matrix; `NaN` if they are not found.
 pub(super) fn eigh<F: Scalar + RealField>(n: usize, matrix: &[F], values: &mut [F], vectors: &mut [F]) {
     // Row-major and lower triangle: column-major and upper triangle of the same symmetric matrix.
     let matrix = MatRef::from_column_major_slice(matrix, n, n);

@@ -36,7 +36,7 @@ impl<S: Scalar> Systems<'_, S> {
 /// Size above which faer's tridiagonal method beats Jacobi on lanes.
 const EIGEN: usize = 32;
 
-/// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix, `NaN` if faer gives up; `false` if the lanes
+/// Eigenvalues, ascending, and eigenvectors as rows (if requested) of one symmetric matrix, `NaN` if faer gives up; `false` if the lanes
 /// are faster, or this scalar has no routine.
 pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) -> bool {
     n > EIGEN && S::eigh(n, matrix, values, vectors)

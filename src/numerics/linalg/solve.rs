@@ -266,7 +266,7 @@ fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>,
     due
 }
 
-/// `true` if a solution stands as it is, by the smallest pivot and the largest elements of triangular factor and matrix.
+/// `true` if a solution needs no correction, by the smallest pivot and the largest elements of triangular factor and matrix.
 #[inline(always)]
 pub(super) fn is_harmless<S: Scalar>(smallest: S, growth: S, largest: S) -> bool {
     (smallest > S::of_f64(SMALL_PIVOT) * largest) & (growth <= S::of_f64(GROWTH) * largest)

@@ -56,7 +56,7 @@ pub enum RngStream {
     Segments,
     /// Trajectories of a recording, or given states, that are held out.
     HeldOut,
-    /// Copies of a recording with noise that is drawn anew.
+    /// Copies of a recording with new noise.
     Copies,
 }
 

@@ -119,7 +119,7 @@ impl<T> Column<T> {
     pub fn new(numbers: T, first: usize, step: usize) -> Self {
         Self { numbers, first, step }
     }
-    /// Numbers that stand side by side.
+    /// Adjacent numbers.
     #[inline(always)]
     pub fn all(numbers: T) -> Self {
         Self::new(numbers, 0, 1)

@@ -116,7 +116,7 @@ pub trait Matrices: Sized {
         None
     }
 
-    /// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix, `NaN` if they are not found; `false` if this
+    /// Eigenvalues, ascending, and eigenvectors as rows (if requested) of one symmetric matrix, `NaN` if they are not found; `false` if this
     /// scalar has no routine.
     fn eigh(_n: usize, _matrix: &[Self], _values: &mut [Self], _vectors: &mut [Self]) -> bool {
         false

@@ -276,7 +276,7 @@ where
     Program::record_within(ROWS, (inputs, value.parameters()), f)
 }
 
-/// What a place holds, recorded now if it is empty.
+/// The content of a place, recorded now if it is empty.
 fn filled<S: Scalar>(
     place: &mut Option<Replay<S>>,
     record: impl FnOnce() -> Result<Program<S>, TapeError>,

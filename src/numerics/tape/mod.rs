@@ -11,7 +11,7 @@
 //!   without allocating; recorded over forward numbers, it computes their derivatives. A branch on a value cannot be recorded
 //!   and is refused; [`Real::select`](crate::scalar::Real::select) can.
 //! - [`Recorded`] holds a function `L(q, v)` of numbers and dense layers ([`Real::affine`](crate::scalar::Real::affine)), and
-//!   an [`Evaluation`] gives everything a Lagrangian is asked for: `p`, `g`, `M`, `c`, and gradients of losses of the
+//!   an [`Evaluation`] evaluates all terms of a Lagrangian: `p`, `g`, `M`, `c`, and gradients of losses of the
 //!   accelerations by parameters and state.
 //!
 //! Memory of a [`Tape`] over numbers of `s` bytes: `8 + 2 s` bytes per node (24 for `f64`), of which there is one per
@@ -84,7 +84,7 @@ pub enum TapeError {
         /// Nodes it may hold.
         limit: u32,
     },
-    /// A result was asked of a tape for a variable that it did not record.
+    /// A result was requested from a tape for a variable that it did not record.
     Foreign,
     /// A slice has the wrong length.
     Shape {

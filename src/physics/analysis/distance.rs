@@ -35,7 +35,7 @@ pub struct ValidTimes {
     pub threshold: f64,
     /// Median of the times.
     pub median: f64,
-    /// `true` if the true median is longer, for too many predictions were valid to their end.
+    /// `true` if the true median is longer, because too many predictions were valid to their end.
     pub at_least: bool,
     /// Starts.
     pub starts: usize,

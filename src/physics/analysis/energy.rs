@@ -82,7 +82,7 @@ pub struct EnergyLoss {
     pub error: f64,
     /// Share of the stretches that lose energy.
     pub losing: f64,
-    /// Stretches looked at.
+    /// Stretches examined.
     pub stretches: usize,
     /// Mean length of a stretch in s.
     pub seconds: f64,
@@ -98,7 +98,7 @@ impl EnergyLoss {
 
 /// Stretches that trajectories are cut into, at least about.
 const STRETCHES: usize = 20;
-/// Samples of a stretch at which the energy is looked at, at most.
+/// Samples of a stretch at which the energy is examined, at most.
 const SAMPLES: usize = 64;
 
 /// Energy lost along the estimated states of recorded motion, work of known forces taken out: the slope of straight lines

@@ -158,7 +158,7 @@ fn nearby_masses<S: Integrable>(model: &dyn EulerLagrange<S>, state: &[f64]) -> 
     }
     let of = |x: &[f64]| x.iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>();
     let mut terms = Terms::default();
-    // What fails is not finite.
+    // Failures are not finite.
     let _ = model.terms(&of(&places), &of(&v.repeat(2 * n + 1)), Request::MASS_MATRIX, &mut terms);
     let mut all: Vec<f64> = terms.mass_matrix.iter().map(|m| m.to_f64()).collect();
     all.resize((2 * n + 1) * n * n, f64::NAN);

@@ -136,7 +136,7 @@ fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64>
     positions
 }
 
-/// Everything goes on as it went in the state before the window: the least that a model must beat.
+/// Everything continues as it went in the state before the window: the least that a model must beat.
 pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
     let prediction = |window: &Window| {
         let times = window.times.iter().map(|t| window.lead + t);

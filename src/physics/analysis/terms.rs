@@ -314,7 +314,7 @@ mod tests {
         let q = [0.0, 0.0, 1.0, 0.0, 3.0, 0.0];
         // By `c` the coordinates act on each other.
         let exact = model(1.0, 0.5, 0.1);
-        // What vanishes at rest does not count.
+        // A difference that vanishes at rest does not count.
         let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);
         assert_eq!((same.factor, same.error.max, same.error.count, same.error.failed), (-0.25, 0.0, 3, 0));
         let other = mass_matrix_error(&exact, &model(1.0, 0.0, 0.0), &q);
@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn a_factor_alone_has_no_summand() {
-        // A constant target says nothing of a slope, but a factor it has.
+        // A constant target gives no information about a slope, but a factor it has.
         let fit = factor_fit(&[2.0, 2.0, 4.0], &[-1.0, -1.0, -2.0]).unwrap();
         assert_eq!((fit.a, fit.b, fit.r2, fit.rms), (-0.5, 0.0, 1.0, 0.0));
         let fit = factor_fit(&[1.0, 3.0], &[2.0, 2.0]).unwrap();

@@ -42,7 +42,7 @@ const LEARNED_STEPS: usize = 30_000;
 /// atol 1e-8.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryTest<S> {
-    /// Where motions start.
+    /// The initial states of motions.
     pub bounds: StartBox,
     /// Number of starts; the paper takes 4.
     pub starts: usize,
@@ -89,7 +89,7 @@ pub struct TrajectoryRun<S> {
     pub reference_energy: EnergyError,
     /// Learned energy along the learned motion.
     pub drift: EnergyError,
-    /// Chaos of the exact motion, if asked for and found.
+    /// Chaos of the exact motion, if requested and found.
     pub lyapunov: Option<Lyapunov>,
     /// Error of the learned coordinates relative to the spread of the exact ones, one per sample of both.
     pub relative: Vec<f64>,
@@ -114,7 +114,7 @@ pub struct TrajectorySummary {
     pub energy_error: Statistics,
     /// Normalised drift of the learned energy.
     pub energy_drift: Statistics,
-    /// Largest finite-time Lyapunov exponent of the exact motion, if it was asked for.
+    /// Largest finite-time Lyapunov exponent of the exact motion, if it was requested.
     pub lyapunov_exponent: Option<f64>,
     /// Time of valid prediction of the learned motion.
     pub valid: ValidTime,
@@ -158,7 +158,7 @@ impl<S: Integrable> TrajectoryTest<S> {
         self.run_from(&self.bounds.starts::<S>(self.starts, self.seed), exact, learned)
     }
 
-    /// The same from the random starts of the box put on the mass shell of `system`, or brought to the constraints of its exact motion;
+    /// The same from the random starts of the box put on the mass shell of `system`, or projected onto the constraints of its exact motion;
     /// a start without a way there has motions that say so.
     ///
     /// # Errors

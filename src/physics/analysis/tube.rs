@@ -16,7 +16,7 @@ const KNOTS: usize = 50;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TubeError {
-    /// A share of the motions that is none.
+    /// An invalid share of the motions.
     #[error("expected a share above 0 and below 1, found {0}")]
     Share(f64),
     /// Too few motions for the share.
@@ -32,7 +32,7 @@ pub enum TubeError {
     Lost {
         /// Motions with a prediction.
         predicted: usize,
-        /// All of them.
+        /// All motions.
         all: usize,
     },
 }

@@ -36,10 +36,10 @@ pub struct Arena {
     blamed: Cell<u64>,
 }
 
-/// Numbers side by side, with the functions of them that were asked for.
+/// Numbers side by side, with the requested functions of them.
 struct Pack {
     layout: Layout,
-    /// Functions of all its numbers that were asked for.
+    /// Functions of all its numbers that were requested.
     functions: Vec<(Function, u32)>,
 }
 
@@ -54,7 +54,7 @@ struct Layout {
     lanes: usize,
 }
 
-/// Places side by side for so many numbers.
+/// Slots side by side for a count of numbers.
 pub fn width(lanes: usize) -> usize {
     if lanes == 1 { 1 } else { LANES }
 }

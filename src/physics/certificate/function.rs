@@ -93,7 +93,7 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
             let (sinh, cosh) = (x.sinh(), x.cosh());
             [cosh, sinh, cosh, sinh, cosh, sinh, cosh]
         }
-        // Polynomials in the tangent t and its square u, each the derivative of the one before, times 1 + u = 1 + t^2.
+        // Polynomials in the tangent t and its square u, each the derivative of the previous one, times 1 + u = 1 + t^2.
         Unary::Tan => {
             let t = x.tan();
             let (u, first) = (t.square(), one + t.square());

@@ -114,7 +114,7 @@ impl Options<'_> {
     }
 }
 
-/// A state where the mass matrix is proven not to be as it should.
+/// A state where the mass matrix is proven to violate the conditions.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Witness {
@@ -135,7 +135,7 @@ pub struct Certificate {
     /// The largest condition number that was allowed.
     #[cfg_attr(feature = "serde", serde(rename = "condition"))]
     pub limit: Option<f64>,
-    /// Share in which every state is proven to be as it should.
+    /// Share in which every state is proven to satisfy the conditions.
     pub certified: f64,
     /// Share in which every state is proven not to be.
     pub refuted: f64,

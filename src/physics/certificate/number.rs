@@ -166,7 +166,7 @@ impl Real for Number<'_> {
     fn constant(value: f64) -> Self {
         Constant(Interval::point(value))
     }
-    /// A value of the box; that it was read is remembered, for nothing is proven of a Lagrangian that may branch on it.
+    /// A value of the box. Reading it is recorded, because nothing can be proven about a Lagrangian that may branch on it.
     fn primal(self) -> f64 {
         if let Variable(arena, _) = self {
             arena.note_read();

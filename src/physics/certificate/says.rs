@@ -1,4 +1,4 @@
-//! What is said of a certificate.
+//! Report of a certificate.
 
 use super::{Certificate, Signature};
 use crate::findings::Findings;

@@ -1,33 +1,34 @@
-//! Noise whose neighbours are alike: the colour that the positions themselves show.
+//! Correlated noise: its autocorrelation, estimated from the positions themselves.
 //!
-//! Differences of the fourth order of samples `m` apart leave of a motion a part that grows with `m^8` in the mean square, of white noise the
-//! same at every `m`, and of noise with the autocorrelation `rho^k`
+//! In fourth differences of samples `m` apart, the mean square of a smooth motion grows with `m^8`, that of white noise is the same at every
+//! `m`, and that of noise with the autocorrelation `rho^k` is
 //!
 //! ```text
 //! V(m) = gamma sum_j (-1)^j C(8, 4 + j) rho^(m |j|),    gamma the variance of the noise.
 //! ```
 //!
-//! The three are told from each other by the distances `m` at which the noise is still seen.
+//! The distances `m` at which the noise is still visible separate the three.
 
 use crate::recording::RecordedTrajectory;
 use crate::recording::smooth::Noise;
 
 /// Distances of samples that are compared.
 const DISTANCES: std::ops::RangeInclusive<usize> = 1..=12;
-/// Weights of a fourth difference, and the sums of products of its weights so far apart.
+/// Weights of a fourth difference, and the autocorrelations of its weights.
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const PRODUCTS: [f64; 5] = [70.0, -56.0, 28.0, -8.0, 1.0];
-/// Largest autocorrelation of neighbours that is noise; beyond it nothing distinguishes noise from slow motion.
+/// Largest lag-1 autocorrelation of noise; above it, noise and slow motion cannot be separated.
 const MOST: f64 = 0.97;
-/// The misfit, in units of its scatter, has to fall by so much for noise to count as coloured (`lnn-studies rates --part
-/// constraints`: white noise is called coloured in none of a hundred).
+/// Decrease of the misfit, in units of its standard deviation, above which noise counts as correlated (`lnn-studies rates --part
+/// constraints`: white noise is called correlated in none of a hundred).
 const PLAIN: f64 = 12.0;
-/// Misfits up to this above the least one are allowed. The differences at neighbouring distances share samples, so that their misfit scatters by
-/// far more than its units: up to 40 the true variance is allowed in 15 of 16 recordings with an autocorrelation of 0.9, up to 12 in 11.
+/// Largest misfit, above the smallest one, that is not excluded. The differences at neighbouring distances share samples, so that their misfit
+/// scatters by far more than its units: with 40 the true variance is included in 15 of 16 recordings with an autocorrelation of 0.9, with 12 in
+/// 11.
 const ALLOWED: f64 = 40.0;
-/// Mean squares over that of neighbours up to which the noise is seen beside the motion.
+/// Largest mean square, over that at distance 1, at which the noise is visible beside the motion.
 const SEEN: f64 = 40.0;
-/// Fewest differences that tell.
+/// Smallest number of differences that is used.
 const LEAST: usize = 64;
 
 /// Noise of a coordinate.
@@ -35,10 +36,10 @@ const LEAST: usize = 64;
 pub struct Colour {
     /// Standard deviation.
     pub sigma: f64,
-    /// Autocorrelation of neighbours.
+    /// Lag-1 autocorrelation.
     pub rho: f64,
-    /// The largest variance that the differences allow, over that of the standard deviation: how noise goes on at frequencies at which the
-    /// motion hides it is known from those above alone.
+    /// The largest variance that the differences allow, over that of the standard deviation: at low frequencies, where the motion hides the
+    /// noise, its spectrum is extrapolated from higher ones.
     pub slack: f64,
 }
 
@@ -49,7 +50,7 @@ impl Default for Colour {
 }
 
 impl Colour {
-    /// Of coordinate `i`, white noise of the survey's size unless the differences say plainly otherwise.
+    /// Noise of coordinate `i`: white with the survey's size, unless the differences clearly contradict that.
     pub fn of(tracks: &[RecordedTrajectory], n: usize, i: usize, white: Noise) -> Self {
         let plain = Self { sigma: white.sigma, ..Self::default() };
         let size = tracks
@@ -87,7 +88,7 @@ impl Colour {
         Self { sigma: gamma.sqrt(), rho, slack: most / gamma }
     }
 
-    /// How many samples count as one for a mean square.
+    /// How many samples count as one independent sample in a mean square.
     pub fn shared(self) -> f64 {
         (1.0 + self.rho * self.rho) / (1.0 - self.rho * self.rho)
     }
@@ -107,7 +108,7 @@ fn differences(tracks: &[RecordedTrajectory], (n, i): (usize, usize), m: usize) 
     (count >= LEAST).then(|| (sum / count as f64, count as f64 / 3.0))
 }
 
-/// The misfit of the mean squares with noise of an autocorrelation and a motion beside it, in units of its scatter, and the variance.
+/// The misfit of the mean squares for noise with an autocorrelation plus a motion, in units of its standard deviation, and the variance.
 fn fitted(squares: &[(usize, f64, f64)], rho: f64) -> (f64, f64) {
     let noise = |m: usize| {
         let far = (1..=4).map(|j| 2.0 * PRODUCTS[j] * rho.powi((m * j) as i32));
@@ -161,7 +162,7 @@ mod tests {
                     .collect();
                 let white = noise_alone(tracks.iter().map(|t| (t.times.as_slice(), t.q.as_slice())), 1, 0);
                 let found = Colour::of(&tracks, 1, 0, white);
-                // What neighbours share hides behind the motion as soon as it is slow.
+                // Correlated noise hides behind the motion as soon as it is slow.
                 assert!((found.rho - rho).abs() < 0.1 && found.slack.sqrt() * found.sigma > 0.0095, "{rho}: {found:?}");
                 assert!(rho > 0.5 || (found.sigma / 0.01 - 1.0).abs() < 0.15, "{rho}: {found:?}");
                 assert!(rho > 0.0 || found.slack == 1.0, "{rho}: {found:?}");

@@ -5,7 +5,7 @@ use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// An eigenvalue of a mass matrix within its constraints below so many roundings of the largest counts as zero.
+/// Eigenvalues of a mass matrix within its constraints below so many roundings of the largest count as zero.
 const ROUNDINGS: f64 = 1024.0;
 
 /// Constraints and degenerate directions of a Lagrangian.
@@ -15,19 +15,19 @@ pub struct ExaminedLagrangian {
     pub system: String,
     /// Names of the coordinates.
     pub coordinates: Vec<String>,
-    /// Its constraints.
+    /// Number of its constraints.
     pub count: usize,
     /// Each of them.
     pub constraints: Vec<OwnConstraint>,
     /// Constraints that follow from the others.
     pub redundant: Vec<String>,
-    /// Directions that no equation moves, at the most states.
+    /// Largest number of degenerate directions at a state.
     pub open: usize,
-    /// States that were looked at.
+    /// States that were examined.
     pub states: usize,
-    /// Those among them with open directions.
+    /// Number of these with degenerate directions.
     pub open_states: usize,
-    /// These directions at a state that has the most of them.
+    /// The degenerate directions at a state with the most of them.
     pub null_directions: Vec<Vec<f64>>,
     /// Positive and negative eigenvalues of the mass matrix within the constraints, at the first state.
     pub signature: Option<[usize; 2]>,
@@ -40,13 +40,14 @@ pub struct OwnConstraint {
     pub kind: ConstraintKind,
     /// Its name.
     pub name: String,
-    /// What vanishes; empty where no formula is known.
+    /// The formula that vanishes; empty where none is known.
     pub formula: String,
 }
 
-/// Examines the Lagrangian of a system with these coordinates at states `(states, n)`, each brought to the constraints; `formulas` are those of the constraints by name.
+/// Examines the Lagrangian of a system with these coordinates at states `(states, n)`, each projected onto the constraints; `formulas` are those
+/// of the constraints by name.
 ///
-/// States without a finite mass matrix are left out; all of them are if `states` is 0.
+/// States without a finite mass matrix are left out; `states` is 0 if that leaves none.
 pub fn examine(
     (system, coordinates): (&str, &[String]),
     model: &dyn EulerLagrange<f64>,

@@ -1,4 +1,4 @@
-//! Terms that constraints are made of: monomials of coordinates, of sines and cosines of angles, perhaps times a velocity.
+//! Terms of constraints: monomials of coordinates and of sines and cosines of angles, possibly times a velocity.
 
 use super::MotionSamples;
 
@@ -35,7 +35,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// Monomials of the coordinates that move up to a degree, the constant last.
+    /// Monomials up to a degree of the coordinates that move, the constant last.
     pub fn of_positions(samples: &MotionSamples, degree: usize) -> Self {
         let mut features = Self::without_terms(samples);
         let monomials = features.monomials(degree);
@@ -43,7 +43,7 @@ impl Features {
         features.written(samples)
     }
 
-    /// Velocities times monomials of the coordinates that move up to a degree, then such monomials alone.
+    /// Velocities times monomials up to a degree of the coordinates that move, then these monomials alone.
     pub fn of_velocities(samples: &MotionSamples, degree: usize) -> Self {
         let mut features = Self::without_terms(samples);
         let monomials = features.monomials(degree);
@@ -63,7 +63,7 @@ impl Features {
         Self { n: samples.n(), variables: variables.collect(), terms: Vec::new(), texts: Vec::new() }
     }
 
-    /// Powers of variables up to a total degree, higher degrees first; the square of a sine is no term of its own.
+    /// Powers of variables up to a total degree, higher degrees first; the square of a sine is not a separate term.
     fn monomials(&self, degree: usize) -> Vec<Vec<(usize, i32)>> {
         let mut all: Vec<Vec<(usize, i32)>> = vec![Vec::new()];
         let mut last = all.clone();
@@ -120,7 +120,7 @@ impl Features {
     pub fn len(&self) -> usize {
         self.terms.len()
     }
-    /// What a term is in a formula.
+    /// A term as text in a formula.
     pub fn text(&self, term: usize) -> &str {
         &self.texts[term]
     }
@@ -128,7 +128,7 @@ impl Features {
     pub fn degree(&self, term: usize) -> i32 {
         self.terms[term].degree()
     }
-    /// `true` if a term is one of the `others`, over the same variables, times variables.
+    /// `true` if a term is a multiple of one of the `others`, over the same variables.
     pub fn is_multiple(&self, term: usize, others: &Self, other: usize) -> bool {
         let (whole, factor) = (&self.terms[term], &others.terms[other]);
         let power = |variable: usize| whole.powers.iter().find(|(k, _)| *k == variable).map_or(0, |(_, power)| *power);
@@ -143,7 +143,7 @@ impl Features {
     pub fn moves(&self, term: usize) -> bool {
         self.terms[term].velocity.is_some()
     }
-    /// `true` for terms of velocities one of whose weights belongs to a term without.
+    /// `true` for terms with velocities whose weights include one of a term without.
     pub fn has_rate(&self, weights: &[f64]) -> bool {
         self.terms.iter().zip(weights).any(|(term, &weight)| term.velocity.is_none() && weight != 0.0)
     }

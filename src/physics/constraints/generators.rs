@@ -1,4 +1,4 @@
-//! From combinations that vanish to formulas that a person reads.
+//! Reduces combinations that vanish to readable formulas.
 
 use super::features::Features;
 use super::pencil::{Moments, Pencil};
@@ -9,51 +9,51 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A combination of this many times the variance of its noise still counts as vanishing.
+/// A combination whose variance is up to this many times that of its noise counts as vanishing.
 const TAKEN: f64 = 4.0;
-/// Deviation of the smallest combination that does not vanish over that of the largest that does, at least.
+/// Smallest ratio of the deviation of the smallest combination that does not vanish to that of the largest that does.
 const LEAST_GAP: f64 = 2.5;
-/// The same of a part of the data that was left out.
+/// The same ratio for held-out parts of the data.
 const HOLDS: f64 = 9.0;
-/// A term may go if the ratio rises by no more than this over the number of independent samples.
+/// A term may be removed if the ratio rises by no more than this over the number of independent samples.
 const RISE: f64 = 30.0;
-/// Shares of the largest weight below which terms are left out at a time.
+/// Shares of the largest weight below which several terms are removed at a time.
 const SHARES: [f64; 5] = [0.1, 0.03, 0.01, 3e-3, 1e-3];
-/// Terms are left out one by one where there are at most so many.
+/// Terms are removed one by one if there are at most so many.
 const FEW: usize = 40;
-/// Preference of terms of lower degree as pivots, which then would not divide what follows.
+/// Preference for pivots of lower degree, which would otherwise not divide terms of higher degree.
 const LOWER: f64 = 1e-3;
-/// Rounds of weighted squares, starts of them for each term, and multiplications that they may take.
+/// Rounds of reweighted least squares, random starts for each term, and largest number of multiplications.
 const REWEIGHTED: usize = 12;
 const FORMS: usize = 4;
 const WORK: usize = 4_000_000_000;
-/// Half width of the range of a factor over the largest factor from which on it says nothing.
+/// Half-width of the confidence interval of a factor, over the largest factor, above which the factor is not determined.
 const UNDETERMINED: f64 = 0.3;
 /// Quantile of Student's distribution for 95 %, 7 degrees of freedom, as of eight parts.
 const STUDENT: f64 = 2.365;
 
-/// Ratios of variances up to which a combination vanishes, and up to which it does so within the noise.
+/// Largest ratios of variances at which a combination vanishes, and at which it does so within the noise.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Up to this it vanishes.
+    /// Largest ratio at which it vanishes.
     pub taken: f64,
-    /// Up to this nothing but noise is left of it. The ratio of noise alone has the scatter `sqrt(2/N)`, `N` the samples whose noise is
-    /// independent; the noise itself is known from differences, to about `sqrt(6/N)`.
+    /// Largest ratio at which only noise remains. The ratio of pure noise has the standard deviation `sqrt(2/N)`, where `N` is the number of
+    /// samples with independent noise; the noise itself is known from differences to about `sqrt(6/N)`.
     pub within: f64,
 }
 
-/// Standard deviations of a ratio of variances that noise alone reaches.
+/// Largest deviation of a ratio of variances due to noise alone, in standard deviations.
 const DEVIATIONS: f64 = 3.0;
 
 impl Limits {
-    /// Of functions of positions, or of rows whose velocities were measured.
+    /// For functions of positions, or for rows with measured velocities.
     pub fn of(samples: &MotionSamples) -> Self {
         let (count, independent) = (samples.len().max(1) as f64, samples.independent().max(1.0));
         let scatter = (2.0 / independent + 6.0 / count).sqrt();
         Self { taken: TAKEN * samples.slack(), within: samples.slack() * (1.0 + DEVIATIONS * scatter) }
     }
 
-    /// Of rows whose velocities come from smoothing: how large their errors are is not known as well.
+    /// For rows with velocities from smoothing, whose errors are known less well.
     pub fn of_smoothed() -> Self {
         Self { taken: TAKEN, within: TAKEN }
     }
@@ -69,9 +69,9 @@ pub struct Generator {
     spread: Vec<f64>,
     /// `c.G c / c.N c`.
     ratio: f64,
-    /// Whether it vanishes on every part of the data by what the others say.
+    /// Whether it vanishes on every part of the data when fitted to the other parts.
     pub holds: bool,
-    /// Whether nothing but noise is left of it.
+    /// Whether only noise remains.
     pub within: bool,
     /// Root mean square length of its gradient by the coordinates.
     size: f64,
@@ -80,8 +80,8 @@ pub struct Generator {
 /// Terms with their factors.
 type Combination = Vec<(usize, f64)>;
 
-/// The combinations of terms that vanish, degree by degree. What vanishes already times further variables is none: terms in which its
-/// leading term divides are left out of higher degrees.
+/// The combinations of terms that vanish, degree by degree. Multiples of combinations that already vanish are excluded: higher degrees omit
+/// terms that their leading terms divide.
 pub struct Vanishing<'a> {
     features: &'a Features,
     cancellation: &'a Cancellation,
@@ -92,7 +92,7 @@ pub struct Vanishing<'a> {
     independent: f64,
     limits: Limits,
     levels: Vec<Level>,
-    /// Leading terms of what vanishes.
+    /// Leading terms of the combinations that vanish.
     leading: Vec<usize>,
 }
 
@@ -103,13 +103,13 @@ struct Level {
     /// A basis over the terms in reduced row echelon form, and the column of each row's pivot.
     rows: Vec<Vec<f64>>,
     pivots: Vec<usize>,
-    /// Size of the step between what vanishes and what does not.
+    /// Ratio between combinations that do not vanish and those that do.
     gap: Option<f64>,
 }
 
 impl<'a> Vanishing<'a> {
-    /// Looks for combinations that vanish, beside those that are `known` to, or `centred`, that are constant along each trajectory; of
-    /// `shared` samples the errors are as one.
+    /// Searches for combinations that vanish, in addition to `known` ones, or, if `centred`, that are constant along each trajectory; `shared`
+    /// samples have one common error.
     pub fn of(
         samples: &'a MotionSamples,
         features: &'a Features,
@@ -131,7 +131,7 @@ impl<'a> Vanishing<'a> {
             let left = |&term: &usize| {
                 let follows =
                     || known.is_some_and(|known| known.divides(features, term)) || found.divides(features, term);
-                // Every constant is constant.
+                // The constant is always constant.
                 features.degree(term) <= degree && !(centred && features.is_constant(term)) && !follows()
             };
             let level = found.level((0..p).filter(left).collect(), degree);
@@ -146,7 +146,7 @@ impl<'a> Vanishing<'a> {
         self.leading.iter().any(|&lead| features.is_multiple(term, self.features, lead))
     }
 
-    /// What vanishes of some terms.
+    /// The combinations of some terms that vanish.
     fn level(&self, terms: Vec<usize>, degree: i32) -> Level {
         let (ratios, combinations) = self.whole.on(&terms).solve();
         let count = ratios.iter().filter(|ratio| **ratio <= self.limits.taken).count();
@@ -160,16 +160,16 @@ impl<'a> Vanishing<'a> {
         Level { degree, terms, rows, pivots, gap }
     }
 
-    /// Size of the step between what vanishes and what does not, the smallest of the degrees of those taken; of the highest degree if
-    /// none was.
+    /// Ratio between combinations that do not vanish and those that do: the smallest over the degrees of those taken, or that of the highest
+    /// degree if none was taken.
     pub fn gap(&self, taken: &[Generator]) -> Option<f64> {
         let has = |degree| taken.iter().any(|generator| generator.degree(self.features) == degree);
         let gaps = self.levels.iter().filter(|level| has(level.degree)).filter_map(|level| level.gap);
         if taken.is_empty() { self.levels.last().and_then(|level| level.gap) } else { gaps.reduce(f64::min) }
     }
 
-    /// Combinations with the terms that they need, simple ones first: a basis, none of which follows from the others, and
-    /// combinations of few terms. Also whether all of these were looked for.
+    /// Combinations reduced to the terms they need, simple ones first: an independent basis, and combinations of few terms. Also whether the
+    /// search for the latter was complete.
     pub fn generators(&self) -> (Vec<Generator>, bool) {
         let mut supports: Vec<Vec<usize>> = Vec::new();
         for level in &self.levels {
@@ -191,7 +191,7 @@ impl<'a> Vanishing<'a> {
 }
 
 impl Level {
-    /// Each row of the basis, without the pivots of the others.
+    /// Each row of the basis, reduced by the pivots of the others.
     fn basis(&self) -> impl Iterator<Item = Combination> + '_ {
         self.rows.iter().zip(&self.pivots).map(|(row, own)| {
             let free = (0..self.terms.len()).filter(|k| k == own || !self.pivots.contains(k));
@@ -199,21 +199,21 @@ impl Level {
         })
     }
 
-    /// Starts of the search for combinations of few terms, of as many as are wanted.
+    /// Starts of the search for combinations of few terms, up to the requested number.
     fn starts(&self) -> [usize; 2] {
         let (size, count) = (self.rows.len(), self.terms.len());
         let once = REWEIGHTED * size * size * (count + size);
         [(WORK / once.max(1)).min(FORMS * count), FORMS * count]
     }
 
-    /// `true` if the search takes all the starts that are wanted.
+    /// `true` if the search can use all requested starts.
     fn is_searched(&self) -> bool {
         let [taken, wanted] = self.starts();
         taken == wanted
     }
 
-    /// For single terms at the factor 1 combinations of few terms, those with a small `sum log |c_k|`: by least squares whose weights
-    /// `1 / (c_k^2 + eps^2)` are of the factors before (Candès, Wakin and Boyd 2008), from random weights at first.
+    /// Combinations of few terms in which one given term has the factor 1. They minimize `sum log |c_k|` by reweighted least squares, with
+    /// weights `1 / (c_k^2 + eps^2)` from the previous factors (Candès, Wakin and Boyd 2008) and random weights at the start.
     fn sparse(&self, cancellation: &Cancellation) -> Vec<Combination> {
         let (size, count) = (self.rows.len(), self.terms.len());
         let (mut rng, mut workspace) = (ChaCha8Rng::seed_from_u64(0), Workspace::new());
@@ -249,7 +249,7 @@ impl Level {
     }
 }
 
-/// Reduced row echelon form with the largest pivots, times the preference of their columns; returns the column of each row's pivot.
+/// Reduced row echelon form; pivots are the largest elements times the preference of their columns. Returns the column of each row's pivot.
 pub fn reduce(rows: &mut [Vec<f64>], preference: &[f64]) -> Vec<usize> {
     let mut pivots = vec![usize::MAX; rows.len()];
     for _ in 0..rows.len() {
@@ -317,7 +317,7 @@ fn needed(pencil: &Pencil, mut support: Combination, independent: f64, taken: f6
     terms
 }
 
-/// Factors of the needed terms with their ranges, by leaving parts of the data out (jackknife).
+/// Factors of the needed terms with their confidence intervals, by leaving out parts of the data (jackknife).
 fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bool, limits: Limits) -> Generator {
     let folds = moments.folds();
     let fit = |pencil: &Pencil| {
@@ -354,7 +354,7 @@ fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bo
     generator
 }
 
-/// The term that has the factor 1: the first of the highest degree, unless another of that degree weighs more than three times as much.
+/// The term that gets the factor 1: the first of the highest degree, unless another of that degree has more than three times its weight.
 fn leading(features: &Features, support: &[usize], raw: &[f64]) -> usize {
     let first = (0..support.len()).find(|&k| !features.is_constant(support[k])).unwrap_or(0);
     let same = (0..support.len()).filter(|&k| features.degree(support[k]) == features.degree(support[first]));
@@ -364,12 +364,12 @@ fn leading(features: &Features, support: &[usize], raw: &[f64]) -> usize {
 }
 
 impl Generator {
-    /// The terms that it has.
+    /// The terms it contains.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.weights.len()).filter(|&term| self.weights[term] != 0.0)
     }
 
-    /// Root mean square length of its gradient by the coordinates, once it was measured.
+    /// Root mean square length of its gradient by the coordinates, once computed.
     pub fn size(&self) -> f64 {
         self.size
     }
@@ -384,7 +384,7 @@ impl Generator {
         Self { size, ..self }
     }
 
-    /// `false` if several vanish that have these terms alone, so that parts of the data have others.
+    /// `false` if several combinations of the same terms vanish, so that parts of the data give different ones.
     fn is_determined(&self) -> bool {
         let most = self.weights.iter().fold(0.0, |most: f64, weight| most.max(weight.abs()));
         self.spread.iter().all(|spread| *spread < UNDETERMINED * most)
@@ -395,7 +395,7 @@ impl Generator {
         self.terms().map(|term| features.degree(term)).max().unwrap_or(0)
     }
 
-    /// In words.
+    /// The combination as a formula.
     pub fn described(&self, features: &Features, kind: ConstraintKind) -> FoundConstraint {
         let (mut formula, mut coefficients, mut range) = (String::new(), BTreeMap::new(), BTreeMap::new());
         let others = self.terms().filter(|term| *term != self.lead);
@@ -422,9 +422,9 @@ impl Generator {
     }
 }
 
-/// A positive number with the digits that its spread leaves.
+/// A positive number with the digits that its spread justifies.
 pub fn digits(value: f64, spread: f64) -> String {
-    // Beyond this the data say nothing, whatever their scatter.
+    // Beyond this the data do not determine the number, whatever their scatter.
     let spread = spread.max(1e-11 * value);
     if spread == 0.0 {
         return value.to_string();

@@ -1,11 +1,11 @@
 //! Constraints found in recorded motion: functions of the coordinates that vanish, and rows linear in the velocities.
 //!
-//! Combinations `c` of monomials of the coordinates are judged by the pencil of what they are, `G = mean D D^T`, and what noise alone makes of
-//! them, `N = mean sum_i sigma_i^2 dD/dq_i dD/dq_i^T`: `c.G c / c.N c` is near 1 where a combination vanishes but for the noise. Its minima are
-//! the fit by errors in all variables (Taubin 1991). Degree by degree, terms are left out that have a leading term of what vanishes already
-//! as a factor: products of it are nothing new (Heldt et al. 2009). Of what vanishes as many combinations are taken as their gradients are independent, the
-//! simplest first, each reduced to the terms that it needs. The same with `monomials(q) v_i`, beside what follows from the former, gives the
-//! rows that are linear in the velocities; Frobenius' condition tells those that a function of the coordinates stands behind.
+//! Combinations `c` of monomials of the coordinates are judged by a pencil of two forms: their mean square `G = mean D D^T`, and the
+//! contribution of noise `N = mean sum_i sigma_i^2 dD/dq_i dD/dq_i^T`; `c.G c / c.N c` is near 1 for a combination that vanishes within the
+//! noise. The minima of this ratio are an errors-in-variables fit (Taubin 1991). The search goes degree by degree and excludes multiples of the
+//! leading terms of combinations that already vanish (Heldt et al. 2009). It takes the simplest combinations with independent gradients, each
+//! reduced to the terms it needs. The same search over `monomials(q) v_i`, beyond the consequences of the former, gives the rows that are linear
+//! in the velocities; Frobenius' condition identifies those that are derivatives of a function of the coordinates.
 
 mod colour;
 mod examine;
@@ -31,35 +31,35 @@ use regular::{branching, phases};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Most terms that are looked at together.
+/// Largest number of terms that are searched together.
 const MOST_TERMS: usize = 1000;
-/// Largest degree of terms that is looked at.
+/// Largest degree of terms.
 #[doc(hidden)]
 pub const MOST_DEGREE: usize = 8;
-/// States at which a Lagrangian is examined, usually.
+/// Usual number of states at which a Lagrangian is examined.
 #[doc(hidden)]
 pub const EXAMINED_STATES: usize = 64;
-/// A row beside others whose part outside of them is, root mean square, below this share follows from them.
+/// A row follows from others if the root mean square of its part outside their span is below this share.
 const OUTSIDE: f64 = 0.15;
-/// Share of the states at which a combination has a part outside of what holds the motion, and how large that has to be: of functions that
-/// vanish, and of what is looked for beside them, where their noise is still about.
+/// Share of the states at which a combination must have a part outside the span of the constraints found so far, and the smallest size of that
+/// part: for functions that vanish, and for further candidates, whose noise is larger.
 const IMPOSED: (f64, f64) = (0.1, 0.1);
 const BESIDE: (f64, f64) = (0.5, OUTSIDE);
-/// States at which gradients are compared.
+/// Number of states at which gradients are compared.
 const PLACES: usize = 64;
-/// The same for whether they stay independent, for which it takes a state near one where they do not.
+/// Number of states for the test that they stay independent, which must include one near where they do not.
 const MANY_PLACES: usize = 256;
-/// A row at unit length beside others whose part outside of them is below this at one of the places nearly follows from them there.
+/// A row of unit length nearly follows from others at a state if its part outside their span is below this.
 const NEARLY: f64 = 0.1;
-/// Below this share of its derivatives the curl of a row within its kernel is noise.
+/// The curl of a row within its kernel counts as noise below this share of its derivatives.
 const CURL: f64 = 0.03;
 
-/// What to look for.
+/// Options of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConstraintSearch {
     /// Largest total degree of functions of the coordinates.
     pub degree: usize,
-    /// The same of the coefficients of velocities.
+    /// Largest total degree of the coefficients of velocities.
     pub velocity_degree: usize,
 }
 
@@ -75,19 +75,19 @@ impl Default for ConstraintSearch {
 pub enum ConstraintKind {
     /// A function of the coordinates that vanishes.
     Holonomic,
-    /// Linear in the velocities, and no function of the coordinates stands behind it.
+    /// Linear in the velocities, and not the derivative of a function of the coordinates.
     Nonholonomic,
-    /// A function of the coordinates that is constant along each trajectory, with a constant of its own: conserved, not imposed.
+    /// A function of the coordinates that is constant along each trajectory, with a different constant for each: conserved, not imposed.
     PerTrajectory,
-    /// A function or a row that nearly vanishes, by more than the noise explains: a stiff spring, an arc that looks straight. No constraint.
+    /// A function or a row that nearly vanishes, but not within the noise: a stiff spring, an arc that looks straight. It is not a constraint.
     Nearly,
-    /// A function that vanishes with its gradient somewhere along the motion, or whose gradient follows from others there: a second branch
-    /// begins, and it does not say which of the two the motion takes. No constraint to compute with.
+    /// A function whose gradient vanishes somewhere along the motion, or follows from those of others there: a second branch begins, and the
+    /// function does not determine which branch the motion takes. It cannot serve as a constraint.
     Branching,
 }
 
 impl ConstraintKind {
-    /// `true` for what holds the motion of the system.
+    /// `true` for a constraint of the system.
     pub fn is_imposed(self) -> bool {
         matches!(self, Self::Holonomic | Self::Nonholonomic)
     }
@@ -98,25 +98,25 @@ impl ConstraintKind {
 pub struct FoundConstraint {
     /// Its kind.
     pub kind: ConstraintKind,
-    /// What vanishes, or is constant.
+    /// The formula that vanishes or is constant.
     pub formula: String,
-    /// Factors of its terms; the leading one of the formula is 1.
+    /// Factors of its terms; the leading term has the factor 1.
     pub coefficients: BTreeMap<String, f64>,
-    /// Ranges of 95 % of the factors.
+    /// 95 % confidence intervals of the factors.
     pub range: BTreeMap<String, [f64; 2]>,
-    /// Root of the mean square defect over what noise makes.
+    /// Root mean square defect over that of noise.
     pub defect: f64,
 }
 
 /// Everything that was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FoundConstraints {
-    /// Constraints of the system: holonomic and nonholonomic ones.
+    /// Number of constraints of the system, holonomic and nonholonomic.
     pub count: usize,
     /// All that was found.
     pub constraints: Vec<FoundConstraint>,
-    /// Smallest combination of the coordinates that does not count as vanishing over the largest that does, both relative to noise, the
-    /// smallest such step of the degrees of the constraints; over noise itself if none vanishes.
+    /// Ratio of the smallest combination that does not vanish to the largest that does, both relative to noise: the smallest over the degrees of
+    /// the constraints. Relative to the noise itself if none vanishes.
     pub gap: Option<f64>,
     /// Trajectories it was found on.
     pub trajectories: usize,
@@ -124,34 +124,34 @@ pub struct FoundConstraints {
     pub refuted: usize,
     /// Names of the coordinates.
     pub coordinates: Vec<String>,
-    /// Noise of each coordinate over its size: smaller deviations are not seen.
+    /// Noise of each coordinate relative to its size: smaller deviations are not visible.
     pub noise: Vec<f64>,
-    /// Columns that do not move, in words; they take no part.
+    /// Columns that do not move and were left out, with the reason.
     pub still: BTreeMap<String, String>,
-    /// Where the search was cut short, in words.
+    /// Limits of the search, in words.
     pub limits: Vec<String>,
 }
 
 impl FoundConstraints {
-    /// Formulas of the constraints of the system by name, as a table `[constraints]` has them; what each trajectory conserves by itself
-    /// is none.
+    /// Formulas of the constraints of the system by name, as in a table `[constraints]`; quantities that single trajectories conserve are not
+    /// included.
     pub fn formulas(&self) -> BTreeMap<String, String> {
         let of_system = self.constraints.iter().filter(|found| found.kind.is_imposed());
         of_system.enumerate().map(|(k, found)| (format!("found {}", k + 1), found.formula.clone())).collect()
     }
 }
 
-/// Why nothing can be looked for.
+/// Why no search is possible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintSearchError {
     /// The search was ended from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-    /// More terms than are looked at.
+    /// Too many terms.
     #[error("{what} gives {found} terms, at most {MOST_TERMS} can be searched together")]
     Terms {
-        /// What makes them.
+        /// What gives so many terms.
         what: &'static str,
         /// Their number.
         found: usize,
@@ -177,7 +177,7 @@ pub fn find_constraints(
     search: ConstraintSearch,
 ) -> Result<FoundConstraints, ConstraintSearchError> {
     let of_positions = Features::of_positions(samples, search.degree);
-    // Of many coordinates as many as there is room for.
+    // Of many coordinates, as many as there is room for.
     let (degree, of_velocities) = (0..=search.velocity_degree)
         .rev()
         .map(|degree| (degree, Features::of_velocities(samples, degree)))
@@ -270,12 +270,12 @@ pub fn find_constraints(
     })
 }
 
-/// What holds the motion at some samples.
+/// The constraints found so far, at some samples.
 struct RowsTaken {
     places: Vec<usize>,
     /// Orthonormal rows at each place.
     bases: Vec<Vec<f64>>,
-    /// Candidates that do not hold on data that were left out.
+    /// Number of candidates that do not hold on held-out data.
     refuted: usize,
 }
 
@@ -286,8 +286,8 @@ impl RowsTaken {
         Self { bases: vec![Vec::new(); places.len()], places, refuted: 0 }
     }
 
-    /// Takes generators as long as one has a part outside of what holds the motion already: of those that have at least half of the
-    /// largest such part the simplest, which come first.
+    /// Takes generators while one has a part outside the span of those already taken: the simplest, which come first, of those whose part is at
+    /// least half of the largest one.
     fn take(
         &mut self,
         samples: &MotionSamples,
@@ -323,8 +323,8 @@ impl RowsTaken {
         taken
     }
 
-    /// How many directions all of the generators that hold have outside of what holds the motion already, at a share of the places. Those
-    /// taken one after the other may nearly depend on each other somewhere, and noise would be taken for one more there.
+    /// How many directions all valid generators add to the span of those already taken, at a share of the states. Generators taken one after the
+    /// other may nearly depend on each other somewhere, and noise would then count as another direction.
     fn rank(&self, n: usize, generators: &[(Generator, Vec<Vec<f64>>)], (share, part): (f64, f64)) -> usize {
         let holding: Vec<_> = generators.iter().filter(|(generator, _)| generator.holds).collect();
         let at = |place: usize| {
@@ -344,7 +344,7 @@ impl RowsTaken {
         ranks.get(((1.0 - share) * ranks.len() as f64) as usize).copied().unwrap_or(0)
     }
 
-    /// Root mean square part of vectors at unit length outside of what holds the motion; 0 where a vector vanishes.
+    /// Root mean square part of unit vectors outside the span; 0 where a vector vanishes.
     fn outside(&self, vectors: &[Vec<f64>]) -> f64 {
         let parts = self.bases.iter().zip(vectors).map(|(basis, vector)| {
             let (rest, size) = (beside(basis, vector), dot(vector, vector));
@@ -354,12 +354,12 @@ impl RowsTaken {
     }
 }
 
-/// Functions with the same zeros whose gradients are independent wherever the motion was: of a rotation matrix three products of its
-/// columns and three of its rows are, at most states, but not where it turns about an axis.
+/// Functions with the same zeros whose gradients are independent wherever the motion was: for a rotation matrix, three products of columns and
+/// three of rows are independent at most states, but not for rotations about an axis.
 ///
-/// Where one of those taken nearly follows from the others or loses its gradient at some of the states, others are taken of all simple
-/// functions with these zeros: as many, one after the other, with which the mean of `1 / det G` over the states, `G` the products of the
-/// gradients over their sizes, is smallest.
+/// If one of the functions nearly follows from the others, or its gradient vanishes, at some of the states, others are chosen from all simple
+/// functions with these zeros: the same number, one after the other, with the smallest mean of `1 / det G` over the states, where `G` contains
+/// the products of the normalized gradients.
 fn independent_everywhere(
     samples: &MotionSamples,
     features: &Features,
@@ -367,7 +367,7 @@ fn independent_everywhere(
     candidates: Vec<Generator>,
 ) -> Vec<Generator> {
     let places = samples.places(MANY_PLACES);
-    // Over their size in the mean, so that a gradient that vanishes somewhere is seen.
+    // Normalized by their mean size, so that a gradient that vanishes somewhere stays visible.
     let sized = |generator: &Generator| -> Vec<Vec<f64>> {
         let mut rows: Vec<Vec<f64>> =
             places.iter().map(|&at| features.gradient(samples, at, &generator.weights)).collect();
@@ -385,12 +385,12 @@ fn independent_everywhere(
     let pool: Vec<Generator> =
         candidates.into_iter().filter(|other| other.holds && Some(degree(other)) <= most).collect();
     let rows: Vec<Vec<Vec<f64>>> = pool.iter().map(sized).collect();
-    // Sums of `1 / det G` over the places of some rows with each row beside.
+    // Sums of `1 / det G` over the states, of some rows together with each candidate.
     let sums = |others: &[usize]| -> Vec<f64> {
         let mut sums = vec![0.0; rows.len()];
         for place in 0..places.len() {
             let (mut basis, mut volume) = (Vec::new(), 1.0);
-            // A place at which they depend on each other counts, but not beyond all others.
+            // A state at which they depend on each other counts, but does not outweigh all others.
             let part = |basis: &[f64], row: &[f64]| {
                 let rest = beside(basis, row);
                 dot(&rest, &rest).max(1e-6)
@@ -406,7 +406,7 @@ fn independent_everywhere(
     let best = |others: &[usize]| {
         sums(others).into_iter().enumerate().map(|(k, sum)| (sum, k)).min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    // One after the other, then one in the place of another.
+    // Adds one after the other, then exchanges one at a time.
     let (mut chosen, mut least) = (Vec::new(), f64::INFINITY);
     while chosen.len() < size
         && let Some((sum, next)) = best(&chosen)
@@ -426,7 +426,7 @@ fn independent_everywhere(
     chosen.into_iter().map(|k| pool[k].clone()).collect()
 }
 
-/// The smallest part of one of some rows outside of those before it.
+/// The smallest part of one of some rows outside the span of those before it.
 fn least_part<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
     let (mut basis, mut least): (Vec<f64>, f64) = (Vec::new(), f64::INFINITY);
     for row in rows {
@@ -437,21 +437,21 @@ fn least_part<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
     least
 }
 
-/// What a vector is beside orthonormal rows.
+/// The part of a vector orthogonal to orthonormal rows.
 fn beside(basis: &[f64], vector: &[f64]) -> Vec<f64> {
     let mut rest = vector.to_vec();
     take_out(&mut rest, basis);
     rest
 }
 
-/// An orthonormal basis of the directions that rows leave.
+/// An orthonormal basis of the null space of the rows.
 fn kernel(n: usize, rows: &[f64]) -> Vec<f64> {
     ReducedMass::of(n, &vec![0.0; n * n], rows).map(|reduced| reduced.basis).unwrap_or_default()
 }
 
-/// Which of the rows have functions behind them, beside those that hold the motion by `by_functions`: of the rows whose curl vanishes in
-/// the directions that all of them leave those whose curl vanishes in the directions that they alone leave, and so on. A disk that rolls has
-/// a row of the first kind, its way along its heading, and none of the second.
+/// Which of the rows are derivatives of functions, in addition to the `by_functions` constraints: starting with the rows whose curl vanishes in
+/// the null space of all rows, repeatedly keeps those whose curl vanishes in the null space of the kept rows. A rolling disk has a row of the
+/// first kind, its path along its heading, and none that remains.
 fn integrable(
     features: &Features,
     samples: &MotionSamples,
@@ -481,7 +481,7 @@ fn integrable(
     }
 }
 
-/// Adds what a vector is beside orthonormal rows to them.
+/// Adds the orthogonal part of a vector to orthonormal rows.
 fn extend(basis: &mut Vec<f64>, vector: &[f64]) {
     let rest = beside(basis, vector);
     let size = dot(&rest, &rest).sqrt();
@@ -490,7 +490,7 @@ fn extend(basis: &mut Vec<f64>, vector: &[f64]) {
     }
 }
 
-/// Size of the curl of a row within the directions that the rows leave, over that of its derivatives: 0 where a function stands behind it
+/// Size of the curl of a row within the null space of the rows, over that of its derivatives: 0 if it is the derivative of a function
 /// (Frobenius).
 fn curl(features: &Features, samples: &MotionSamples, at: usize, weights: &[f64], rows: &[f64]) -> f64 {
     let n = samples.n();

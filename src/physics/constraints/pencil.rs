@@ -1,10 +1,10 @@
-//! What combinations of terms are, and what noise makes of them.
+//! Mean squares of combinations of terms, and the contribution of noise to them.
 
 use super::MotionSamples;
 use super::features::Features;
 use crate::linalg::{Workspace, dot, eigh};
 
-/// Deviations below this share of a term are not told from rounding.
+/// Deviations below this share of a term are rounding.
 pub const FLOOR: f64 = 1e-6;
 
 /// Means of products of terms, of their noise, and of products of their means along trajectories.
@@ -25,7 +25,7 @@ pub struct Moments {
     pub scale: Vec<f64>,
 }
 
-/// Sums of the two forms over data, terms at unit size.
+/// Sums of the two forms over data, with terms scaled to unit size.
 #[derive(Clone, Debug)]
 pub struct Pencil {
     terms: usize,
@@ -34,7 +34,7 @@ pub struct Pencil {
 }
 
 impl Moments {
-    /// Of all samples, `folds` parts; trajectories stay whole where there are enough of them.
+    /// From all samples, in `folds` parts; trajectories stay whole if there are enough of them.
     pub fn of(samples: &MotionSamples, features: &Features, folds: usize) -> Self {
         let p = features.len();
         let empty = Fold { samples: 0.0, gram: vec![0.0; p * p], noise: vec![0.0; p * p], between: vec![0.0; p * p] };
@@ -51,7 +51,7 @@ impl Moments {
             let (fold, length) = (&mut parts[part], piece.len().max(1));
             mean.fill(0.0);
             for at in piece {
-                // What is summed up by then is finite, but of no use.
+                // The sums so far are finite, but useless.
                 if fold.samples > 0.0 && !samples.cancellation.go_on() {
                     break;
                 }
@@ -63,7 +63,7 @@ impl Moments {
                     row[i..].iter_mut().zip(&values[i..]).for_each(|(sum, x)| *sum += values[i] * x);
                 }
                 slopes.sort_unstable_by_key(|&(component, term, _)| (component, term));
-                // Sine and cosine of one angle may meet in one term.
+                // Sine and cosine of one angle may occur in one term.
                 slopes.dedup_by(|next, first| {
                     let same = (next.0, next.1) == (first.0, first.1);
                     first.2 += if same { next.2 } else { 0.0 };
@@ -108,7 +108,7 @@ impl Moments {
         self.folds.len()
     }
 
-    /// The forms over the parts that are taken, of the terms or, `centred`, of what they are beside their mean along each trajectory.
+    /// The forms over the chosen parts, of the terms or, if `centred`, of their deviations from their mean along each trajectory.
     pub fn pencil(&self, centred: bool, taken: impl Fn(usize) -> bool) -> Pencil {
         let p = self.terms;
         let (mut gram, mut noise, mut samples) = (vec![0.0; p * p], vec![0.0; p * p], 0.0);
@@ -147,7 +147,7 @@ impl Pencil {
         form(&self.gram) / form(&self.noise)
     }
 
-    /// Stationary values of the ratio, ascending, with their combinations, row by row; empty of numbers that are not finite.
+    /// Stationary values of the ratio, ascending, with their combinations, row by row; empty if numbers are not finite.
     pub fn solve(&self) -> (Vec<f64>, Vec<f64>) {
         let p = self.terms;
         if p == 0 {

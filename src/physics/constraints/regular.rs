@@ -1,5 +1,5 @@
-//! Which functions hold a motion without a second branch: relations between whole multiples of angles, and gradients that do not vanish on the
-//! way.
+//! Functions that constrain a motion without a second branch: relations between integer multiples of angles, and gradients that do not vanish
+//! along the motion.
 
 use super::features::Features;
 use super::generators::{Generator, Limits, digits, reduce};
@@ -8,17 +8,17 @@ use crate::linalg::{Workspace, dot, eigh};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Largest whole multiple of an angle that is looked at, and how near to one a ratio of gradients has to be.
+/// Largest integer multiple of an angle that is tried, and how near to one a ratio of gradients must be.
 const MULTIPLES: std::ops::RangeInclusive<u32> = 1..=12;
 const WHOLE: f64 = 0.05;
-/// Share of the gradients that has to lie along the same directions everywhere.
+/// Share of the gradients that must have the same directions everywhere.
 const ALIKE: f64 = 0.99;
-/// The smallest singular value of the gradients over the largest that it has along the motion, below which a second branch is met: half of
-/// what a motion that crosses one leaves between samples a hundredth of a radian apart.
+/// Ratio of the smallest singular value of the gradients to its largest along the motion below which a second branch counts as reached: half of
+/// the value for a motion that crosses a branch with samples a hundredth of a radian apart.
 const BRANCH: f64 = 0.005;
 
-/// Replaces functions of angles alone, whose gradients have the same directions everywhere, by `sin(k.q - delta)` with whole numbers `k`:
-/// `cos(b) - cos(2a)` has a second branch at every half turn, the sine of `b - 2a` has none. Returns what is left of the functions.
+/// Replaces functions of angles alone whose gradients have the same directions everywhere by `sin(k.q - delta)` with integers `k`: `cos(b) -
+/// cos(2a)` has a second branch at every half turn, the sine of `b - 2a` has none. Returns the remaining functions.
 pub(super) fn phases(
     samples: &MotionSamples,
     features: &Features,
@@ -35,13 +35,13 @@ pub(super) fn phases(
     }
 }
 
-/// Whole multiples of the coordinates that span the gradients of some functions everywhere, if there are such.
+/// Integer multiples of the coordinates that span the gradients of some functions everywhere, if they exist.
 fn directions(samples: &MotionSamples, features: &Features, functions: &[&Generator]) -> Option<Vec<Vec<i32>>> {
     let (n, mut mean, mut count) = (samples.n(), vec![0.0; samples.n() * samples.n()], 0.0);
     for at in samples.places(MANY_PLACES) {
         let rows = functions.iter().map(|function| {
             let row = features.gradient(samples, at, &function.weights);
-            // Where a gradient nearly vanishes its direction is noise.
+            // Where a gradient nearly vanishes, its direction is noise.
             let seen = dot(&row, &row) > 1e-2 * function.size().powi(2);
             if seen { row } else { vec![0.0; n] }
         });
@@ -66,7 +66,7 @@ fn directions(samples: &MotionSamples, features: &Features, functions: &[&Genera
     rows.iter().map(whole).collect()
 }
 
-/// `sin(k.q - delta)`, if it vanishes along the motion to the noise.
+/// `sin(k.q - delta)`, if it vanishes along the motion within the noise.
 fn phase(samples: &MotionSamples, limits: Limits, k: &[i32]) -> Option<FoundConstraint> {
     let angle = |at: usize| k.iter().zip(samples.state(at)).map(|(k, q)| f64::from(*k) * q).sum::<f64>();
     let (sin, cos) = (0..samples.len()).map(angle).fold((0.0, 0.0), |(s, c), a| (s + a.sin(), c + a.cos()));
@@ -114,8 +114,8 @@ fn phase(samples: &MotionSamples, limits: Limits, k: &[i32]) -> Option<FoundCons
     Some(FoundConstraint { kind, formula: format!("sin({terms})"), coefficients, range, defect: ratio.sqrt() })
 }
 
-/// Which of some functions meet a second branch along the motion: their gradient turns about from one sample to the next, or follows
-/// from those of the others.
+/// Which of some functions reach a second branch along the motion: their gradient reverses from one sample to the next, or follows from those of
+/// the others.
 pub(super) fn branching(samples: &MotionSamples, features: &Features, functions: &[Generator]) -> Vec<bool> {
     let (m, mut found) = (functions.len(), vec![false; functions.len()]);
     let sizes: Vec<f64> = functions.iter().map(Generator::size).collect();

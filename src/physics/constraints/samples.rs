@@ -7,10 +7,10 @@ use crate::recording::Recording;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use std::collections::BTreeMap;
 
-/// Most samples that are looked at, evenly spaced.
+/// Largest number of samples that are used, evenly spaced.
 const MOST_SAMPLES: usize = 60_000;
-/// A column moves if it scatters along its trajectories by more than so many standard deviations of its noise: by less it would vanish itself,
-/// and every function of it with it.
+/// A column moves if its standard deviation along its trajectories exceeds so many standard deviations of its noise: otherwise it would vanish
+/// itself, and every function of it with it.
 const MOVES: f64 = 2.0;
 
 /// Positions and velocities of trajectories, with standard deviations of their noise.
@@ -25,26 +25,26 @@ pub struct MotionSamples {
     velocity_noise: Vec<f64>,
     /// First sample of each trajectory.
     starts: Vec<usize>,
-    /// Samples whose velocities have errors of their own, as one to so many.
+    /// Number of samples per one with independent errors of velocities.
     shared: f64,
-    /// Ends a search in them.
+    /// Cancels a search in them.
     pub(super) cancellation: Cancellation,
-    /// Samples whose positions have errors of their own, as one to so many, and how much larger the variance of their noise may be.
+    /// Number of samples per one with independent errors of positions, and how much larger the variance of their noise may be.
     alike: f64,
     slack: f64,
-    /// Columns that do not move, with how they are.
+    /// Columns that do not move, with the reason.
     still: Vec<(usize, String)>,
-    /// Samples of the recording to each that is looked at.
+    /// Samples of the recording per sample used.
     stride: usize,
-    /// `true` if velocities were measured, with noise that is known.
+    /// `true` if velocities were measured, with known noise.
     measured: bool,
 }
 
 impl MotionSamples {
-    /// Of a recording: positions as they were measured, velocities measured or by smoothing.
+    /// From a recording: measured positions, with velocities that are measured or smoothed.
     ///
     /// # Errors
-    /// [`SmoothError`] of trajectories that are too short to know their noise.
+    /// [`SmoothError`] for trajectories that are too short to estimate their noise.
     pub fn of(recording: &Recording, options: &SmoothOptions) -> Result<Self, SmoothError> {
         let n = recording.n();
         let smoothing = Smoothing::choose(recording, options)?;
@@ -93,10 +93,10 @@ impl MotionSamples {
         Ok(samples)
     }
 
-    /// Of a recording of exact states, positions and velocities, whose trajectories may be of any length.
+    /// From a recording of exact positions and velocities, whose trajectories may have any length.
     ///
     /// # Errors
-    /// [`SmoothError::Shape`] of a trajectory without velocities.
+    /// [`SmoothError::Shape`] for a trajectory without velocities.
     #[doc(hidden)]
     pub fn exact(recording: &Recording) -> Result<Self, SmoothError> {
         let n = recording.n();
@@ -125,7 +125,7 @@ impl MotionSamples {
         Ok(samples)
     }
 
-    /// The same, a search in which is ended by `cancellation` and reports to it.
+    /// The same samples; `cancellation` cancels a search in them and receives its progress.
     #[must_use]
     pub fn watched(self, cancellation: &Cancellation) -> Self {
         Self { cancellation: cancellation.clone(), ..self }
@@ -143,15 +143,15 @@ impl MotionSamples {
     pub(crate) fn trajectories(&self) -> usize {
         self.starts.len()
     }
-    /// Samples that count as one where errors are shared.
+    /// Number of samples that share one error.
     pub(super) fn shared(&self) -> f64 {
         self.shared
     }
-    /// Samples whose noise is independent, about.
+    /// About how many samples have independent noise.
     pub(super) fn independent(&self) -> f64 {
         self.len() as f64 / self.alike.max(1.0)
     }
-    /// Largest variance of the noise that the recording allows, over that which is taken.
+    /// Largest variance of the noise that the recording allows, over the one that is used.
     pub(super) fn slack(&self) -> f64 {
         self.slack
     }
@@ -167,7 +167,7 @@ impl MotionSamples {
     pub(super) fn still(&self) -> BTreeMap<String, String> {
         self.still.iter().map(|(i, how)| (self.names[*i].clone(), how.clone())).collect()
     }
-    /// Samples of the recording to each that is looked at.
+    /// Samples of the recording per sample used.
     pub(super) fn stride(&self) -> usize {
         self.stride
     }
@@ -192,7 +192,7 @@ impl MotionSamples {
         let ends = self.starts.iter().skip(1).copied().chain([self.len()]);
         self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
     }
-    /// So many samples, evenly spaced.
+    /// At most so many samples, evenly spaced.
     pub(super) fn places(&self, most: usize) -> Vec<usize> {
         (0..self.len()).step_by(self.len().div_ceil(most).max(1)).collect()
     }
@@ -209,8 +209,8 @@ impl MotionSamples {
     }
 }
 
-/// How a column stands still; none for one that moves. One that keeps a value along every trajectory says nothing of a constraint, nor does one
-/// that is all noise: its sensor may be off.
+/// Why a column counts as still; none for one that moves. A column that is constant along every trajectory does not show a constraint, nor does
+/// one that is all noise: its sensor may be off.
 fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> Option<String> {
     let (n, mut square, mut count, mut constant) = (recording.n(), 0.0, 0.0, true);
     for track in &recording.tracks {
@@ -228,7 +228,7 @@ fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> O
             number(*first)
         ));
     }
-    // A mean takes part of the noise that neighbours share.
+    // A mean absorbs part of correlated noise.
     let still = resolved && square <= MOVES * MOVES * noise.sigma.powi(2) * noise.slack * count;
     still.then(|| format!("moves by no more than twice its noise of {}", number(noise.sigma)))
 }

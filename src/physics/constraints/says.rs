@@ -6,7 +6,7 @@ use crate::findings::Findings;
 use crate::names::{percent, pluralize, rounded};
 
 impl FoundConstraints {
-    /// What was found, how well it is known, and where the search ended.
+    /// The constraints, their accuracy, and the limits of the search.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         let on = pluralize(self.trajectories, "trajectory", "trajectories");
@@ -71,7 +71,7 @@ impl FoundConstraint {
 }
 
 impl ExaminedLagrangian {
-    /// The constraints, and the directions that no equation moves.
+    /// The constraints and the degenerate directions.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.line(format!("{}: {}", self.system, pluralize(self.count, "constraint", "constraints")));

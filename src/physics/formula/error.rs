@@ -27,7 +27,7 @@ pub enum FormulaError {
         /// Largest number.
         most: usize,
     },
-    /// A function of the user's own that is none.
+    /// A user's function that is not valid.
     #[error("function {text:?}: {problem}")]
     Function {
         /// The function.
@@ -43,15 +43,15 @@ pub enum FormulaError {
         /// Terms of the formula.
         known: String,
     },
-    /// A coordinate that does not move, or moves as others do.
+    /// A coordinate that does not move, or follows from others.
     #[error("no law can be found in this motion: {coordinate} {how}; leave the coordinate out")]
     Still {
         /// The coordinate.
         coordinate: String,
-        /// In which way it stands still.
+        /// How it stands still.
         how: String,
     },
-    /// A coordinate that keeps its value but for a few large steps.
+    /// A coordinate that keeps its value except for a few large steps.
     #[error(
         "no law can be found in this motion: {coordinate} moves in steps, it keeps its value over {still} of {steps} intervals and jumps in others"
     )]
@@ -63,7 +63,7 @@ pub enum FormulaError {
         /// All intervals.
         steps: usize,
     },
-    /// Rows that belong to no motion.
+    /// Rows that do not belong to the motion.
     #[error(
         "{coordinate} is {value:.4e} at t = {time} (sample {} of trajectory {}), {} by {size:.3e} where its motion has a range of {range:.3e}; {}",
         sample + 1, if trajectory.is_empty() { (track + 1).to_string() } else { trajectory.clone() }, if *jumps { "it jumps there" } else { "it is off" },
@@ -88,7 +88,7 @@ pub enum FormulaError {
         size: f64,
         /// Range of all but one sample in fifty.
         range: f64,
-        /// Such places in all.
+        /// Number of such rows.
         places: usize,
     },
     /// Motion under a constraint.
@@ -101,7 +101,7 @@ pub enum FormulaError {
         /// What vanishes.
         formulas: Vec<String>,
     },
-    /// No choice of terms has a regular mass matrix.
+    /// Every choice of terms has a singular mass matrix.
     #[error(
         "every formula that fits the motion has a nearly singular mass matrix: the library contains no law for it, try another basis"
     )]
@@ -117,7 +117,7 @@ pub enum FormulaError {
         /// Least number.
         needed: usize,
     },
-    /// Too few stretches in which the motion changes.
+    /// Too few segments in which the motion changes.
     #[error(
         "the recording has fewer than two segments of {seconds:.3} s without a long gap: record longer, or at a higher rate"
     )]

@@ -1,4 +1,4 @@
-//! Terms exchanged after convergence: one candidate for one to four terms of the formula.
+//! Exchanges of terms after convergence: one candidate replaces one to four terms of the formula.
 
 use super::motion::{BlockSum, Model, inflation, total};
 use super::search::{Search, THRESHOLD};
@@ -8,22 +8,23 @@ use crate::identification::linear::{inverse_with, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
 
-/// Exchanges that are followed through the motion each time: so many, and others that promise more than the best of them gains, up to the most.
+/// Number of exchanges that are fitted to the motion in each round: the usual number, and the largest one if others promise more than the best
+/// of them gains.
 const TRIED: usize = 3;
 const MOST_TRIED: usize = 10;
-/// How often terms are exchanged.
+/// Largest number of rounds of exchanges.
 const ROUNDS: usize = 4;
-/// Exchanges whose mass matrices are looked at.
+/// Largest number of exchanges whose mass matrices are checked.
 const LOOKED_AT: usize = 100;
-/// Mean square of the residuals from which on a formula is too far from the motion for exchanges.
+/// Mean square of the residuals above which a formula is too far from the motion for exchanges.
 const FAR: f64 = 100.0;
-/// Cost up to which an exchange is looked at, in units of noise: what is linear says less of larger ones.
+/// Largest cost of an exchange that is considered, in units of the noise variance: the linear estimate is not reliable beyond.
 const WITHIN: f64 = 10.0 * THRESHOLD;
-/// Choices of terms after an exchange, at most, and terms that are exchanged for one.
+/// Largest number of choices of terms after an exchange, and of terms that one candidate replaces.
 const CHOICES: usize = 2;
 const MOST_GONE: usize = 4;
 
-/// Another choice of terms, and what it costs more: the sum of squares in units of noise, and a threshold for every term.
+/// Another choice of terms and its additional cost: the sum of squares over the noise variance, plus a threshold for every term.
 #[derive(Clone, Debug)]
 pub(super) struct Exchanged {
     pub model: Model,
@@ -31,7 +32,7 @@ pub(super) struct Exchanged {
 }
 
 impl Search<'_> {
-    /// Exchanges terms as long as that makes the formula better; the best choice that was not taken.
+    /// Exchanges terms while that improves the formula; returns the best choice that was not taken.
     pub fn exchange(
         &self,
         model: &mut Model,
@@ -53,7 +54,7 @@ impl Search<'_> {
                 let mut tried = proposal.model;
                 let mut starts = segments.clone();
                 for rounds in [0, CHOICES] {
-                    // As it is, and without what the exchange has made superfluous.
+                    // As it is, and without the terms that the exchange has made superfluous.
                     self.converge(&mut tried, &mut starts, rounds);
                     if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
                         break;
@@ -132,7 +133,7 @@ impl Search<'_> {
     }
 }
 
-/// One to four of all terms but the last whose loss, together, is below `most`, with what they cost.
+/// One to four of all terms except the last whose joint loss is below `most`, with their costs.
 fn removals(inverse: &[f64], x: &[f64], most: f64) -> Vec<(f64, Vec<usize>)> {
     let size = x.len();
     let lost = |gone: &[usize]| {

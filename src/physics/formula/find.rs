@@ -1,4 +1,4 @@
-//! From recorded motion to a formula.
+//! Finds a formula from recorded motion.
 
 use super::error::FormulaError;
 use super::found::{FoundFormula, Rival, Verdict};
@@ -18,35 +18,35 @@ use crate::recording::Recording;
 use rand::Rng;
 use std::collections::BTreeSet;
 
-/// How a formula is looked for.
+/// Options of the search for a formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FormulaOptions {
-    /// Functions of the coordinates; if not given, larger and larger libraries until one explains the motion.
+    /// Functions of the coordinates; if not given, larger and larger libraries until one fits the motion.
     pub families: Option<Families>,
-    /// Formulas of the coordinates beside them, in the grammar of system files.
+    /// Additional formulas of the coordinates, in the grammar of system files.
     pub functions: Vec<String>,
-    /// `true` for terms `v_i f(q)`, those of magnetic fields and turning frames.
+    /// `true` for terms `v_i f(q)`, as in magnetic fields and rotating frames.
     pub gyroscopic: bool,
     /// `true` for a Rayleigh dissipation function of the velocities.
     pub friction: bool,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,
-    /// Known forces between the samples; what meets the motion best if not given.
+    /// Interpolation of known forces between the samples; by default the one that fits the motion best.
     pub between: Option<Between>,
-    /// Term and coefficient that fix the common factor; the first square of a velocity and 1/2 if not given. With known forces the motion
-    /// itself gives the factor.
+    /// Term and coefficient that fix the common factor; by default the first square of a velocity and 1/2. With known forces the motion itself
+    /// gives the factor.
     pub scale: Option<(String, f64)>,
     /// Units of the coordinates, such as `m`; an empty text, or no list, where they are not known.
     pub units: Vec<String>,
     /// Unit of time.
     pub time_unit: String,
-    /// Resamplings of the trajectories that give every term a probability.
+    /// Bootstrap samples of the trajectories that give every term a probability.
     pub bootstraps: usize,
-    /// Seed of the resamplings and of the states at which terms are compared.
+    /// Seed of the bootstrap samples and of the states at which terms are compared.
     pub seed: u64,
     /// Threads; the result does not depend on them.
     pub threads: usize,
-    /// Ends the search, and receives reports of how far it is.
+    /// Cancels the search, and receives reports of its progress.
     pub cancellation: Cancellation,
 }
 
@@ -70,37 +70,38 @@ impl Default for FormulaOptions {
     }
 }
 
-/// Resamplings at most.
+/// Largest number of bootstrap samples.
 pub const MOST_BOOTSTRAPS: usize = 10_000;
-/// One block of so many is held out.
+/// One block in so many is held out.
 const HELD_OUT: usize = 5;
-/// Terms that are looked at through the motion, at most.
+/// Largest number of terms that are fitted to the motion.
 const MOST_CANDIDATES: usize = 60;
-/// Terms that the search through the motion may start with, at most.
+/// Largest number of terms with which the search through the motion starts.
 const MOST_START: usize = 15;
-/// Error of accelerations over the least of all choices that a shorter choice may have to start with.
+/// Largest error of accelerations, over the smallest of all choices, of a shorter choice that may be the start.
 const START_ERROR: f64 = 1.3;
-/// The same of a choice with a positive definite mass matrix, if no such one is nearer, and of others that are tried where the first leads
-/// to no formula; and their number.
+/// The same for a choice with a positive definite mass matrix if no such choice is nearer, and for others that are tried if the first gives no
+/// formula; and the number of these.
 const DEFINITE_ERROR: f64 = 3.0;
 const OTHER_STARTS: usize = 2;
-/// Held-out residual over noise from which, and up to which, a formula is found; of noise that is given or that of exact numbers, only the
-/// latter.
+/// Smallest and largest held-out residual over noise at which a formula is found; if the noise is given or is that of exact numbers, only the
+/// largest one applies.
 const LEAST_RESIDUAL: f64 = 0.8;
 const MOST_RESIDUAL: f64 = 1.1;
-/// Motion of a coordinate over its residual from which on it tells a law: noise is below half of the spread.
+/// Smallest ratio of a coordinate's motion to its residual at which it can confirm a law: noise is below half of the spread.
 const SIGNAL: f64 = 2.0;
-/// Error of accelerations over that of smaller libraries up to which a larger one is followed through the motion.
+/// Largest error of accelerations, over that of smaller libraries, at which a larger library is fitted to the motion.
 const BETTER: f64 = 0.8;
-/// Choices of terms through the motion, at most.
+/// Largest number of choices of terms that are fitted to the motion.
 const ROUNDS: usize = 6;
 
-/// Looks for a formula of the Lagrangian of recorded motion. Where no families are given, larger and larger libraries are searched until one
-/// of them explains what was held out.
+/// Finds a formula for the Lagrangian of recorded motion. If no families are given, searches larger and larger libraries until one fits the
+/// held-out motion.
 ///
 /// # Errors
-/// [`FormulaError`] for motion that is too short, cannot be smoothed or holds no law, such as a coordinate that stands still; for a library
-/// that is too large, and for functions and terms that are none. Motion that the library cannot explain is no error: the verdict says so.
+/// [`FormulaError`] for motion that is too short, cannot be smoothed or does not determine a law, for example because a coordinate stands still;
+/// for a library that is too large, and for invalid functions and terms. Motion that the library cannot fit is not an error: the verdict reports
+/// it.
 pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Result<FoundFormula, FormulaError> {
     let rungs = options.families.map_or_else(|| rungs(&recording.periodic), |families| vec![families]);
     let libraries: Vec<(Families, Result<Library, FormulaError>)> =
@@ -126,7 +127,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         searched.push(families.to_string());
         stop.check()?;
         let followed = WeakForm::new(&data, library, &judges, options).and_then(|weak| {
-            // Only a library that meets accelerations better is worth following the motion.
+            // A library is fitted to the motion only if it fits accelerations better.
             let (error, before) = (weak.least(), least);
             least = least.min(error);
             if error > BETTER * before { Ok(None) } else { weak.follow_all(&data, &judges, options).map(Some) }
@@ -184,7 +185,7 @@ fn library(recording: &Recording, families: Families, options: &FormulaOptions) 
     Library::new(&recording.coordinates, &recording.periodic, extent, &options.functions)
 }
 
-/// A library with what the weak form says of its terms.
+/// A library with the results of the weak form for its terms.
 struct WeakForm {
     library: Library,
     quotient: Quotient,
@@ -219,7 +220,7 @@ impl WeakForm {
             eliminate_backward(&windows, (set, &start), (&data.sigma, &complexity), &judges, stop)
         };
         let mut path = Path::default();
-        // A search that ends at a nearly singular mass matrix starts again from other ones.
+        // A search that ends at a nearly singular mass matrix restarts from other choices.
         for speeds in data.starts() {
             stop.check()?;
             path = eliminate(&windows.apart(&[]), &speeds);
@@ -227,8 +228,8 @@ impl WeakForm {
                 break;
             }
         }
-        // Together the size of coordinates that do not act on each other is a joint one, and one of them may vanish: all of them apart, then
-        // those that move by themselves.
+        // If decoupled coordinates are normalized jointly, one of them may vanish. So all coordinates are first normalized separately, then the
+        // groups that are decoupled.
         let mut alone: Vec<usize> = (0..data.n).collect();
         while data.n > 1 && !alone.is_empty() {
             stop.check()?;
@@ -250,12 +251,12 @@ impl WeakForm {
         Ok(Self { library, quotient, windows, path })
     }
 
-    /// The least error on what was held out of choices that the search through the motion may start with.
+    /// The smallest held-out error of choices with which the search through the motion may start.
     fn least(&self) -> f64 {
         best(&self.path).map_or(f64::INFINITY, judged)
     }
 
-    /// Goes on through the motion, from another choice of the weak form where one leads to no formula.
+    /// Fits the choice to the motion, or another choice of the weak form if that gives no formula.
     fn follow_all(
         &self,
         data: &Prepared<'_>,
@@ -276,7 +277,7 @@ impl WeakForm {
         best.ok_or(FormulaError::Singular)
     }
 
-    /// Goes on through the motion.
+    /// Fits a choice to the motion.
     fn follow(
         &self,
         choice: &Choice,
@@ -314,7 +315,7 @@ impl WeakForm {
         }
         stop.check()?;
         stop.stage("longer segments");
-        // Longer segments say more of the constants; their starts are known by now.
+        // Longer segments determine the constants better; their initial states are known by now.
         let before = (model.clone(), learned.clone());
         let short = search.motion.settle(&model, &mut learned, 1);
         let mut learned = data.joined(&learned);
@@ -322,7 +323,7 @@ impl WeakForm {
         let (mut blocks, mut chosen) = search.converge(&mut model, &mut learned, ROUNDS);
         let long = search.motion.settle(&model, &mut learned, 1);
         if long.0 / long.1 > 1.1 * short.0 / short.1 {
-            // Motion that is too unstable to be followed for so long.
+            // The motion is too unstable to be followed for so long.
             (model, learned) = before;
             (blocks, chosen) = search.converge(&mut model, &mut learned, 0);
         }
@@ -381,7 +382,7 @@ impl WeakForm {
     }
 }
 
-/// What the motion that was held out says of a model.
+/// Held-out motion as a test of a model.
 struct Judged<'a> {
     search: &'a Search<'a>,
     model: &'a Model,
@@ -395,7 +396,7 @@ impl Judged<'_> {
         (self.square / self.count.max(1.0)).sqrt()
     }
 
-    /// Few residuals scatter by themselves.
+    /// Three standard deviations of the residual, which matter if its count is small.
     fn scatter(&self) -> f64 {
         3.0 / (2.0 * self.count.max(1.0)).sqrt()
     }
@@ -408,7 +409,7 @@ impl Judged<'_> {
         }
     }
 
-    /// Why small residuals say nothing.
+    /// Reasons why small residuals do not confirm the formula.
     fn doubts(&self) -> Vec<String> {
         let data = self.search.motion.data;
         let mut doubts = Vec::new();
@@ -453,7 +454,7 @@ impl Judged<'_> {
     }
 }
 
-/// Blocks that are held out: one of so many, drawn.
+/// The blocks that are held out: one in so many, chosen at random.
 fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     let tracks = 0..data.recording.tracks.len();
     let mut blocks: Vec<usize> = tracks.flat_map(|t| data.pieces(t).into_iter().map(|(block, _)| block)).collect();
@@ -463,8 +464,8 @@ fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     (0..count).map(|_| blocks.swap_remove(rng.random_range(0..blocks.len()))).collect()
 }
 
-/// The shortest choice whose error is near the least, one with a positive definite mass matrix if there is any that is not much worse; then
-/// others near the least.
+/// The shortest choice whose error is near the smallest, with a positive definite mass matrix if such a choice is not much worse; then other
+/// choices near the smallest error.
 fn beginnings<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
     let few: Vec<&'a Choice> = path.best.values().filter(|choice| choice.set.len() <= MOST_START).collect();
     let least = few.iter().map(|choice| judged(choice)).fold(f64::INFINITY, f64::min);
@@ -477,13 +478,13 @@ fn beginnings<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
     [first].into_iter().chain(others.into_iter().take(OTHER_STARTS)).collect()
 }
 
-/// The choice of the least error that the search through the motion may start with.
+/// The choice with the smallest error that the search through the motion may start with.
 fn best(path: &Path) -> Option<&Choice> {
     let few = path.best.values().filter(|choice| choice.set.len() <= MOST_START);
     few.min_by(|a, b| judged(a).total_cmp(&judged(b)))
 }
 
-/// Error of a choice where it was held out.
+/// Held-out error of a choice.
 fn judged(choice: &Choice) -> f64 {
     if choice.held_out.is_finite() { choice.held_out } else { choice.error }
 }

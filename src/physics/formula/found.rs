@@ -1,4 +1,4 @@
-//! A formula that was found, and its ways to be written.
+//! A formula that was found, and its output formats.
 
 use super::error::FormulaError;
 use super::find::FormulaOptions;
@@ -12,16 +12,16 @@ use crate::linalg::dot;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Whether the library holds the Lagrangian.
+/// Whether the library contains the Lagrangian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Verdict {
-    /// The formula explains motion that was held out, up to its noise.
+    /// The formula fits the held-out motion within its noise.
     #[serde(rename = "found")]
     Found,
-    /// It does not.
+    /// The library does not contain the Lagrangian.
     #[serde(rename = "not in the library")]
     NotInLibrary,
-    /// Residuals are small, but there is doubt whether they say anything.
+    /// Residuals are small, but may not confirm the formula.
     #[serde(rename = "undecided")]
     Undecided,
 }
@@ -31,7 +31,7 @@ pub enum Verdict {
 pub struct Rival {
     /// Its terms.
     pub terms: Vec<String>,
-    /// What it costs more: its sum of squares in units of noise, and 30 for every term.
+    /// Its additional cost: the sum of squares over the noise variance, and 30 for every term.
     pub cost: f64,
 }
 
@@ -53,20 +53,20 @@ pub struct FoundTerm {
     pub coefficient: f64,
     /// Standard error of the coefficient; 0 for the one that fixes the common factor.
     pub standard_error: f64,
-    /// Name of the constant that the coefficient is, or the negative of: one name for coefficients that are equal.
+    /// Name of the constant that equals the coefficient or its negative: coefficients that are equal share a name.
     pub constant: String,
-    /// Unit of the coefficient; none where the function of the term hides a constant with a unit.
+    /// Unit of the coefficient; none if the function of the term contains a constant with a unit.
     pub unit: Option<String>,
-    /// Share of the resampled recordings in which it was chosen.
+    /// Share of the bootstrap samples in which it was chosen.
     pub probability: f64,
     /// `true` for a term of Rayleigh's dissipation function, `false` for one of the Lagrangian.
     pub dissipation: bool,
     /// A simple fraction within the error of the coefficient, if there is one.
     pub near: Option<Near>,
-    /// Place of the term of its block whose coefficient is given, if there is one.
+    /// Index of the term of its block whose coefficient is fixed, if there is one.
     #[serde(skip)]
     reference: Option<usize>,
-    /// Coefficients of resamplings in which terms were chosen anew.
+    /// Coefficients of bootstrap samples in which terms were chosen again.
     #[serde(skip)]
     drawn: Vec<f64>,
     /// Coordinates that it joins.
@@ -80,10 +80,10 @@ pub struct FoundTerm {
     rust: String,
 }
 
-/// What is left over in a part of the range of a coordinate.
+/// Residuals in a part of the range of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Left {
-    /// Place of the coordinate.
+    /// Index of the coordinate.
     pub coordinate: usize,
     /// Lower end of the part.
     pub low: f64,
@@ -102,41 +102,41 @@ pub struct FoundFormula {
     pub coordinates: Vec<String>,
     /// Which of them are angles.
     pub periodic: Vec<bool>,
-    /// Whether the formula explains what was held out.
+    /// Whether the formula fits the held-out motion.
     pub verdict: Verdict,
     /// Its terms.
     pub terms: Vec<FoundTerm>,
-    /// Root mean square residual over noise of what was held out: 1 where nothing but noise is left.
+    /// Root mean square of the held-out residual over the noise: 1 if only noise remains.
     pub residual: f64,
-    /// Noise of every coordinate that the residual is measured by.
+    /// Noise of every coordinate that scales the residual.
     pub noise: Vec<f64>,
-    /// `false` if the noise could not be told from the motion: what it is measured by is an upper bound.
+    /// `false` if the noise and the motion could not be separated: the noise given is then an upper bound.
     pub noise_resolved: bool,
     /// Residuals by parts of the ranges of coordinates.
     pub left: Vec<Left>,
     /// Terms searched, and how many of them were removed as total derivatives and identities.
     pub searched: (usize, usize),
-    /// Families of functions that it was found among.
+    /// Families of functions in the library of the formula.
     pub basis: String,
-    /// All that were searched.
+    /// All families that were searched.
     pub tried: Vec<String>,
-    /// Coordinates in groups that do not act on each other: without known forces each has a common factor of its own that is not determined.
+    /// Groups of decoupled coordinates: without known forces, each has a common factor that is not determined.
     pub blocks: Vec<Vec<String>>,
     /// The next best formula; `several` if it is as good.
     pub rival: Option<Rival>,
-    /// `true` if other formulas explain the motion as well.
+    /// `true` if other formulas fit the motion equally well.
     pub several: bool,
     /// Why the verdict is in doubt.
     pub doubts: Vec<String>,
-    /// What else is to be known of the search.
+    /// Other notes about the search.
     pub notes: Vec<String>,
-    /// Known forces between the samples.
+    /// Interpolation of known forces between the samples.
     pub between: Option<Between>,
-    /// `true` if it is that of a model, not of recorded motion.
+    /// `true` if the formula is that of a model, not of recorded motion.
     pub of_model: bool,
-    /// `true` if a dissipation was looked for.
+    /// `true` if a dissipation function was searched.
     pub friction: bool,
-    /// Seed of what was drawn.
+    /// Seed of the random choices.
     pub seed: u64,
     /// Coordinates with known forces.
     pub(super) forced: Vec<bool>,
@@ -147,7 +147,7 @@ pub struct FoundFormula {
     units: (Vec<String>, String),
 }
 
-/// A formula with what is written from it, as JSON.
+/// A formula with the texts made from it, as JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct FormulaSummary<'a> {
     verdict: Verdict,
@@ -177,7 +177,7 @@ pub struct FormulaSummary<'a> {
 }
 
 impl FoundFormula {
-    /// The formula of a model of a library, with the covariance of its coefficients and the probabilities of its terms.
+    /// The formula of a model from a library, with the covariance of its coefficients and the probabilities of its terms.
     pub(super) fn new(
         library: &Library,
         periodic: &[bool],
@@ -245,7 +245,7 @@ impl FoundFormula {
         }
     }
 
-    /// Takes the coefficients of resamplings of the recording, by the terms of the library.
+    /// Takes over the coefficients of bootstrap samples, by the terms of the library.
     pub(super) fn draw(&mut self, library: &Library, model: &Model, coefficients: &BTreeMap<usize, Vec<f64>>) {
         for &k in &model.terms {
             let text = library.written(k, Notation::System);
@@ -256,7 +256,7 @@ impl FoundFormula {
         }
     }
 
-    /// Standard deviation of a term's coefficient over the resamplings, as a ratio to that of a reference which is `value` then.
+    /// Standard deviation of a term's coefficient over the bootstrap samples, relative to a reference, which then has the value `value`.
     fn scatter(&self, k: usize, reference: Option<(usize, f64)>) -> f64 {
         let own = &self.terms[k].drawn;
         let values: Vec<f64> = match reference {
@@ -271,8 +271,8 @@ impl FoundFormula {
         (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt()
     }
 
-    /// Fixes the common factor of every block of coordinates that no known force gives it: a term gets the coefficient that is given, or
-    /// the first square of a velocity 1/2.
+    /// Fixes the common factor of every block of coordinates without a known force: a term gets the given coefficient, or the first square of a
+    /// velocity gets 1/2.
     pub(super) fn rescale(&mut self, scale: Option<&(String, f64)>) -> Result<(), FormulaError> {
         let plain = |text: &str| text.chars().filter(|c| !c.is_whitespace()).collect::<String>();
         let given = match scale {
@@ -308,8 +308,8 @@ impl FoundFormula {
         Ok(())
     }
 
-    /// The first square of a velocity of a block, and 1/2 or -1/2: the sign that makes most of its squares positive, since a time runs
-    /// against the places.
+    /// The first square of a velocity of a block, and 1/2 or -1/2: the sign that makes most of its squares positive, since a time coordinate has
+    /// the opposite sign of the spatial ones.
     fn first_square(&self, block: &[usize]) -> Option<(usize, f64)> {
         let square = |&i: &usize| {
             let text = format!("{}_dot^2", self.coordinates[i]);
@@ -320,7 +320,7 @@ impl FoundFormula {
         Some((first, if signs * self.terms[first].coefficient < 0.0 { -0.5 } else { 0.5 }))
     }
 
-    /// Writes coefficients as ratios to the references of their blocks, with their covariance.
+    /// Expresses coefficients as ratios to the references of their blocks, with their covariance.
     fn relate(&mut self, references: &[(usize, f64)]) {
         let m = self.terms.len();
         let x: Vec<f64> = self.terms.iter().map(|t| t.coefficient).collect();
@@ -341,7 +341,7 @@ impl FoundFormula {
             slopes[k].iter().flat_map(|(i, a)| slopes[l].iter().map(move |(j, b)| a * old[i * m + j] * b)).sum()
         };
         let mut covariance: Vec<f64> = (0..m * m).map(|e| element(e / m, e % m)).collect();
-        // No error is smaller than what choosing the terms anew makes.
+        // No standard error is smaller than the scatter over bootstrap samples that choose the terms again.
         let wider = |k: usize| {
             let reference = self.terms[k].reference.and_then(|at| references.iter().find(|(known, _)| *known == at));
             let (own, drawn) = (covariance[k * m + k].max(0.0).sqrt(), self.scatter(k, reference.copied()));
@@ -360,7 +360,7 @@ impl FoundFormula {
         }
     }
 
-    /// Gives the coefficients their units, one name to those that are equal, and names the fractions near them.
+    /// Sets the units of coefficients, one name for equal coefficients, and fractions near them.
     pub(super) fn name_constants(&mut self) {
         let dimensions: Vec<Option<Dimension>> = self.terms.iter().map(|t| t.dimension.clone()).collect();
         for term in &mut self.terms {
@@ -376,7 +376,7 @@ impl FoundFormula {
                 None => groups.push(vec![k]),
             }
         }
-        // A letter that no coordinate has before a number.
+        // A letter that, followed by a number, is not the name of a coordinate.
         let letter =
             ['c', 'k', 'w'].into_iter().find(|letter| !self.coordinates.iter().any(|q| q.starts_with(*letter)));
         for (number, group) in groups.iter().enumerate() {
@@ -390,8 +390,8 @@ impl FoundFormula {
         }
     }
 
-    /// `true` if two coefficients are the same constant or its negative: of one block and the same unit, and equal within their errors where that is
-    /// no accident.
+    /// `true` if two coefficients are the same constant or its negative: in the same block, with the same unit, equal within their errors, and
+    /// not by chance.
     fn equal(&self, a: usize, b: usize) -> bool {
         const ACCIDENT: f64 = 5e-3;
         let (m, [x, y]) = (self.terms.len(), [a, b].map(|k| &self.terms[k]));
@@ -403,7 +403,7 @@ impl FoundFormula {
         same && error < ACCIDENT * size && (size - y.coefficient.abs()).abs() <= 2.0 * error
     }
 
-    /// The best size of a constant and its standard error, of the coefficients that it is.
+    /// The best estimate of a constant and its standard error, from the coefficients that equal it.
     fn common(&self, group: &[usize]) -> (f64, f64) {
         let own = |k: usize| (self.terms[k].coefficient.abs(), self.terms[k].standard_error);
         if let Some(&fixed) = group.iter().find(|k| group.len() == 1 || own(**k).1 == 0.0) {
@@ -419,7 +419,7 @@ impl FoundFormula {
         (dot(&sums, &sizes) / whole, whole.recip().max(0.0).sqrt())
     }
 
-    /// The formula as JSON, with the dissipation if one was looked for; `name` is that of the system which it makes.
+    /// The formula as JSON, with the dissipation function if one was searched; `name` is the name of the system in its file.
     pub fn summary(&self, name: &str) -> FormulaSummary<'_> {
         let wanted = if self.friction { &[false, true][..] } else { &[false] };
         FormulaSummary {
@@ -472,7 +472,7 @@ impl FoundFormula {
         if text.is_empty() { "0".to_string() } else { text }
     }
 
-    /// Rust: a type with this Lagrangian.
+    /// A Rust type with this Lagrangian.
     pub fn rust(&self) -> String {
         let n = self.coordinates.len();
         let body: Vec<String> = self
@@ -488,7 +488,7 @@ impl FoundFormula {
         )
     }
 
-    /// A system file: its constants are parameters that a training may learn.
+    /// A system file, with its constants as parameters that a training may learn.
     pub fn system_file(&self, name: &str) -> String {
         let mut text = format!("name = {name:?}\n");
         let sum = |dissipation: bool| {
@@ -539,14 +539,14 @@ impl FoundFormula {
         text
     }
 
-    /// The first term of every constant.
+    /// The first term with each constant.
     fn constants(&self) -> impl Iterator<Item = &FoundTerm> {
         let first = |k: usize| self.terms.iter().position(|t| t.constant == self.terms[k].constant) == Some(k);
         self.terms.iter().enumerate().filter(move |(k, _)| first(*k)).map(|(_, t)| t)
     }
 }
 
-/// Seven digits.
+/// A number with seven digits.
 fn number(x: f64) -> String {
     let size = x.abs();
     if x != 0.0 && !(1e-4..1e7).contains(&size) {
@@ -565,7 +565,7 @@ fn latex_number(x: f64) -> String {
     }
 }
 
-/// A fraction of small whole numbers within two standard errors, if the number is known well enough that this is no accident.
+/// A fraction of small integers within two standard errors, if the number is known well enough that this is not by chance.
 fn near(x: f64, error: f64) -> Option<Near> {
     if !(x.is_finite() && error.is_finite()) {
         return None;
@@ -573,7 +573,7 @@ fn near(x: f64, error: f64) -> Option<Near> {
     let within = (2.0 * error).max(1e-9 * x.abs());
     for bottom in 1..=12 {
         let top = (x * f64::from(bottom)).round();
-        // Fractions of this denominator stand 1 / bottom apart: one within the error by accident is rare.
+        // Fractions with this denominator are 1 / bottom apart: one within the error is rarely there by chance.
         let rare = within * f64::from(bottom * bottom) < 0.02;
         if rare && top != 0.0 && top.abs() <= 24.0 && (x - top / f64::from(bottom)).abs() <= within {
             let fraction = if bottom == 1 { format!("{top}") } else { format!("{top}/{bottom}") };

@@ -1,10 +1,10 @@
-//! Functions of the coordinates that terms of a Lagrangian are made of.
+//! Functions of the coordinates in the terms of a Lagrangian.
 
 use crate::forward::Dual;
 use crate::lagrangian::{ExpressionError, ExpressionLagrangian, Lagrangian};
 use crate::scalar::Real;
 
-/// Coordinates at most.
+/// Largest number of coordinates.
 pub(super) const MOST_COORDINATES: usize = 8;
 
 /// A factor of a function.
@@ -14,7 +14,7 @@ pub(super) enum Factor {
     Power(usize, i32),
     /// `(q_i^2 + q_j^2 + ..)^(k/2)` over some coordinates.
     Radius(Vec<usize>, i32),
-    /// `sin(m.q)` of whole numbers `m`, the first of them that is not 0 positive.
+    /// `sin(m.q)` with integers `m`, the first nonzero one positive.
     Sine(Vec<i32>),
     /// `cos(m.q)`.
     Cosine(Vec<i32>),
@@ -62,7 +62,7 @@ impl Factor {
         }
     }
 
-    /// How involved it is.
+    /// Its complexity.
     fn complexity(&self) -> f64 {
         match self {
             Self::Power(_, k) => f64::from(k.abs()) + if *k < 0 { 0.5 } else { 0.0 },
@@ -93,7 +93,7 @@ fn angle(harmonics: &[i32], names: &[String], product: &str) -> String {
     text
 }
 
-/// A way to write formulas.
+/// A notation for formulas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Notation {
     /// The grammar of system files.
@@ -158,7 +158,7 @@ impl Function {
     /// A formula of coordinates.
     ///
     /// # Errors
-    /// A mistake in it, with its column.
+    /// A mistake in the formula, with its column.
     pub fn formula(names: &[String], text: &str) -> Result<Self, ExpressionError> {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let compiled = ExpressionLagrangian::new(&names, &[], text)?;
@@ -195,7 +195,7 @@ impl Function {
         found
     }
 
-    /// `true` for a formula that holds a velocity.
+    /// `true` for a formula that contains a velocity.
     pub fn moves(&self) -> bool {
         let Self::Formula(_, formula) = self else { return false };
         let n = formula.coordinates();
@@ -208,7 +208,7 @@ impl Function {
     pub fn coordinates(&self, n: usize) -> Vec<usize> {
         let q: Vec<f64> = (0..n).map(|i| 0.37 + 0.11 * i as f64).collect();
         let slopes = self.taylor(&q).gradient;
-        // Outside of its domain a formula may depend on anything.
+        // Outside its domain a formula may depend on anything.
         (0..n).filter(|&i| slopes[i] != 0.0).collect()
     }
 
@@ -217,7 +217,7 @@ impl Function {
         matches!(self, Self::Product(factors) if factors.is_empty())
     }
 
-    /// Product with another one.
+    /// Product with another function.
     pub fn product(&self, other: &Self) -> Option<Self> {
         match (self, other) {
             (Self::Product(a), Self::Product(b)) => Some(Self::Product([a.clone(), b.clone()].concat())),
@@ -225,7 +225,7 @@ impl Function {
         }
     }
 
-    /// How involved it is.
+    /// Its complexity.
     pub fn complexity(&self) -> f64 {
         match self {
             Self::Product(factors) => factors.iter().map(Factor::complexity).sum(),

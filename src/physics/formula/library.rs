@@ -9,7 +9,7 @@ use crate::scalar::Real;
 use crate::tape::TapeError;
 use rand::Rng;
 
-/// Functions and terms at most.
+/// Largest number of functions and terms.
 pub(super) const MOST_TERMS: usize = 400;
 /// Highest degree of a family.
 const MOST_DEGREE: usize = 6;
@@ -17,13 +17,13 @@ const MOST_DEGREE: usize = 6;
 /// Which functions of the coordinates a library is made of, by family and total degree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Families {
-    /// Powers of coordinates that are no angles.
+    /// Powers of coordinates that are not angles.
     pub polynomial: usize,
     /// Sines and cosines of sums and differences of multiples of the angles.
     pub trigonometric: usize,
-    /// Powers, positive and negative, of the distance from the origin in the coordinates that are no angles.
+    /// Positive and negative powers of the distance from the origin in the coordinates that are not angles.
     pub radial: usize,
-    /// Reciprocals of powers of every coordinate that is no angle.
+    /// Reciprocals of powers of every coordinate that is not an angle.
     pub reciprocal: usize,
 }
 
@@ -50,7 +50,7 @@ impl std::fmt::Display for Families {
 impl std::str::FromStr for Families {
     type Err = String;
 
-    /// `family:degree,..`; a family that is not there has degree 0.
+    /// `family:degree,..`; a family that is missing has degree 0.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut families = Self { polynomial: 0, trigonometric: 0, radial: 0, reciprocal: 0 };
         for part in text.split(',') {
@@ -72,7 +72,7 @@ impl std::str::FromStr for Families {
     }
 }
 
-/// What a term is.
+/// Kind of a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// `v_i v_j f(q)` in `L`, `i <= j`.
@@ -85,14 +85,14 @@ pub(super) enum Kind {
     Dissipation(usize, usize),
 }
 
-/// A term: velocities by kind, times a function by its place in the library.
+/// A term: velocities by kind, times a function by its index in the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Term {
     pub kind: Kind,
     pub function: usize,
 }
 
-/// Which terms a library has beside `v_i v_j f(q)` and `f(q)`.
+/// Kinds of terms in a library, besides `v_i v_j f(q)` and `f(q)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Extent {
     pub families: Families,
@@ -107,7 +107,7 @@ pub(super) struct Library {
     pub names: Vec<String>,
     pub functions: Vec<Function>,
     pub terms: Vec<Term>,
-    /// Terms up to this one are searched; those behind it may replace several at the end.
+    /// Terms up to this one are searched; later ones may replace several terms at the end.
     pub searched: usize,
 }
 
@@ -115,10 +115,10 @@ pub(super) struct Library {
 pub(super) type Values = Vec<Taylor>;
 
 impl Library {
-    /// The library of coordinates, `periodic` those that are angles, with formulas of the user's own.
+    /// The library of coordinates, of which `periodic` are angles, with the user's own formulas.
     ///
     /// # Errors
-    /// Too many coordinates or terms, or a formula that is none.
+    /// Too many coordinates or terms, or an invalid formula.
     pub fn new(names: &[String], periodic: &[bool], extent: Extent, own: &[String]) -> Result<Self, FormulaError> {
         let n = names.len();
         if n == 0 || n > MOST_COORDINATES {
@@ -219,7 +219,7 @@ impl Library {
         self.names.len()
     }
 
-    /// Values and derivatives of some functions at `q`; the others keep what they had.
+    /// Values and derivatives of some functions at `q`; the others keep their previous ones.
     pub fn evaluate(&self, which: &[usize], q: &[f64], values: &mut Values) {
         if values.len() < self.functions.len() {
             values.resize(self.functions.len(), Taylor::default());
@@ -237,7 +237,7 @@ impl Library {
         functions
     }
 
-    /// Coordinates that a term joins: those of its velocities and of its function.
+    /// Coordinates that a term couples: those of its velocities and of its function.
     pub fn coordinates(&self, k: usize) -> Vec<usize> {
         let Term { kind, function } = self.terms[k];
         let mut joined = self.functions[function].coordinates(self.n());
@@ -249,7 +249,7 @@ impl Library {
         joined
     }
 
-    /// Groups of coordinates that do not act on each other by some terms.
+    /// Groups of coordinates that some terms leave decoupled.
     pub fn blocks(&self, terms: &[usize]) -> Vec<Vec<usize>> {
         let joined: Vec<Vec<usize>> = terms.iter().map(|&k| self.coordinates(k)).collect();
         blocks(self.n(), joined.iter().map(Vec::as_slice))
@@ -266,8 +266,8 @@ impl Library {
         }
     }
 
-    /// The equations of motion of some terms, whose coefficients are the first of `count` parameters, with slopes by the coefficients of
-    /// wanted terms.
+    /// The equations of motion of some terms, whose coefficients are the first of `count` parameters, with derivatives by the coefficients of
+    /// the wanted terms.
     ///
     /// # Errors
     /// A formula that branches on its data.
@@ -309,7 +309,7 @@ impl Library {
         }
     }
 
-    /// How involved a term is: of equally good ones the simplest is kept.
+    /// Complexity of a term: of equally good terms the simplest is kept.
     pub fn complexity(&self, k: usize) -> f64 {
         let Term { kind, function } = self.terms[k];
         let own = match kind {
@@ -326,7 +326,7 @@ impl Library {
         own + self.functions[function].complexity()
     }
 
-    /// The terms that are searched without those that others make up by a total derivative or an identity, simple ones first kept:
+    /// The searched terms without those that are linear combinations of others up to a total derivative or an identity, keeping simple ones:
     /// their Euler-Lagrange equations at random states are independent. Positions are drawn from `bounds`.
     pub fn independent(&self, bounds: &[[f64; 2]], seed: u64) -> (Vec<usize>, Quotient) {
         let (n, count) = (self.n(), self.terms.len());
@@ -392,7 +392,7 @@ impl Library {
         }
     }
 
-    /// The mass matrix' part of a term: `(i, j)` of an element and its mirror image.
+    /// The contribution of a term to the mass matrix: `(i, j)` of an element and its mirror image.
     pub fn kinetic(&self, k: usize) -> Option<(usize, usize)> {
         match self.terms[k].kind {
             Kind::Kinetic(i, j) => Some((i, j)),
@@ -401,13 +401,13 @@ impl Library {
     }
 }
 
-/// Groups of `n` coordinates, by lists of those that act on each other.
+/// Groups of `n` coordinates, by lists of those that are coupled.
 pub(super) fn blocks<'a>(n: usize, joined: impl IntoIterator<Item = &'a [usize]>) -> Vec<Vec<usize>> {
     let pairs = joined.into_iter().flat_map(|list| list.windows(2).map(|pair| (pair[0], pair[1])));
     linalg::components(n, pairs)
 }
 
-/// A sum of terms, each times the parameter at a place if it has one.
+/// A sum of terms, each times the parameter at an index if it has one.
 struct Sum<'a> {
     library: &'a Library,
     terms: Vec<(usize, Option<usize>)>,
@@ -437,19 +437,19 @@ fn own_function(names: &[String], text: &str) -> Result<Function, FormulaError> 
     Ok(function)
 }
 
-/// How terms that are not kept are made up of those that are.
+/// How removed terms are combined from the kept ones.
 #[derive(Clone, Debug)]
 pub(super) struct Quotient {
     /// Kept terms, in the order of the library.
     pub kept: Vec<usize>,
-    /// Of every term of the library: its coefficients over the kept ones; none if it is not made up of them.
+    /// For every term of the library: its coefficients over the kept terms; none if it is not a combination of them.
     pub over_kept: Vec<Option<Vec<f64>>>,
     /// Total derivatives and identities among the terms that are searched.
     pub removed: usize,
 }
 
 impl Quotient {
-    /// Relative rest below which a term is made up of others.
+    /// Relative remainder below which a term is a combination of others.
     const REST: f64 = 1e-7;
 
     fn new(library: &Library, columns: &[Vec<f64>]) -> (Vec<usize>, Self) {
@@ -566,12 +566,12 @@ mod tests {
         let (kept, quotient) = library.independent(&bounds, 0);
         let find =
             |text: &str| (0..library.terms.len()).find(|&k| library.written(k, Notation::System) == text).unwrap();
-        // The constant, and q1_dot as the derivative of q1, do nothing.
+        // The constant, and q1_dot as the derivative of q1, have no effect.
         for nothing in ["1", "q1_dot", "q1_dot*cos(q1)"] {
             assert!(!kept.contains(&find(nothing)), "{nothing}");
             assert!(quotient.over_kept[find(nothing)].as_ref().unwrap().iter().all(|x| x.abs() < 1e-9));
         }
-        // Of two terms whose sum is a total derivative one is left.
+        // Of two terms whose sum is a total derivative one remains.
         let pair = ["q1_dot*q2*cos(q1)", "q2_dot*sin(q1)"].map(find);
         assert_eq!(pair.iter().filter(|k| kept.contains(k)).count(), 1);
         // sin^2 over cos 2x.

@@ -1,11 +1,11 @@
-//! A Lagrangian as a formula: from recorded motion, or from a model that was learned.
+//! A Lagrangian as a formula, from recorded motion or from a learned model.
 //!
-//! The equations of Euler and Lagrange are linear in the coefficients of a library of terms: products of velocities with functions of the
-//! coordinates. Terms that are total derivatives, or that identities such as `sin^2 + cos^2 = 1` make of others, are found and left out by
-//! the rank of the stacked equations at random states, never by hand. Of recorded motion [`formula_of_motion`] takes the weak form of the
-//! equations along smoothed positions, gives up terms one after the other with refits, and then follows the motion itself by the survivors:
-//! multiple shooting with Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does
-//! not bias. Held-out trajectories say whether what is left is noise. Of models [`formula_of_model`] takes the equations at sampled states.
+//! The Euler-Lagrange equations are linear in the coefficients of a library of terms: products of velocities with functions of the coordinates.
+//! Terms that are total derivatives, or that follow from others by identities such as `sin^2 + cos^2 = 1`, are detected and left out by the rank
+//! of the stacked equations at random states. For recorded motion, [`formula_of_motion`] uses the weak form of the equations along smoothed
+//! positions, removes terms one after the other with refits, and then fits the surviving terms to the motion itself: multiple shooting with
+//! Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does not bias. Held-out
+//! trajectories show whether the residuals are noise. For models, [`formula_of_model`] uses the equations at sampled states.
 //!
 //! ```
 //! use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};

@@ -1,4 +1,4 @@
-//! The coefficients of terms through the motion: the multiple shooting of [`identification`](crate::identification), by all terms of a
+//! Fits the coefficients of terms to the motion: the multiple shooting of [`identification`](crate::identification), with all terms of a
 //! library.
 
 use super::library::{Library, Values};
@@ -17,35 +17,35 @@ pub(super) struct Model {
     pub coefficients: Vec<f64>,
 }
 
-/// Follows segments by models of a library.
+/// Integrates segments with models of a library.
 #[derive(Clone, Debug)]
 pub(super) struct Motion<'a> {
     pub library: &'a Library,
     pub data: &'a Prepared<'a>,
-    /// Integration steps from sample to sample.
+    /// Integration steps between samples.
     pub substeps: usize,
     /// Known forces between the samples.
     pub between: Between,
     pub threads: usize,
 }
 
-/// Normal equations of a block, its starts eliminated.
+/// Normal equations of a block, with its initial states eliminated.
 #[derive(Clone, Debug)]
 pub(super) struct BlockSum {
     pub matrix: Vec<f64>,
     pub right: Vec<f64>,
     /// Sum of squared residuals in units of noise, large ones counted linearly.
     pub square: f64,
-    /// Residuals less the numbers that each start takes.
+    /// Number of residuals minus the numbers of initial states.
     pub count: f64,
-    /// Variance of what coefficients are pulled by, over that of independent noise: residuals that are alike all along a motion, those of
-    /// a model that is not quite right, say less than their number. At least 1.
+    /// Variance of the scores of coefficients over that of independent noise: residuals of an imperfect model are correlated along the motion
+    /// and carry less information than their number suggests. At least 1.
     pub inflation: f64,
 }
 
-/// Mean squared residual that stands for a segment that cannot be followed.
+/// Mean squared residual that is assumed for a segment that cannot be followed.
 const FAILED: f64 = 1e3;
-/// Segments whose normal equations are held at a time.
+/// Number of segments whose normal equations are kept at a time.
 const AT_A_TIME: usize = 256;
 
 /// Sum over blocks.
@@ -58,8 +58,7 @@ pub(super) fn total(blocks: &BTreeMap<usize, BlockSum>, weight: &dyn Fn(usize) -
     sum
 }
 
-/// The median over the coefficients of the scatter of what blocks pull them by once they are changed, over the scatter of noise; at
-/// least the mean squared residual that is left, and 1.
+/// The median over the coefficients of the scatter of the blocks' scores, over the scatter of noise; at least the mean squared residual, and 1.
 pub(super) fn inflation(
     blocks: &BTreeMap<usize, BlockSum>,
     weight: &dyn Fn(usize) -> f64,
@@ -103,7 +102,7 @@ impl BlockSum {
 }
 
 impl Motion<'_> {
-    /// Multiple shooting by a model, its unknowns the coefficients of wanted terms, of which the model need not have all; `None` for a
+    /// Multiple shooting with a model; the unknowns are the coefficients of the wanted terms, which the model need not all have; `None` for a
     /// formula that cannot be recorded.
     fn shooting<T>(
         &self,
@@ -170,7 +169,7 @@ impl Motion<'_> {
         blocks
     }
 
-    /// Moves the starts alone, so that a model meets the data as well as it can; the sum of squares and the count of residuals.
+    /// Adapts only the initial states, so that a model fits the data as well as it can; returns the sum of squares and the number of residuals.
     pub fn settle(&self, model: &Model, segments: &mut [Segment], iterations: usize) -> (f64, f64) {
         let squares = self.shooting(model, &[], |problem, x| {
             problem.settle(&x, segments, iterations);
@@ -180,7 +179,7 @@ impl Motion<'_> {
         squares.iter().fold((0.0, 0.0), |(square, count), (s, c)| (square + s, count + c))
     }
 
-    /// Fits the coefficients and the starts.
+    /// Fits the coefficients and the initial states.
     pub fn fit(&self, model: &mut Model, segments: &mut [Segment], iterations: usize) {
         let fitted = self.shooting(model, &model.terms, |problem, mut x| {
             problem.fit(&mut x, segments, iterations);
@@ -189,8 +188,8 @@ impl Motion<'_> {
         model.coefficients = fitted.unwrap_or_else(|| model.coefficients.clone());
     }
 
-    /// Mean size of the mass matrix of wanted terms relative to the model's, over the starts of segments, for every block of coordinates whose
-    /// factor no forces give: 1 for the model itself.
+    /// Mean size of the mass matrix of the wanted terms relative to the model's, over the initial states of segments, for every block of
+    /// coordinates whose factor no forces determine: 1 for the model itself.
     fn sizes(&self, model: &Model, wanted: &[usize], segments: &[Segment]) -> Vec<Vec<f64>> {
         let n = self.library.n();
         let mut blocks = self.library.blocks(&model.terms);
@@ -211,7 +210,7 @@ impl Motion<'_> {
             for (at, &k) in wanted.iter().enumerate() {
                 let Some((i, j)) = self.library.kinetic(k) else { continue };
                 let value = values[self.library.terms[k].function].value;
-                // Of coordinates in different blocks the inverse is 0.
+                // The inverse is 0 between coordinates in different blocks.
                 if let Some(block) = blocks.iter().position(|block| block.contains(&i)) {
                     sizes[block][at] += value * (inverse[i * n + j] + inverse[j * n + i]);
                 }
@@ -223,7 +222,7 @@ impl Motion<'_> {
         sizes
     }
 
-    /// Fixes the common factor of every block, of which the motion says nothing without forces, at the model's.
+    /// Fixes the common factor of every block at the model's, because the motion without forces does not determine it.
     pub fn pin(&self, model: &Model, wanted: &[usize], segments: &[Segment], sum: &mut BlockSum) {
         let m = wanted.len();
         let sizes = self.sizes(model, wanted, segments);
@@ -239,7 +238,7 @@ impl Motion<'_> {
         }
     }
 
-    /// The way of known forces between the samples that meets the motion best; the model and its segments by it.
+    /// The interpolation of known forces that fits the motion best; returns the model and its segments with it.
     pub fn choose_between(&mut self, model: &mut Model, segments: &mut [Segment]) {
         let mut least = self.settle(model, segments, 1).0;
         let from = (model.clone(), segments.to_vec());
@@ -264,7 +263,7 @@ impl Motion<'_> {
         self.shooting(model, &[], |problem, x| problem.all_residuals(&x, segments)).unwrap_or_default()
     }
 
-    /// As many integration steps from sample to sample as keep the integrator's error below a part of the noise.
+    /// Chooses as many integration steps between samples as keep the integrator's error below a share of the noise.
     pub fn choose_steps(&mut self, model: &Model, segments: &[Segment]) {
         let steps = self.shooting(model, &[], |problem, x| {
             choose_steps(problem, &x, segments);
@@ -274,7 +273,7 @@ impl Motion<'_> {
     }
 }
 
-/// Sum of squares and count of residuals of every segment.
+/// Sum of squares and number of residuals of every segment.
 fn squares(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<(f64, f64)> {
     let of = |(found, segment): (Option<_>, &Segment)| {
         let size = (segment.samples * problem.sigma.len()) as f64;
@@ -283,8 +282,8 @@ fn squares(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<(f64, 
     problem.all(x, segments).into_iter().zip(segments).map(of).collect()
 }
 
-/// Settles segments anew that are met badly: their first part, then more and more of them, as long as that meets them better. The sum of
-/// squares and the count of residuals of every segment.
+/// Fits segments with large residuals again: first their beginning, then longer and longer parts while the fit improves. Returns the sum of
+/// squares and the number of residuals of every segment.
 fn rescue(problem: &Problem<'_>, x: &[f64], segments: &mut [Segment]) -> Vec<(f64, f64)> {
     const BAD: f64 = 3.0;
     let mut found = squares(problem, x, segments);

@@ -1,4 +1,4 @@
-//! Motion that no law can be read off: coordinates that stand still, copies, steps, rows that belong to no motion, constraints.
+//! Recordings that do not determine a law: coordinates that stand still, copies, steps, rows that do not belong to the motion, constraints.
 
 use super::error::FormulaError;
 use crate::cancellation::Cancellation;
@@ -8,12 +8,12 @@ use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothing};
 use crate::recording::survey::{Kind, find_suspicious, stillness};
 
-/// Size of an outlier or a jump, over the range of all but one sample in fifty, from which on it is no part of a motion.
+/// Size of an outlier or a jump above which it does not belong to the motion, over the range of all but one sample in fifty.
 const WILD: f64 = 0.25;
-/// Samples that are looked at for ranges, about.
+/// About how many samples are used for ranges.
 const LOOKED_AT: usize = 1 << 16;
 
-/// Refuses a recording that holds no motion, or rows that are none; what else does not look like motion, a sentence for each coordinate.
+/// Rejects a recording without motion, or with rows that do not belong to it; returns a note for each coordinate with less severe faults.
 pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<Vec<String>, FormulaError> {
     if let Some((i, how)) = stillness(recording, smoothing).into_iter().next() {
         let coordinate = recording.coordinates[i].clone();
@@ -23,7 +23,7 @@ pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<Vec
     Ok(all.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
-/// Refuses rows far from the motion around them, and motion by steps; a sentence about rows that stand out by less.
+/// Rejects rows far from the motion around them, and motion in steps; returns a note about rows that stand out less.
 fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, FormulaError> {
     let n = recording.n();
     let stride = (recording.samples() / LOOKED_AT).max(1);
@@ -71,10 +71,10 @@ fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, F
     })
 }
 
-/// What vanishes along a single trajectory, which may be a constraint or its orbit.
+/// A function that vanishes along a single trajectory: a constraint, or the orbit itself.
 ///
 /// # Errors
-/// [`FormulaError::Constrained`] if several trajectories keep to it: of a Lagrangian of these coordinates they say too little.
+/// [`FormulaError::Constrained`] if several trajectories satisfy it: they do not determine a Lagrangian of these coordinates.
 pub(super) fn constrained(
     recording: &Recording,
     noise: Option<&Vec<f64>>,
@@ -85,7 +85,7 @@ pub(super) fn constrained(
     }
     let options = SmoothOptions { noise: noise.cloned(), ..SmoothOptions::default() };
     let samples = MotionSamples::of(recording, &options)?.watched(cancellation);
-    // A search that is too large, or too few samples, says nothing against a formula.
+    // A search that is too large, or has too few samples, is no objection to a formula.
     let Ok(found) = find_constraints(&samples, ConstraintSearch::default()) else { return Ok(None) };
     let held = found.constraints.into_iter().filter(|c| c.kind == ConstraintKind::Holonomic).map(|c| c.formula);
     let formulas: Vec<String> = held.collect();

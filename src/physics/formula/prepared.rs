@@ -1,4 +1,4 @@
-//! Recorded motion as a search for a formula takes it: smoothed, cut into blocks, stretches and segments.
+//! Recorded motion prepared for the search: smoothed, and cut into blocks, stretches and segments.
 
 use super::FormulaOptions;
 use super::error::FormulaError;
@@ -9,45 +9,45 @@ use crate::identification::{Segment, joined, spread_of, thinned};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::{Clock, RecordedTrajectory, Recording};
 
-/// Least noise relative to the range of a coordinate: what is exact to more digits is taken as exact to these.
+/// Smallest noise that is assumed, relative to the range of a coordinate.
 const LEAST_NOISE: f64 = 1e-6;
-/// Samples in a row that are needed.
+/// Smallest number of consecutive samples.
 pub(super) const LEAST_SAMPLES: usize = 20;
-/// Samples from which on a trajectory may have a noise of its own.
+/// Smallest number of samples at which a trajectory may have a noise of its own.
 const LEAST_OWN: usize = 200;
-/// Trajectories from which on they are held out as a whole; fewer are cut into pieces.
+/// Smallest number of trajectories at which whole trajectories are held out; fewer are cut into pieces.
 const WHOLE: usize = 5;
-/// Pieces of a trajectory otherwise.
+/// Number of pieces of a trajectory otherwise.
 const PIECES: usize = 10;
-/// Gap over the width of a test function, at most, across which the motion is read off the polynomials around it; one lost row is none.
+/// Largest gap, over the width of a test function, that the smoothing polynomials bridge; a single lost row does not count as a gap.
 const MOST_GAP: f64 = 0.2;
 
-/// Recorded motion with what smoothing says of it.
+/// Recorded motion with the results of smoothing.
 #[derive(Debug)]
 pub(super) struct Prepared<'a> {
     pub recording: &'a Recording,
     smoothed: Vec<Option<Smoothed>>,
     /// Noise of every coordinate.
     pub sigma: Vec<f64>,
-    /// The same by trajectory: its own where it is plainly another than that of all together.
+    /// Noise by trajectory, where it clearly differs from that of all trajectories.
     pub sigma_of: Vec<Vec<f64>>,
     /// Standard deviation of every coordinate.
     pub spread: Vec<f64>,
     /// Usual time between samples, in s.
     pub step: f64,
-    /// `false` if the noise could not be told from the motion.
+    /// `false` if the noise and the motion could not be separated.
     pub resolved: bool,
-    /// `true` for a coordinate whose noise was estimated, and is not just that of exact numbers.
+    /// `true` for a coordinate whose noise was estimated and exceeds that of exact numbers.
     pub estimated: Vec<bool>,
-    /// What does not look like motion, but is not far from it.
+    /// Notes about rows that do not look like motion, but are not far from it.
     pub suspicious: Vec<String>,
     /// Coordinates with known forces.
     pub forced: Vec<bool>,
     pub bounds: Vec<[f64; 2]>,
     pub speeds: Vec<f64>,
-    /// Time in which the motion changes, in s.
+    /// Time scale of the motion, in s.
     pub pace: f64,
-    /// Ends the search.
+    /// Cancels the search.
     pub cancellation: Cancellation,
     pub n: usize,
 }
@@ -140,7 +140,7 @@ impl<'a> Prepared<'a> {
         self.recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0)
     }
 
-    /// Width of test functions in s, and parts that trajectories are cut into.
+    /// Width of test functions in s, and number of parts into which trajectories are cut.
     pub fn width(&self) -> (f64, usize) {
         let span = |times: &[f64]| times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
         let longest = self.recording.tracks.iter().map(|track| span(&track.times)).fold(0.0, f64::max);
@@ -148,7 +148,7 @@ impl<'a> Prepared<'a> {
         ((3.0 * self.pace).min(longest / pieces as f64 / 2.5), pieces)
     }
 
-    /// Speeds by which unit masses are weighed, for one start of the elimination after the other.
+    /// Speeds that weight unit masses, one set for each start of the elimination.
     pub fn starts(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
         const OTHER: [f64; 3] = [1.0, 3.0, 0.3];
         let at = move |number: usize| {
@@ -170,7 +170,7 @@ impl<'a> Prepared<'a> {
         track * PIECES + sample * PIECES / self.recording.tracks[track].len().max(1)
     }
 
-    /// Ranges of samples without change of the block.
+    /// Ranges of samples within one block.
     pub fn pieces(&self, track: usize) -> Vec<(usize, std::ops::Range<usize>)> {
         let length = self.recording.tracks[track].len();
         let mut pieces: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
@@ -184,8 +184,8 @@ impl<'a> Prepared<'a> {
         pieces
     }
 
-    /// Smoothed motion for the weak form, at even steps: where samples are missing or late the motion is that of the polynomials around them.
-    /// Test functions do not reach across gaps of a good part of their width.
+    /// Smoothed motion for the weak form, at even steps: where samples are missing or late, the smoothing polynomials around them give the
+    /// motion. Test functions do not reach across gaps that are a large part of their width.
     pub fn stretches(&self, width: f64) -> Vec<Stretch> {
         let mut stretches = Vec::new();
         for (track, smoothed) in self.smoothed.iter().enumerate() {
@@ -232,13 +232,13 @@ impl<'a> Prepared<'a> {
         thinned(segments)
     }
 
-    /// Pairs of segments of a block that follow each other as one.
+    /// Joins pairs of consecutive segments of a block.
     pub fn joined(&self, segments: &[Segment]) -> Vec<Segment> {
         segments.chunk_by(|a, b| self.block_of(a) == self.block_of(b)).flat_map(joined).collect()
     }
 }
 
-/// Samples of smoothed motion between which it is read off the polynomials.
+/// Samples of smoothed motion, between which polynomials interpolate.
 struct Nodes<'a> {
     smoothed: &'a Smoothed,
     force: &'a [f64],
@@ -260,7 +260,7 @@ impl Nodes<'_> {
         }
     }
 
-    /// Motion at even steps, through position, velocity and acceleration of the samples around each of them.
+    /// Motion at even steps, interpolated from position, velocity and acceleration of the neighbouring samples.
     fn at_steps(&self, step: f64, block: usize) -> Stretch {
         let (n, times) = (self.n, &self.smoothed.times);
         let (first, last) = (times[self.at[0]], times[self.at[self.at.len() - 1]]);
@@ -294,8 +294,8 @@ impl Nodes<'_> {
     }
 }
 
-/// Factors by which the quintic Hermite polynomial makes position, then velocity, of position, velocity and acceleration at the start and
-/// at the end of an interval of length `h`, when the part `s` of it has passed.
+/// Weights of the quintic Hermite polynomial, for position and then velocity, of position, velocity and acceleration at the start and at the end
+/// of an interval of length `h`, at the share `s` of it.
 fn quintic(s: f64, h: f64) -> [[f64; 6]; 2] {
     let [s2, s3, s4, s5] = [2, 3, 4, 5].map(|k| s.powi(k));
     let rise = 10.0 * s3 - 15.0 * s4 + 6.0 * s5;

@@ -1,4 +1,4 @@
-//! From a Lagrangian that can be evaluated, learned or written down, to a formula.
+//! Finds a formula from a Lagrangian that can be evaluated, learned or given.
 
 use super::error::FormulaError;
 use super::find::FormulaOptions;
@@ -14,20 +14,20 @@ use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
 use rand::Rng;
 
-/// Relative error of accelerations up to which a formula is that of a model.
+/// Largest relative error of accelerations at which a formula counts as that of a model.
 const MOST_RESIDUAL: f64 = 0.02;
-/// States at which a model is asked, usually.
+/// Usual number of states at which a model is evaluated.
 pub const MODEL_STATES: usize = 1500;
-/// The same, at most.
+/// Largest number of such states.
 const MOST_STATES: usize = 3000;
-/// One state of so many judges alone.
+/// One state in so many is used only for validation.
 const HELD_OUT: usize = 5;
-/// Mean squared error over the least one up to which a choice of terms may be the formula.
+/// Largest mean squared error, over the smallest one, at which a choice of terms may be the formula.
 const NEAR: f64 = 100.0;
 
-/// Passes of a refit: each takes the mass matrix of the one before.
+/// Passes of a refit: each uses the mass matrix of the previous one.
 const REFITS: usize = 8;
-/// Error of the motion, over the least that any coefficients have, up to which it says nothing of a direction.
+/// Error of the motion, over the smallest one of any coefficients, up to which it does not determine a direction.
 const OPEN: f64 = 4.0;
 
 /// A state with the mass matrix and the acceleration of a model.
@@ -38,14 +38,14 @@ struct Asked {
     own: Vec<f64>,
 }
 
-/// Looks for a formula of a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at drawn accelerations
-/// `a`, or by `a(q, v)` alone if `M` is that of no formula; coefficients by `a(q, v)`.
+/// Finds a formula for a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at random accelerations `a`, or by
+/// `a(q, v)` alone if no formula has the mass matrix `M`; coefficients by `a(q, v)`.
 ///
-/// Everything that moves by a Lagrangian is asked in the same way: models of a structure, black boxes, systems. Total derivatives do
-/// nothing to the equations, so that neither model nor formula needs a gauge.
+/// Structured models, black boxes and systems are evaluated in the same way. Total derivatives do not change the equations, so that neither
+/// model nor formula needs a gauge.
 ///
 /// # Errors
-/// [`FormulaError`] for a model whose terms are not finite, for a library that is too large, and for functions and terms that are none.
+/// [`FormulaError`] for a model whose terms are not finite, for a library that is too large, and for invalid functions and terms.
 pub fn formula_of_model(
     model: &dyn EulerLagrange<f64>,
     (names, periodic): (&[String], &[bool]),
@@ -88,7 +88,7 @@ pub fn formula_of_model(
     let search = |windows: &Windows, start: &[f64]| {
         eliminate_backward(windows, (&all, start), (&sigma, &complexity), &judges, stop)
     };
-    // Its own motion, which holds nothing of the mass matrix but what moves it.
+    // The model's own motion, which contains the mass matrix only as far as it affects the motion.
     let moving = known.iter().map(|Asked { q, v, own, .. }| {
         let (q, v, a) = (q.clone(), v.clone(), own.clone());
         State { q, v, a, equation: Vec::new() }
@@ -112,7 +112,7 @@ pub fn formula_of_model(
     let residual = |choice: &Choice| (choice.held_out / n as f64).sqrt();
     choice = refit((&motion, &windows), choice, &sigma);
     if residual(&choice) > MOST_RESIDUAL {
-        // The mass matrix of the model is not that of a formula, though its motion may be: a function of L moves as L does.
+        // No formula has the mass matrix of the model, though one may have its motion: a function of L has the motion of L.
         let alone = search(&motion, &choice.coefficients);
         let found = elbow(&alone, n).map(|found| refit((&motion, &windows), found.clone(), &sigma));
         if let Some(found) = found.filter(|found| residual(found) < residual(&choice)) {
@@ -124,7 +124,7 @@ pub fn formula_of_model(
     let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
     let m = choice.set.len();
     let rest = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
-    // The motion leaves the common factor of every group free.
+    // The motion does not determine the common factor of each group.
     let weight =
         (0..m).map(|k| normal.matrix[k * m + k] * choice.coefficients[choice.set[k]].powi(2)).fold(0.0, f64::max);
     let mut pinned = normal.matrix.clone();
@@ -155,7 +155,7 @@ pub fn formula_of_model(
     Ok(found)
 }
 
-/// Coefficients with which kinetic terms make up the mass matrices of a model, every element in units of its coordinates' usual ones.
+/// Coefficients of kinetic terms that reproduce the mass matrices of a model, every element in units of its coordinates' typical values.
 fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Option<Vec<f64>> {
     let n = library.n();
     let size = |i: usize| known.iter().map(|k| k.mass[i * n + i].abs()).sum::<f64>() / known.len() as f64;
@@ -169,7 +169,7 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
     for Asked { q, mass, .. } in known {
         library.evaluate(&functions, q, &mut values);
         for (k, &(_, (i, j), f)) in kinetic.iter().enumerate() {
-            // An element that two coordinates share stands twice in the matrix.
+            // An off-diagonal element appears twice in the matrix.
             let weight = if i == j { 4.0 } else { 2.0 } / (sizes[i] * sizes[j]);
             let value = weight * values[f].value;
             right[k] += value * mass[i * n + j] * if i == j { 0.5 } else { 1.0 };
@@ -184,12 +184,12 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
     Some(coefficients)
 }
 
-/// `true` for a state that judges alone.
+/// `true` for a validation state.
 fn judges(block: usize) -> bool {
     block.is_multiple_of(HELD_OUT)
 }
 
-/// A choice of terms with the coefficients that the motion of the model asks for; in directions that it leaves open the mass matrix decides.
+/// A choice of terms with coefficients from the motion of the model; in directions that the motion does not determine, the mass matrix decides.
 fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f64]) -> Choice {
     let held_out: Vec<bool> = motion.blocks.iter().map(|&block| judges(block)).collect();
     let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
@@ -201,7 +201,7 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
     };
     for _ in 0..REFITS {
         let [moved, asked] = [motion, windows].map(|of| of.normal(&choice.coefficients, &set, sigma, &learned));
-        // Directions in which the mass matrix changes alike.
+        // Directions in which the mass matrix changes equally.
         let Some((sizes, axes)) = principal(&asked.matrix) else { break };
         let least = RIDGE * sizes.iter().copied().fold(0.0, f64::max);
         let unit: Vec<f64> = (0..m * m).map(|at| axes[at] / sizes[at / m].max(least).sqrt()).collect();
@@ -223,7 +223,7 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
     choice
 }
 
-/// The choice of terms of which none can be given up: the error of the next shorter one is the most times as large.
+/// The choice of terms from which none can be removed: the error grows most at the next shorter one.
 fn elbow(path: &Path, n: usize) -> Option<&Choice> {
     let least = path.best.values().map(|choice| choice.held_out).fold(f64::INFINITY, f64::min);
     // Differences below rounding are not significant.
@@ -231,13 +231,13 @@ fn elbow(path: &Path, n: usize) -> Option<&Choice> {
     let near = || path.best.values().filter(|choice| choice.held_out <= NEAR * floor);
     let rise = |choice: &Choice| {
         let shorter = path.best.range(..choice.set.len()).next_back();
-        // Of no terms the error is the size of the accelerations.
+        // Without terms the error is the size of the accelerations.
         shorter.map_or(n as f64, |(_, shorter)| shorter.held_out) / choice.held_out.max(floor)
     };
     near().max_by(|a, b| rise(a).total_cmp(&rise(b)).then(b.set.len().cmp(&a.set.len())))
 }
 
-/// The share of half samples of the states in which each term is among the last ones left.
+/// The share of random halves of the states in which each term survives.
 fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64], options: &FormulaOptions) -> Vec<f64> {
     let mut rng = RngStream::Segments.generator(options.seed);
     let mut counts = vec![0.0; windows.terms];
@@ -307,11 +307,11 @@ mod tests {
         assert_eq!(seen, [kinetic[0], kinetic[1], ("sqrt(x^2 + y^2)^(-1)", "c2", Some("m^3/s^2"))]);
         let file = found.system_file("kepler-found");
         assert!(file.contains("c1*x_dot^2 + c1*y_dot^2") && !file.contains("c3"), "{file}");
-        // Units that differ are never the same constant.
+        // Constants with different units are never the same.
         let options = FormulaOptions { units: ["m", "A"].map(String::from).to_vec(), ..options };
         let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
         assert_eq!([0, 1, 2].map(|k| found.terms[k].constant.as_str()), ["c1", "c2", "c3"]);
-        // The distance of unlike lengths has no unit.
+        // The distance of different lengths has no unit.
         assert_eq!(found.terms[2].unit, None);
     }
 }

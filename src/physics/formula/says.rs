@@ -5,7 +5,7 @@ use crate::findings::Findings;
 use crate::names::rounded;
 
 impl FoundFormula {
-    /// The verdict, the formula, and a table of its terms; of motion that it does not explain, where it does not.
+    /// The verdict, the formula, and a table of its terms; if the formula does not fit, the residuals by range.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         self.say_verdict(&mut findings);
@@ -17,7 +17,9 @@ impl FoundFormula {
         findings.gap().table(&headers, self.terms.iter().map(FoundTerm::row));
         if let Some(Rival { terms, cost }) = &self.rival {
             let (terms, cost) = (terms.join(", "), rounded(*cost, 3));
-            findings.gap().line(format!("next best: {terms}; its cost is {cost} higher (sum of squares over the noise variance, plus 30 per term)"));
+            findings.gap().line(format!(
+                "next best: {terms}; its cost is {cost} higher (sum of squares over the noise variance, plus 30 per term)"
+            ));
         }
         if self.verdict == Verdict::NotInLibrary && !self.left.is_empty() {
             let rows = self.left.iter().map(|left| {
@@ -42,7 +44,7 @@ impl FoundFormula {
         findings.line(if self.of_model {
             format!("{verdict}: accelerations differ from the model's by {residual} of their size")
         } else {
-            let bound = if self.noise_resolved { "" } else { ", an upper bound of which was assumed" };
+            let bound = if self.noise_resolved { "" } else { " (the noise is an upper bound)" };
             format!("{verdict}: the residual of held-out motion is {residual} times its noise{bound}")
         });
         findings.lines(self.doubts.iter().map(|doubt| format!("in doubt: {doubt}")));
@@ -56,7 +58,7 @@ impl FoundFormula {
         findings.lines(&self.notes).lines(self.independent());
     }
 
-    /// What moves by itself.
+    /// Groups of coordinates that are decoupled.
     fn independent(&self) -> Vec<String> {
         let Some((first, others)) = self.blocks.split_first() else { return Vec::new() };
         let first = first.join(", ");

@@ -1,4 +1,4 @@
-//! The choice of terms through the motion.
+//! Chooses terms by fits to the motion.
 
 use super::found::Left;
 use super::function::Notation;
@@ -13,14 +13,14 @@ use crate::random::RngStream;
 use rand::Rng;
 use std::collections::BTreeMap;
 
-/// Least determinant of a mass matrix over that of the model before it.
+/// Smallest determinant of a mass matrix, over that of the previous model.
 const LEAST_REGULAR: f64 = 0.05;
-/// Sum of squares in units of noise that a term must explain.
+/// Reduction of the sum of squares, in units of the noise variance, that a term must bring.
 pub(super) const THRESHOLD: f64 = 30.0;
-/// Passes of a fit, and fits at most until the last one is at its end.
+/// Largest number of steps of a fit, and of fits until one has converged.
 pub(super) const PASSES: usize = 10;
 const REFITS: usize = 4;
-/// Newton decrement at which a fit is at its end, in units of noise: a tenth of a standard error.
+/// Newton decrement at which a fit has converged, in units of the noise variance: a tenth of a standard error.
 const SETTLED: f64 = 1e-2;
 
 /// A search through the motion.
@@ -48,8 +48,8 @@ impl Search<'_> {
         masses
     }
 
-    /// `true` if terms give a mass matrix that is not nearly singular beside the one of a model, and as definite. Lagrangians of one
-    /// motion may differ in that: with a cyclic coordinate the square of its momentum may be added as often as one likes.
+    /// `true` if terms give a mass matrix that is not nearly singular relative to that of a model, and as definite. Lagrangians of the same
+    /// motion may differ in that: with a cyclic coordinate, any multiple of the square of its momentum may be added.
     pub fn regular(&self, model: &Model, (terms, coefficients): (&[usize], &[f64])) -> bool {
         let n = self.library.n();
         let eigenvalues = |mass: &[f64]| {
@@ -76,7 +76,7 @@ impl Search<'_> {
         ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_REGULAR)
     }
 
-    /// The terms that blocks of some weights need.
+    /// The terms that blocks with some weights need.
     pub fn survivors(
         &self,
         model: &Model,
@@ -90,15 +90,15 @@ impl Search<'_> {
         let complexity: Vec<f64> = self.candidates.iter().map(|&k| self.library.complexity(k)).collect();
         let equations =
             Equations { matrix: &sum.matrix, right: &sum.right, coefficients: &coefficients, complexity: &complexity };
-        // What is left once all terms are there is what counts as noise.
+        // The residual with all terms counts as noise.
         let m = self.candidates.len();
         let change = times(m, &inverse_with(m, &sum.matrix, RIDGE)?, &sum.right);
         let noise = inflation(blocks, weight, &sum, &change);
         survivors(&equations, THRESHOLD * noise, &|x| self.regular(model, (&self.candidates, x)))
     }
 
-    /// Refits and chooses terms anew until they stay the same; the normal equations at the end, by block, and `false` if the choice was
-    /// cut off.
+    /// Refits and chooses terms again until they no longer change; returns the normal equations at the end, by block, and `false` if the choice
+    /// did not converge.
     pub fn converge(
         &self,
         model: &mut Model,
@@ -132,16 +132,16 @@ impl Search<'_> {
     }
 }
 
-/// What resamplings of the blocks say of each candidate.
+/// Bootstrap results for each candidate.
 pub(super) struct Resampled {
-    /// Share that keeps it.
+    /// Share of the bootstrap samples that keep it.
     pub share: BTreeMap<usize, f64>,
-    /// Its coefficients, 0 where it is given up.
+    /// Its coefficients, 0 where it is removed.
     pub coefficients: BTreeMap<usize, Vec<f64>>,
 }
 
 impl Search<'_> {
-    /// Draws blocks anew, and chooses the terms from each drawing.
+    /// Draws blocks at random, and chooses the terms for each bootstrap sample.
     pub fn resample(
         &self,
         model: &Model,
@@ -171,7 +171,7 @@ impl Search<'_> {
     }
 }
 
-/// Replaces two terms by one that is made up of them wherever the motion allows it; what each new term replaced.
+/// Replaces two terms by one that is a combination of them where the motion allows it; returns what each new term replaced.
 pub(super) fn shorten(
     search: &Search<'_>,
     quotient: &Quotient,
@@ -189,7 +189,7 @@ pub(super) fn shorten(
         let mut best: Option<(f64, Vec<usize>, Model)> = None;
         for (term, over) in quotient.over_kept.iter().enumerate() {
             let Some(over) = over.as_ref().filter(|_| !model.terms.contains(&term)) else { continue };
-            // The new term over the model's own, if it is made up of them.
+            // The new term over the model's own, if it is a combination of them.
             let support: Vec<usize> = (0..over.len()).filter(|&k| over[k].abs() > 1e-6).collect();
             let inside = |k: &usize| own.contains(&Some(*k));
             if support.len() != 2 || !support.iter().all(inside) {
@@ -226,7 +226,7 @@ pub(super) fn shorten(
     }
 }
 
-/// Covariance of the coefficients, the common factors fixed; `false` if the fit has not come to its end.
+/// Covariance of the coefficients with the common factors fixed; `false` if the fit has not converged.
 pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut [Segment]) -> (Vec<f64>, bool) {
     let m = model.terms.len();
     let mut last = (vec![f64::NAN; m * m], false);

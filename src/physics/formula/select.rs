@@ -6,41 +6,41 @@ use crate::identification::linear::{inverse, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
 
-/// Terms up to which every drop is judged by the errors of accelerations, and refitted.
+/// Largest number of terms at which every removal is judged by the errors of accelerations, and refitted.
 const FEW: usize = 40;
-/// Terms up to which terms are exchanged as well.
+/// Largest number of terms at which terms are exchanged as well.
 const EXCHANGED: usize = 10;
-/// Rounds of exchanges at most.
+/// Largest number of rounds of exchanges.
 const EXCHANGES: usize = 3;
-/// Drops, and additions, that are looked at each time.
+/// Number of removals, and of additions, that are tried each time.
 const TRIED: usize = 6;
 
 /// A choice of terms.
 #[derive(Clone, Debug)]
 pub(super) struct Choice {
-    /// Places of the terms.
+    /// Indices of the terms.
     pub set: Vec<usize>,
     /// Coefficients of all terms, 0 outside the set.
     pub coefficients: Vec<f64>,
-    /// Mean squared error of accelerations on what was learned from.
+    /// Mean squared error of accelerations on the training data.
     pub error: f64,
-    /// The same on what was held out.
+    /// The same on held-out data.
     pub held_out: f64,
 }
 
-/// Choices of terms by their number.
+/// Choices of terms by their number of terms.
 #[derive(Default)]
 pub(super) struct Path {
     /// The best choice of every size.
     pub best: BTreeMap<usize, Choice>,
-    /// All terms in the order in which they were given up, the last ones first.
+    /// All terms in the order of removal, the last ones first.
     pub order: Vec<usize>,
-    /// `false` if exchanges still made choices better when they were cut off.
+    /// `false` if exchanges were stopped while they still improved choices.
     pub settled: bool,
 }
 
 impl Path {
-    /// The choices of this path, its terms before those of another one.
+    /// The choices of this path; its terms precede those of another one.
     pub fn before(mut self, other: Self) -> Self {
         self.order.extend(other.order.into_iter().filter(|k| !self.order.contains(k)).collect::<Vec<_>>());
         self
@@ -56,7 +56,7 @@ struct Search<'a> {
 }
 
 /// Coefficients that solve normal equations, group by group: those of known forces, or those of the smallest error with a mass matrix of
-/// the size that it had. A joint size would let the group of the larger errors vanish.
+/// constant size. With a joint size, the group with the larger errors would vanish.
 fn solve(normal: &Normal, groups: &[Group]) -> Option<Vec<f64>> {
     let mut all = vec![0.0; normal.size.len()];
     for Group { places, share } in groups {
@@ -79,12 +79,12 @@ impl Normal {
         Self { matrix: part(m, &self.matrix, places), right: pick(&self.right), size: pick(&self.size) }
     }
 
-    /// `true` if known forces give the size.
+    /// `true` if known forces determine the size.
     fn driven(&self) -> bool {
         self.right.iter().any(|x| *x != 0.0)
     }
 
-    /// What coefficients are asked for: the forces, or a size.
+    /// Condition that determines the coefficients: the forces, or a size.
     fn target(&self) -> &[f64] {
         if self.driven() { &self.right } else { &self.size }
     }
@@ -100,7 +100,7 @@ impl Normal {
         groups.iter().map(of).sum()
     }
 
-    /// What giving up each term costs to first order.
+    /// First-order cost of removing each term.
     pub fn costs(&self, groups: &[Group]) -> Option<Vec<f64>> {
         let mut costs = vec![0.0; self.size.len()];
         for Group { places, share } in groups {
@@ -138,7 +138,7 @@ impl Search<'_> {
         coefficients
     }
 
-    /// The choice of a set, refitted from coefficients before it; `None` if it moves not all coordinates.
+    /// The choice of a set, refitted from previous coefficients; `None` if it does not move all coordinates.
     fn choice(&self, set: &[usize], start: &[f64], refits: usize) -> Option<Choice> {
         if !self.windows.moves_all(set) {
             return None;
@@ -149,14 +149,14 @@ impl Search<'_> {
             let normal = self.windows.normal(&coefficients, set, self.sigma, &self.learned);
             coefficients = self.spread(set, &solve(&normal, &groups)?);
         }
-        // A nearly singular mass matrix explains everything.
+        // A nearly singular mass matrix fits everything.
         if !self.windows.is_regular(&coefficients) {
             return None;
         }
         self.judged(set.to_vec(), coefficients)
     }
 
-    /// Coefficients as far on the way to others as the mass matrix does not become nearly singular.
+    /// Coefficients moved towards others as far as the mass matrix stays regular.
     fn kept_regular(&self, from: &[f64], to: Vec<f64>) -> Vec<f64> {
         let between = |share: f64| from.iter().zip(&to).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>();
         let regular = [1.0, 0.5, 0.25, 0.1].map(between).into_iter().find(|x| self.windows.is_regular(x));
@@ -169,7 +169,7 @@ impl Search<'_> {
         error.is_finite().then_some(Choice { set, coefficients, error, held_out })
     }
 
-    /// The best choice with a term less.
+    /// The best choice with one term less.
     fn shorter(&self, from: &Choice) -> Option<Choice> {
         let normal = self.windows.normal(&from.coefficients, &from.set, self.sigma, &self.learned);
         let costs = normal.costs(&self.windows.groups(&from.set))?;
@@ -187,13 +187,13 @@ impl Search<'_> {
         });
         let tries: Vec<(usize, Choice)> = tries.collect();
         let least = tries.iter().map(|(_, choice)| choice.error).fold(f64::INFINITY, f64::min);
-        // Of equally good ones the most involved term goes.
+        // Of equally good terms the most complex one is removed.
         let equal = tries.into_iter().filter(|(_, choice)| choice.error <= least * (1.0 + 1e-3));
         let involved = |gone: usize| self.complexity[from.set[gone]];
         equal.max_by(|a, b| involved(a.0).total_cmp(&involved(b.0))).map(|(_, choice)| choice)
     }
 
-    /// Choices with a term more, of the terms that promise most.
+    /// Choices with one term more, for the most promising terms.
     fn longer(&self, from: &Choice, all: &[usize]) -> Vec<Choice> {
         let normal = self.windows.normal(&from.coefficients, all, self.sigma, &self.learned);
         let own: Vec<usize> = (0..all.len()).filter(|&k| from.set.contains(&all[k])).collect();
@@ -217,10 +217,10 @@ impl Search<'_> {
     }
 }
 
-/// Eliminates terms of a set, from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
+/// Removes terms of a set, from all of them down to one per coordinate or fewer, then exchanges some while that improves the choices.
 ///
-/// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks
-/// that judge alone. What is returned after a cancellation is of no use.
+/// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks used
+/// only for validation. The result is meaningless after a cancellation.
 pub(super) fn eliminate_backward(
     windows: &Windows,
     (all, start): (&[usize], &[f64]),
@@ -240,7 +240,7 @@ pub(super) fn eliminate_backward(
         }
     }
     let mut order = Vec::new();
-    // Many at once while there are many.
+    // Removes many at once while there are many.
     while set.len() > FEW && cancellation.go_on() {
         let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
         let mut places: Vec<usize> = (0..set.len()).collect();
@@ -300,7 +300,7 @@ pub(super) fn eliminate_backward(
     Path { best, order, settled }
 }
 
-/// Takes a choice in if it is better than the one of its size.
+/// Takes over a choice if it is better than that of the same size.
 fn improve(best: &mut BTreeMap<usize, Choice>, choice: Choice) -> bool {
     let known = best.get(&choice.set.len()).map_or(f64::INFINITY, |known| known.error);
     let better = choice.error < known * (1.0 - 1e-3);

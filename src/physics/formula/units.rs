@@ -1,4 +1,4 @@
-//! Units of constants: what their terms leave to them.
+//! Units of constants, from those of their terms.
 
 use super::function::Function;
 use super::library::{Kind, Library};
@@ -55,11 +55,11 @@ pub(super) struct Units {
     time: Dimension,
 }
 
-/// Unit of coordinates that are no angles and have none of their own.
+/// Unit of coordinates that are not angles and have no unit of their own.
 const UNKNOWN: &str = "[q]";
 
 impl Units {
-    /// Units by their texts; coordinates without one are angles, or all of one unit that is not known.
+    /// Units from their texts; coordinates without one are angles, or all have the same unknown unit.
     pub fn new(texts: &[String], time: &str, periodic: &[bool]) -> Self {
         let of = |(i, periodic): (usize, &bool)| match texts.get(i).filter(|text| !text.is_empty()) {
             Some(text) => Dimension::of(text),
@@ -68,8 +68,8 @@ impl Units {
         Self { coordinates: periodic.iter().enumerate().map(of).collect(), time: Dimension::of(time) }
     }
 
-    /// Of a function of the coordinates: what it is multiplied by where all lengths are; none if that is no power, as of `exp(-x)`, in
-    /// which a constant with a unit hides.
+    /// Scaling of a function of the coordinates when all lengths are scaled; none if it is not a power, as for `exp(-x)`, which contains a
+    /// constant with a unit.
     fn of_function(&self, function: &Function) -> Option<Dimension> {
         let n = self.coordinates.len();
         let mut bases: Vec<&String> = self.coordinates.iter().flat_map(|unit| unit.0.keys()).collect();
@@ -84,7 +84,7 @@ impl Units {
                 (function.value(&scaled) / function.value(&q)).ln() / factor.ln()
             };
             let found = [power(1.3, 0.0), power(0.6, 0.0), power(1.3, 0.23)];
-            // Halves: of square roots.
+            // Halves, for square roots.
             let exponent = (2.0 * found[0]).round() / 2.0;
             if !found.iter().all(|x| (x - exponent).abs() < 1e-9) {
                 return None;
@@ -94,7 +94,8 @@ impl Units {
         Some(dimension)
     }
 
-    /// Of a term without its coefficient, a dissipation's times the unit of time: all terms with their coefficients have the unit of `L`.
+    /// Unit of a term without its coefficient, for a dissipation function times the unit of time: all terms with their coefficients have the
+    /// unit of `L`.
     pub fn of_term(&self, library: &Library, k: usize) -> Option<Dimension> {
         let term = library.terms[k];
         let function = self.of_function(&library.functions[term.function])?;
@@ -108,7 +109,7 @@ impl Units {
     }
 }
 
-/// Unit of the coefficient of a term, of an `L` in joules or of one whose unit is that of a term.
+/// Unit of the coefficient of a term, for an `L` in joules or one with the unit of a term.
 pub(super) fn of_coefficient(term: Option<&Dimension>, reference: Option<&Dimension>) -> Option<String> {
     let whole = reference.cloned().unwrap_or_else(|| Dimension::of("kg*m^2/s^2"));
     Some(whole.times(term?, -1.0).written())

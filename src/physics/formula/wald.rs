@@ -4,7 +4,7 @@ use crate::identification::linear::{inverse_with, times};
 
 /// Normal equations at a model.
 pub(super) struct Equations<'a> {
-    /// `(m, m)`, the common factor fixed.
+    /// `(m, m)`, with the common factor fixed.
     pub matrix: &'a [f64],
     /// Gradient at the coefficients.
     pub right: &'a [f64],
@@ -13,27 +13,27 @@ pub(super) struct Equations<'a> {
     pub complexity: &'a [f64],
 }
 
-/// What is left of the terms.
+/// The surviving terms.
 #[derive(Clone, Debug)]
 pub(super) struct Survivors {
-    /// Places of the terms.
+    /// Indices of the terms.
     pub set: Vec<usize>,
     /// Coefficients of all terms, 0 outside the set.
     pub coefficients: Vec<f64>,
-    /// What giving up the cheapest survivor would cost.
+    /// Cost of removing the cheapest survivor.
     pub next: f64,
 }
 
-/// Part of the diagonal that stands for what the motion does not show.
+/// Share of the diagonal that is added for directions that the motion does not determine.
 pub(super) const RIDGE: f64 = 1e-10;
-/// The same, at most, where coefficients are held at those of the model.
+/// Largest such share, for coefficients that are held at those of the model.
 const MOST_HELD: f64 = 1e-2;
 
-/// Gives up terms as long as one costs less than `threshold` in the sum of squares; `allowed` says whether coefficients still make a
-/// mechanical system.
+/// Removes terms while one costs less than `threshold` in the sum of squares; `allowed` says whether coefficients still form a mechanical
+/// system.
 ///
-/// Coefficients move from those of the model only as far as the motion asks for: a change that is worth less than `threshold` does not,
-/// though giving up a term may ask for it.
+/// Coefficients change from those of the model only as far as the motion requires: changes that are worth less than `threshold` are not made,
+/// even if removing a term would require them.
 pub(super) fn survivors(
     equations: &Equations<'_>,
     threshold: f64,
@@ -59,7 +59,7 @@ pub(super) fn survivors(
         if cost(least) >= threshold || set.len() == 1 {
             return Some(Survivors { next: cost(least), set, coefficients: x });
         }
-        // Of terms that cost next to nothing the most involved goes first.
+        // Of terms that cost almost nothing the most complex one is removed first.
         let nothing = threshold / 10.0;
         let free = order.iter().copied().filter(|&k| cost(k) < nothing);
         let gone = free.max_by(|&a, &b| complexity[a].total_cmp(&complexity[b])).unwrap_or(least);
@@ -108,7 +108,7 @@ mod tests {
             Equations { matrix: &matrix, right: &[0.1, -0.1], coefficients: &[2.0, 0.0], complexity: &[2.0, 1.0] };
         let all = survivors(&equations, 30.0, &|x| x[0] != 0.0 && x[1] != 0.0).unwrap();
         assert!(all.set == [0, 1] && (all.coefficients[0] - 2.0).abs() < 0.1, "{all:?}");
-        // Of terms that cost nothing the more involved one goes.
+        // Of terms that cost nothing the more complex one is removed.
         let one = survivors(&equations, 30.0, &|_| true).unwrap();
         assert!(one.set == [1] && (one.coefficients[1] - 2.0).abs() < 1e-2, "{one:?}");
     }

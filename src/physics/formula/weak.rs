@@ -1,4 +1,4 @@
-//! The Euler-Lagrange equations in their weak form: no accelerations are needed.
+//! The Euler-Lagrange equations in their weak form, which needs no accelerations.
 //!
 //! For a function `phi` of compact support `int (phi (dD/dv - dL/dq - F) - phi' dL/dv) dt = 0` along every motion. It is linear in the
 //! coefficients of the terms.
@@ -13,11 +13,11 @@ pub(super) struct Stretch {
     pub q: Vec<f64>,
     pub v: Vec<f64>,
     pub force: Vec<f64>,
-    /// Block of the data that is held out, or drawn again, as a whole.
+    /// Block of the data that is held out, or resampled, as a whole.
     pub block: usize,
 }
 
-/// A state with an acceleration, and what the equations of motion come to there: `(n)` each.
+/// A state with an acceleration, and both sides of the equations of motion there: `(n)` each.
 pub(super) struct State {
     pub q: Vec<f64>,
     pub v: Vec<f64>,
@@ -40,17 +40,17 @@ pub(super) struct Windows {
     pub blocks: Vec<usize>,
     /// Number of functions.
     width: usize,
-    /// What the terms do to the mass matrix: `(i, j, function)`.
+    /// Contributions of the terms to the mass matrix: `(i, j, function)`.
     kinetic: Vec<Option<(usize, usize, usize)>>,
-    /// Coordinates that each term joins.
+    /// Coordinates that each term couples.
     joined: Vec<Vec<usize>>,
 }
 
-/// Windows at most.
+/// Largest number of windows.
 const MOST_WINDOWS: f64 = 4000.0;
 
 impl Windows {
-    /// Test functions `(1 - x^2)^4` of `width` seconds along stretches of motion, a quarter of their width or more apart.
+    /// Test functions `(1 - x^2)^4` of `width` seconds along stretches of motion, at least a quarter of their width apart.
     pub fn new(library: &Library, terms: &[usize], stretches: &[Stretch], width: f64) -> Self {
         let n = library.n();
         let seconds: f64 = stretches.iter().map(|s| s.times[s.times.len() - 1] - s.times[0]).sum();
@@ -152,7 +152,7 @@ impl Windows {
         }
     }
 
-    /// The equations themselves at single states, in the place of windows; each state is a block.
+    /// The equations themselves at single states instead of windows; each state is a block.
     pub fn of_states(library: &Library, terms: &[usize], states: &[State]) -> Self {
         let mut windows = Self::new(library, terms, &[], 1.0);
         let (n, count) = (windows.n, windows.terms);
@@ -185,7 +185,7 @@ impl Windows {
         !self.forces.is_empty()
     }
 
-    /// Places of a set of terms in groups whose coordinates do not act on each other.
+    /// Indices of a set of terms in groups of decoupled coordinates.
     pub fn groups(&self, set: &[usize]) -> Vec<Group> {
         let of = |coordinates: Vec<usize>| {
             let own = |at: &usize| self.joined[set[*at]].first().is_some_and(|i| coordinates.contains(i));
@@ -263,14 +263,14 @@ impl Windows {
         (0..self.n).map(of).collect()
     }
 
-    /// Places of the terms that join none of the coordinates `alone` with another one.
+    /// Indices of the terms that do not couple any of the coordinates `alone` with another one.
     pub fn apart(&self, alone: &[usize]) -> Vec<usize> {
         let kept = |joined: &Vec<usize>| joined.iter().all(|i| !alone.contains(i) || joined.iter().all(|j| i == j));
         (0..self.terms).filter(|&k| kept(&self.joined[k])).collect()
     }
 
-    /// Normal equations of the errors of accelerations, the mass matrix being that of `coefficients`: matrix of the terms `set`, what the
-    /// known forces give on the right, and how the terms change the size of the mass matrix. Windows for which `used` is false are left out.
+    /// Normal equations of the errors of accelerations with the mass matrix of `coefficients`: the matrix of the terms `set`, the contribution
+    /// of known forces on the right, and how the terms change the size of the mass matrix. Windows for which `used` is false are left out.
     pub fn normal(&self, coefficients: &[f64], set: &[usize], sigma: &[f64], used: &[bool]) -> Normal {
         let (n, count, m) = (self.n, self.terms, set.len());
         let mut weights = vec![0.0; self.len() * n * n];
@@ -284,7 +284,7 @@ impl Windows {
             (0..n * n).for_each(|e| weight[e] /= sigma[e / n]);
             sizes.push(weight.iter().map(|w| w * w).sum::<f64>().sqrt());
         }
-        // Where the mass matrix is nearly singular an error would count without bound.
+        // Near a singular mass matrix an error would have unlimited weight.
         let mut sorted: Vec<f64> = sizes.iter().copied().filter(|s| *s > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
         let most = 5.0 * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
@@ -331,7 +331,7 @@ impl Windows {
         normal
     }
 
-    /// `true` if a term of the mass matrix holds every coordinate's velocity.
+    /// `true` if a term of the mass matrix contains every coordinate's velocity.
     pub fn moves_all(&self, set: &[usize]) -> bool {
         (0..self.n).all(|i| set.iter().any(|&k| self.kinetic[k].is_some_and(|(a, b, _)| a == i || b == i)))
     }
@@ -346,9 +346,9 @@ impl Windows {
     }
 }
 
-/// Windows whose mass matrices are looked at for their condition, about.
+/// About how many windows are used to check the condition of mass matrices.
 const LOOKED_AT: usize = 200;
-/// Largest condition number of a mass matrix in units of its diagonal: textbooks' systems stay below 100 but next to singular places.
+/// Largest condition number of a mass matrix in units of its diagonal: systems in textbooks stay below 100 except near singular positions.
 const MOST_CONDITION: f64 = 1e4;
 
 /// `true` if most of some symmetric matrices `(n, n)` have a condition number, rows and columns scaled to size 1, below
@@ -356,7 +356,7 @@ const MOST_CONDITION: f64 = 1e4;
 pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
     let mut scaled = matrices.to_vec();
     for matrix in scaled.chunks_exact_mut(n * n) {
-        // Of a positive definite matrix the largest element of each row is then its diagonal's; others need not have a diagonal.
+        // The largest element of each row of a positive definite matrix is then on the diagonal; others need not have a diagonal.
         for _ in 0..3 {
             let size = |i: usize| matrix[i * n..(i + 1) * n].iter().fold(0.0, |most: f64, x| most.max(x.abs())).sqrt();
             let sizes: Vec<f64> = (0..n).map(size).collect();
@@ -374,9 +374,9 @@ pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
     4 * regular.count() > 3 * (values.len() / n)
 }
 
-/// Terms that act on coordinates of their own.
+/// Terms that act on separate coordinates.
 pub(super) struct Group {
-    /// Places of the terms in the set.
+    /// Indices of the terms in the set.
     pub places: Vec<usize>,
     /// Share of the coordinates.
     pub share: f64,

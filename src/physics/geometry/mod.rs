@@ -47,7 +47,7 @@ use alloc::vec::Vec;
 /// Coordinates of a metric whose curvature is computed, at most: a tensor has `n^4` numbers, a point takes 190 MB.
 pub(crate) const MOST_COORDINATES: usize = 32;
 
-/// Points of so many coordinates whose geometry is held at a time: about a million numbers of a tensor.
+/// Number of points, for a number of coordinates, whose geometry is kept at a time: about a million numbers of a tensor.
 pub(crate) fn at_once(n: usize) -> usize {
     ((1 << 20) / n.pow(4).max(1)).max(1)
 }

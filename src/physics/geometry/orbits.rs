@@ -121,7 +121,7 @@ impl<S: Scalar> Symmetric<S> {
     }
 }
 
-/// Steps of a search, a factor of the radius each.
+/// Steps of a search, each by a factor of the radius.
 const STEPS: usize = 400;
 
 impl<S: Scalar> Equator<'_, S> {

@@ -2,7 +2,7 @@
 //!
 //! Neighbouring smoothed accelerations have correlated errors and are regressors themselves, so that the standard errors of least squares are
 //! too small by factors and some bias remains. The recording is therefore simulated: the true motion is given by polynomials of a higher degree,
-//! the true forces are those that the fitted constants need along it; noise of encoders and forces is drawn anew, and everything is smoothed and
+//! the true forces are those that the fitted constants need along it; noise of encoders and forces is drawn again, and everything is smoothed and
 //! fitted again. The mean change of the constants is their bias, which is subtracted; the scatter is their standard error (Efron and Tibshirani,
 //! An Introduction to the Bootstrap, 1993, sections 6.5 and 10.2). The residuals of the copies show what a correct model leaves at every sample.
 

@@ -61,8 +61,8 @@ pub(super) struct ByForces {
     pub here: Vec<Vec<f64>>,
 }
 
-/// Spreads coordinate `i` of states evenly over a range. Numbers of different `kind`, positions, velocities and what drives them, do not follow
-/// each other: these are multiples of different irrational numbers.
+/// Spreads coordinate `i` of states evenly over a range. Positions, velocities and drives, the `kind`s of numbers, are independent: they are
+/// multiples of different irrational numbers.
 fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize), [low, high]: [f64; 2]) {
     let turn = ((kind * n + i + 2) as f64).powf(0.7);
     for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
@@ -95,7 +95,7 @@ impl Examiner<'_> {
         self.coordinates.len()
     }
 
-    /// Recorded states: starts of segments, or of few segments the states along them.
+    /// Recorded states: the initial states of segments or, for few segments, the states along them.
     fn recorded(&self, x: &[f64]) -> Probe {
         let n = self.n();
         let mut probe = Probe { q: Vec::new(), v: Vec::new(), force: Vec::new() };
@@ -121,7 +121,7 @@ impl Examiner<'_> {
         probe
     }
 
-    /// Changes of accelerations along directions over `sizes`, a column each, and the effects of their unknowns each for itself, summed.
+    /// Changes of accelerations along directions over `sizes`, a column each, and the summed separate effects of their unknowns.
     fn effects(&self, place: &Place<'_>, probe: &Probe, sizes: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
         let (n, m) = (self.n(), self.problem.chosen.len());
         let values = self.problem.parameters(place.x);
@@ -164,7 +164,7 @@ impl Examiner<'_> {
         [wider(&recorded.q, &self.bounds.positions), wider(&recorded.v, &self.bounds.velocities)]
     }
 
-    /// States spread evenly over the wider ranges, whatever the recorded ones are.
+    /// States spread evenly over the wider ranges, independent of the recorded ones.
     fn wild(&self, recorded: &Probe) -> Probe {
         let n = self.n();
         let mut wild = recorded.clone();
@@ -176,7 +176,7 @@ impl Examiner<'_> {
         wild
     }
 
-    /// Recorded states under forces of the size of those of inertia.
+    /// Recorded states under forces as large as the inertial forces.
     fn driven(&self, x: &[f64], (recorded, sizes): (&Probe, &[f64])) -> Probe {
         let n = self.n();
         let mut driven = recorded.clone();
@@ -240,7 +240,7 @@ impl Examiner<'_> {
         cures.join("; ")
     }
 
-    /// The coordinate that is to go farther or faster so that directions are told best.
+    /// The coordinate whose larger range or speed determines the directions best.
     fn farther(&self, recorded: &Probe, effects: impl Fn(&Probe) -> Vec<Vec<f64>>) -> Option<String> {
         let n = self.n();
         let [wide_q, wide_v] = self.ranges(recorded);
@@ -275,7 +275,7 @@ impl Examiner<'_> {
         best.1
     }
 
-    /// Open directions of equations that are linear in the constants, by what would tell them.
+    /// Open directions of equations that are linear in the constants, by what would determine them.
     pub fn by_forces(&self, x: &[f64], (changes, size): (&[Vec<f64>], &[f64])) -> ByForces {
         let (n, m) = (self.n(), self.problem.chosen.len());
         let probe = self.wild(&self.recorded(x));
@@ -312,8 +312,8 @@ impl Examiner<'_> {
     }
 }
 
-/// Effects of changes by the slopes of equations, a column each, and those of their unknowns each for itself, the root of the sum of squares,
-/// of which every row has `least` at least.
+/// Effects of changes by the derivatives of equations, a column each, and the separate effects of their unknowns: the root of the sum of
+/// squares, to which every row contributes at least `least`.
 fn effects(
     (rows, least): (&[&[f64]], f64),
     changes: &[Vec<f64>],
@@ -333,7 +333,7 @@ fn effects(
     changes.iter().map(of).unzip()
 }
 
-/// Columns over their sizes, where these are not 0.
+/// Columns divided by their sizes where these are not 0.
 fn scaled(columns: Vec<Vec<f64>>, sizes: &[f64]) -> Vec<Vec<f64>> {
     let over =
         |(column, size): (Vec<f64>, &f64)| column.into_iter().map(|x| if *size > 0.0 { x / size } else { x }).collect();

@@ -1,4 +1,4 @@
-//! Levenberg and Marquardt's method for constants, sensors and starts, and when it has arrived.
+//! Levenberg and Marquardt's method for constants, sensors and initial states, with its test of convergence.
 //!
 //! Of the normal equations of constants `c` and starts `s` the starts are eliminated: `S = H_cc - H_cs H_ss^-1 H_sc`, with the gradient
 //! `g = g_c - H_cs H_ss^-1 g_s`. A step is `dc = (S + damping diag S)^-1 g` and `ds = (H_ss + damping diag H_ss)^-1 g_s - H_ss^-1 H_sc dc`. Starts
@@ -14,42 +14,42 @@ use super::solve::{Linear, Normal, Problem, Sensor, SensorKind};
 use crate::lagrangian::system::Range;
 use crate::linalg::{Workspace, dot, eigh};
 
-/// Newton decrement over the variance of the noise that is arrived at: constants within a thousandth of their standard errors.
+/// Newton decrement over the variance of the noise at which the search has converged: constants within a thousandth of their standard errors.
 const ARRIVED: f64 = 1e-6;
-/// The same where no step, however short, gains anything: what rounding and the steps of the integrator leave.
+/// The same if no step, however short, gains anything: the effect of rounding and of the integrator's steps.
 const STUCK: f64 = 1e-3;
-/// The same where forces have noise: how the filter depends on the unknowns is no part of the slopes, and the least sum of squares lies off by a
-/// tenth of a standard error.
+/// The same for noisy forces: the derivatives neglect how the filter depends on the unknowns, which shifts the minimum by a tenth of a standard
+/// error.
 const STUCK_FILTERED: f64 = 1e-2;
-/// Part of the diagonal that keeps normal equations regular.
+/// Share of the diagonal that is added to keep the normal equations regular.
 pub(super) const RIDGE: f64 = 1e-11;
-/// Rounding of an eliminated diagonal, over the diagonal before starts were eliminated.
+/// Rounding of an eliminated diagonal, over the diagonal before initial states were eliminated.
 const ELIMINATION: f64 = 1e-14;
-/// Part of the effect of an unknown, squared, that other starts do not have; integrators are no better.
+/// Squared share of the effect of an unknown that other initial states cannot reproduce; the accuracy of integrators.
 const LIKE_STARTS: f64 = 1e-8;
-/// Effect of an unknown on the motion, over the motion itself and squared, that is rounding alone.
+/// Squared effect of an unknown on the motion, over the motion itself, that is only rounding.
 const NO_EFFECT: f64 = 1e-22;
-/// The same while the search goes on, where a constant may be far smaller than it is to be.
+/// The same during the search, where a constant may be far smaller than its final value.
 pub(super) const SILENT: f64 = 1e-26;
 const FIRST_DAMPING: f64 = 1e-4;
 pub(super) const LEAST_DAMPING: f64 = 1e-10;
-/// Damping beyond which nothing gets better.
+/// Damping beyond which no step improves the fit.
 pub(super) const MOST_DAMPING: f64 = 1e8;
-/// Gain of starts, over the sum of squares, that is none while they settle.
+/// Gain of initial states, over the sum of squares, that counts as zero while they converge.
 const SETTLED: f64 = 1e-4;
-/// Sum of squares, of each residual, of a segment that cannot be followed.
+/// Sum of squares per residual that is assumed for a segment that cannot be followed.
 pub(super) const FAILED: f64 = 1e8;
-/// Part of a positive constant that a step leaves at least.
+/// Smallest share of a positive constant that a step leaves.
 const LEAST_PART: f64 = 0.1;
-/// Least value of a positive constant, over the value it starts with: its bound.
+/// Smallest value of a positive constant, over its starting value: its bound.
 const LEAST_POSITIVE: f64 = 1e-12;
-/// Largest delay of a sensor in usual steps between samples.
+/// Largest delay of a sensor, in typical steps between samples.
 const MOST_DELAY: f64 = 20.0;
 
 /// A solution of damped normal equations.
 pub(super) struct Step {
     pub change: Vec<f64>,
-    /// Decrease of the sum of squares that the quadratic model promises of the whole step if it is undamped.
+    /// Decrease of the sum of squares that the quadratic model predicts for the whole undamped step.
     pub decrement: f64,
     /// Constants that stay at the bound of their range.
     pub held: Vec<bool>,
@@ -91,8 +91,8 @@ impl Problem<'_> {
         numbers * self.spread.iter().zip(&self.sigma).map(square).sum::<f64>() / self.sigma.len() as f64
     }
 
-    /// A change of an unknown that is large: its value, of a sensor's offset the spread of the motion, of its delay ten samples; 0 of a
-    /// constant that may be 0.
+    /// A large change of an unknown: its value; for a sensor's offset the spread of the motion, for its delay ten samples; 0 for a constant that
+    /// may be 0.
     pub fn scale(&self, unknown: usize, x: f64) -> f64 {
         match unknown.checked_sub(self.chosen.len()).map(|k| self.sensors[k]) {
             None => x.abs(),
@@ -102,7 +102,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Unknowns of which a change of their size, or of that of their starting value, has less than this in the normal equations.
+    /// Unknowns for which a change by their size, or by that of their starting value, has less than this effect in the normal equations.
     pub(super) fn too_weak(&self, x: &[f64], normal: &Normal, least: f64) -> Vec<bool> {
         let m = normal.right.len();
         let given = |k: usize| self.chosen.get(k).map_or(0.0, |&at| self.values[at].abs());
@@ -110,7 +110,7 @@ impl Problem<'_> {
         (0..m).map(|k| normal.matrix[k * m + k] * scale(k).powi(2) <= least).collect()
     }
 
-    /// Unknowns that the motion shows nothing of: their effect is rounding, or what other starts do as well.
+    /// Unknowns without a visible effect on the motion: their effect is rounding, or other initial states reproduce it.
     pub fn without_effect(&self, x: &[f64], normal: &Normal) -> Vec<bool> {
         self.muted(x, normal, NO_EFFECT)
     }
@@ -124,7 +124,7 @@ impl Problem<'_> {
         muted
     }
 
-    /// The step by damped normal equations of unknowns that are not muted. Constants at a bound that would leave their range stay.
+    /// The step from the damped normal equations of unknowns that are not muted. Constants at a bound that would leave their range stay.
     pub(super) fn step(&self, x: &[f64], normal: &Normal, muted: &[bool], damping: f64) -> Step {
         let m = normal.right.len();
         let at_bound: Vec<bool> = (0..m).map(|k| x[k] <= self.bound(k)).collect();
@@ -142,7 +142,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Notes how far the normal equations are from their minimum.
+    /// Records how far the normal equations are from their minimum.
     pub(super) fn judge(&self, x: &[f64], normal: &mut Normal, muted: &[bool], stuck: bool) {
         let step = self.step(x, normal, muted, 0.0);
         let variance = (normal.square / normal.count.max(1.0)).max(1.0);
@@ -159,7 +159,7 @@ impl Problem<'_> {
         normal.converged = normal.failed == 0 && normal.decrement < left;
     }
 
-    /// Fits unknowns and starts; the normal equations at the end, undamped, say whether the search has converged.
+    /// Fits unknowns and initial states; the undamped normal equations at the end show whether the search has converged.
     pub fn fit(&self, x: &mut Vec<f64>, segments: &mut [Segment], iterations: usize) -> Normal {
         let mut best = self.all(x, segments);
         let mut normal = self.normal(&best, segments);
@@ -199,7 +199,7 @@ impl Problem<'_> {
         normal
     }
 
-    /// The step of a start, given that of the unknowns.
+    /// The step of an initial state, given that of the unknowns.
     fn start_step(&self, linear: &Linear, change: &[f64], damping: f64) -> Vec<f64> {
         let (starts, width) = (linear.right.len() - self.unknowns(), linear.right.len());
         let own = times(starts, &self.start_inverse(linear, damping), &linear.right[..starts]);
@@ -211,7 +211,7 @@ impl Problem<'_> {
         own.iter().zip(followed).map(|(own, followed)| own - followed).collect()
     }
 
-    /// Moves the starts alone, each segment for itself; `false` if they could go on gaining.
+    /// Moves only the initial states, each segment separately; `false` if they could still gain.
     pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
         let still = vec![0.0; self.unknowns()];
         let mut best = self.all(x, segments);
@@ -250,8 +250,8 @@ impl Problem<'_> {
     }
 }
 
-/// Solution of damped normal equations for some unknowns, the others held: by the eigenvectors of the matrix of correlations, whose
-/// eigenvalues below rounding count as rounding.
+/// Solution of damped normal equations for some unknowns with the others held fixed, by the eigenvectors of the correlation matrix; eigenvalues
+/// below rounding count as rounding.
 fn solution(normal: &Normal, free: &[usize], damping: f64) -> Vec<f64> {
     let (m, count) = (normal.right.len(), free.len());
     let mut change = vec![0.0; m];
@@ -274,7 +274,7 @@ fn solution(normal: &Normal, free: &[usize], damping: f64) -> Vec<f64> {
     change
 }
 
-/// Leaves unknowns out of normal equations: they stay where they are.
+/// Removes unknowns from normal equations: they keep their values.
 pub(super) fn mute(muted: &[bool], matrix: &mut [f64], right: &mut [f64]) {
     let m = right.len();
     for (k, _) in muted.iter().enumerate().filter(|(_, muted)| **muted) {

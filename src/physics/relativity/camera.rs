@@ -1,4 +1,4 @@
-//! The camera: where it stands, how it moves, and the direction of every pixel.
+//! The camera: its position and motion, and the direction of every pixel.
 
 use super::coordinates::{Chart, depends_on_time};
 use super::orbits::{along, dot, lower, norm, product, times};
@@ -115,7 +115,7 @@ impl Tetrad {
     /// The frame of a camera in a metric, by the method of Gram and Schmidt: velocity, forward, right, up.
     ///
     /// # Errors
-    /// [`RelativityError`]: a model that is no metric of space-time, a camera that cannot rest where it stands.
+    /// [`RelativityError`]: a model that is not a metric of space-time, a camera that cannot rest where it stands.
     pub fn new(model: &dyn EulerLagrange<f64>, camera: &Camera) -> Result<Self, RelativityError> {
         camera.check()?;
         camera.chart.check(model.coordinates())?;

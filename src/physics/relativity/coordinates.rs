@@ -7,7 +7,7 @@ use crate::geometry::{Equator, Turn, TurningPoint};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms, acting_groups};
 use std::f64::consts::FRAC_PI_2;
 
-/// Which coordinates say where something is around a centre; the axis of a spin is `z`.
+/// Coordinates that give positions around a centre; the axis of a spin is `z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CentralCoordinates {
@@ -298,7 +298,7 @@ pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: 
     let v: Vec<f64> = (0..q.len()).map(|k| (1.0 + 2.4 * k as f64).cos()).collect();
     let accelerations = |q: &[f64], v: &[f64]| {
         let mut terms = Terms::default();
-        // Where the metric is none it says nothing.
+        // Where the metric is invalid, nothing is compared.
         let _ = model.terms(q, v, Request::ACCELERATION, &mut terms);
         terms.acceleration
     };
@@ -310,7 +310,7 @@ pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: 
     acting_groups(4, (&q, &v), &accelerations, &[noise; 4]).contains(&vec![chart.time])
 }
 
-/// Later and earlier times at which a metric is looked at, in parts of the span that matters.
+/// Later and earlier times at which a metric is compared, as shares of the relevant span.
 const TIMES: [f64; 3] = [0.31, -0.57, 1.0];
 /// Differences of the components, over the largest of them, that are rounding.
 const ROUNDING: f64 = 1e-9;
@@ -337,7 +337,7 @@ pub fn depends_on_time(
             Ok(()) | Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. }) => {}
             Err(error) => return Err(error),
         }
-        // Of times at which the metric is none there is nothing to compare; if it is one at some times, it must be the same at all.
+        // Times at which the metric is invalid are skipped; at all others it must be the same.
         let metrics = || terms.mass_matrix.chunks_exact(n * n);
         let Some(one) = metrics().find(|g| g.iter().all(|g| g.is_finite())) else { continue };
         let most = one.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
@@ -449,7 +449,7 @@ mod tests {
         let points = [0.0, 1.0, 0.0, 30.0];
         let of = |rate: f64| depends_on_time(&Mechanics::<_, f64>::new(Breathing(rate), vec![]), 0, &points, 7.0);
         assert_eq!([of(0.0), of(1e-12), of(1e-6), of(0.5)], [Ok(false), Ok(false), Ok(true), Ok(true)]);
-        // A metric that is none at the present is one at other times: `(dx^2 - dt^2)/t^2`.
+        // A metric that is invalid at present but valid at other times: `(dx^2 - dt^2)/t^2`.
         let shrinking = Mechanics::<_, f64>::new(Shrinking, vec![]);
         assert_eq!(depends_on_time(&shrinking, 0, &points, 7.0), Ok(true));
         // Of a place it may depend.

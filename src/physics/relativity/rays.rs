@@ -16,7 +16,7 @@ pub enum RayOutcome {
     Captured,
     /// It came from far away: the place on the sky, a unit vector of space.
     Escaped([f64; 3]),
-    /// Neither, within the steps allowed, or it met a place where the metric is none.
+    /// Neither, within the steps allowed, or it reached a point where the metric is invalid.
     Unfinished,
 }
 
@@ -171,7 +171,7 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    /// Accelerations of states, one by one `NaN` where the metric is none.
+    /// Accelerations of states, each `NaN` where the metric is invalid.
     fn accelerations(&mut self, q: &[[f64; 4]], k: &[[f64; 4]], to: &mut Vec<[f64; 4]>) -> Result<(), RelativityError> {
         let outcome = self.model.terms(q.as_flattened(), k.as_flattened(), Request::ACCELERATION, &mut self.terms);
         let (found, []) = self.terms.acceleration.as_chunks::<4>() else { return Err(no_accelerations(outcome)) };

@@ -24,7 +24,7 @@ pub struct Reading {
     pub learned: Option<f64>,
     /// Error, relative where there is an exact value; none if it has no learned one.
     pub error: Option<f64>,
-    /// Error that is aimed at.
+    /// Target error.
     pub aim: f64,
 }
 
@@ -45,7 +45,7 @@ pub struct LearnedHole<'a> {
 
 /// Points of the deviation of the metric.
 const POINTS: usize = 4000;
-/// Distance from which the mass is read, where nothing but its attraction is left.
+/// Distance at which the mass is read, where only its attraction remains.
 const FAR: f64 = 1e6;
 /// Semilatus rectum over mass, and eccentricity, of bound orbits.
 const ORBITS: [(f64, f64); 8] =
@@ -65,7 +65,7 @@ impl LearnedHole<'_> {
         Reading { quantity: quantity.into(), exact: None, learned: None, error, aim }
     }
 
-    /// Something of both metrics.
+    /// A quantity of both metrics; none where the learned one does not have it.
     fn both<T>(
         &self,
         of: impl Fn(&dyn EulerLagrange<f64>) -> Result<T, GeometryError>,
@@ -183,7 +183,7 @@ impl LearnedHole<'_> {
                     let found = radial_period(model, (&q, &v), self.around, (4.0 * kepler, kepler / SAMPLES))?;
                     Some(found.advance)
                 };
-                // What falls in or turns elsewhere is no orbit between the two.
+                // Orbits that fall in or turn elsewhere do not lie between the two.
                 let Some(truth) = advance(self.exact).filter(|advance| *advance > 0.0) else { continue };
                 let name = format!("periastron advance, p = {p} M, e = {e}{suffix} [rad]");
                 all.extend(Self::reading(name, Some(truth), advance(self.learned), 2e-3));

@@ -211,7 +211,7 @@ fn mistakes_are_named() {
     let model = hole("schwarzschild-cartesian", &[]);
     let usual = Tracing::of(&camera);
     let near = Camera { distance: 1.9, ..camera };
-    assert!(traced(&*model, near, usual).contains("no camera rests"));
+    assert!(traced(&*model, near, usual).contains("no camera can be at rest"));
     assert!(traced(&flat([1; 4]), camera, usual).contains("0 negative and 4 positive"));
     assert!(traced(&*hole("kepler", &[]), camera, usual).contains("found 2 coordinates"));
     let twice = Chart { time: 1, ..Chart::default() };

@@ -26,9 +26,9 @@ pub struct Algebra {
     pub name: Option<String>,
 }
 
-/// Fields whose algebra is looked at, at most: beyond, their commutators take minutes.
+/// Largest number of fields whose algebra is computed: beyond, their commutators take minutes.
 pub(crate) const MOST_FIELDS: usize = 200;
-/// States at which commutators are looked at, at most, and products of numbers that are worth it: seconds.
+/// Largest number of states at which commutators are computed, and of products of numbers, which take seconds.
 const STATES: (usize, usize) = (400, 10_000_000_000);
 
 impl Algebra {
@@ -108,7 +108,7 @@ struct At {
     slopes: Vec<Vec<f64>>,
 }
 
-/// Fields at about so many states that are spread over the sample.
+/// Fields at about this many states, spread over the sample.
 fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> Vec<At> {
     let (n, spread) = (sample.n, sample.spread());
     let step = (sample.len() / states).max(1);
@@ -171,7 +171,7 @@ const SEMISIMPLE: [(usize, usize, &str); 13] = [
     (4, 6, "so(3,2)"),
 ];
 
-/// Dimensions of an algebra that is looked into, at most: what has a name here is far smaller.
+/// Largest dimension of an algebra that is identified: named ones are far smaller.
 const MOST: usize = 64;
 
 /// Name of the algebra with these constants, known to `tolerance`; `None` for one that is not known here.
@@ -288,7 +288,7 @@ fn euclidean(c: &Constants, derived: &Orthonormal, tolerance: f64) -> Option<Str
 fn bracket(c: &Constants, x: &[f64], y: &[f64]) -> Vec<f64> {
     let m = c.len();
     let mut result = vec![0.0; m];
-    // Most elements that are asked for have few components.
+    // Most elements that are requested have few components.
     for (a, x) in x.iter().enumerate().filter(|(_, x)| **x != 0.0) {
         for (b, y) in y.iter().enumerate().filter(|(_, y)| **y != 0.0) {
             super::null_space::add(&mut result, &c[a][b], x * y);
@@ -307,7 +307,7 @@ fn derived(c: &Constants, tolerance: f64) -> Orthonormal {
 /// Orthonormal basis of the commutators of elements.
 fn commutators(c: &Constants, of: &[Vec<f64>], tolerance: f64) -> Orthonormal {
     let all = of.iter().enumerate().flat_map(|(k, x)| of[k + 1..].iter().map(move |y| bracket(c, x, y)));
-    // The largest first: the remainders of small ones are judged beside them.
+    // The largest first: the remainders of small ones are compared with them.
     let mut all: Vec<Vec<f64>> = all.filter(|x| dot(x, x).sqrt() > tolerance).collect();
     all.sort_by(|a, b| dot(b, b).total_cmp(&dot(a, a)));
     orthonormal(&all, tolerance.sqrt())

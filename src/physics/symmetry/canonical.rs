@@ -60,7 +60,7 @@ impl<S: Scalar> CanonicalForm<S> {
         action.fold(-self.lagrangian, |sum, x| sum + x)
     }
 
-    /// Terms of `L` at velocities `(batch, n)` turned into those of `L'`, whichever there are.
+    /// Turns the given terms of `L` at velocities `(batch, n)` into those of `L'`.
     fn apply(&self, v: &[S], terms: &mut Terms<S>) {
         let (s, n, energy) = (self.factor, self.momentum.len().max(1), self.energy());
         for (value, v) in terms.lagrangian.iter_mut().zip(v.chunks_exact(n)) {
@@ -108,7 +108,7 @@ fn positive<S: Scalar>(n: usize, matrix: &[S], signs: Inertia) -> bool {
     if signs.positive != signs.negative {
         return signs.positive > signs.negative;
     }
-    // What is below the root of the rounding beside its row is zero for one of two equal matrices and not for the other.
+    // A number below the root of the rounding, relative to its row, can be zero for one of two equal matrices and not for the other.
     let rounding = Real::sqrt(S::epsilon());
     let counts = |&(i, j): &(usize, usize)| {
         let largest = matrix[i * n..(i + 1) * n].iter().fold(zero, |most, x| Real::max(most, Real::abs(*x)));

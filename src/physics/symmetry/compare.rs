@@ -24,7 +24,7 @@ pub struct Comparison {
     pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,
-    /// `F` as a formula, without functions whose coefficients the states do not tell.
+    /// `F` as a formula, without functions whose coefficients the states do not determine.
     pub gauge_formula: String,
     /// The constant, in the unit of `A`.
     pub constant: f64,
@@ -106,7 +106,7 @@ struct Fit {
     factors: Vec<f64>,
     on_shell: bool,
     gauge: Vec<f64>,
-    /// The same without what the states do not tell.
+    /// The same without what the states do not determine.
     known_gauge: Vec<f64>,
     constant: f64,
     rest: f64,
@@ -156,7 +156,7 @@ impl Fit {
         let mut gauge = plain.given(&plain.along(&rest), columns.len());
         let mut known_gauge = null_space::significant(&columns, &rest, DEPENDENT);
         let whole = norm(&target);
-        // Roundings are no terms.
+        // Roundings are not terms.
         for (k, column) in columns.iter().enumerate() {
             for c in [&mut gauge[k], &mut known_gauge[k]] {
                 if (*c * norm(column)).abs() <= ROUNDING * whole {
@@ -340,7 +340,7 @@ fn factors(
     let plain = orthonormal(&columns, DEPENDENT);
     let mut solution = plain.given(&plain.along(&target), columns.len());
     let whole = norm(&target);
-    // Roundings are no terms.
+    // Roundings are not terms.
     for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
         if (*c * norm(column)).abs() <= ROUNDING * whole {
             *c = 0.0;

@@ -11,7 +11,7 @@ use crate::linalg::singular;
 
 /// Part of the length of a column that must be left beside the others.
 const DEPENDENT: f64 = 1e-7;
-/// Part of a quantity that is no combination of known ones, for it to be new.
+/// Part of a quantity that is not a combination of known ones, for it to be new.
 const NEW: f64 = 1e-4;
 
 /// Factor of a function of the coordinates.
@@ -96,7 +96,7 @@ pub struct Quadratic {
     pub singular_values: Vec<f64>,
     /// Number of all conserved quantities that were found, known ones included, and the gap behind them.
     pub separation: Separation,
-    /// Those that are no combinations of the energy, of the charges of the point symmetries and of the products of these, in
+    /// Those that are not combinations of the energy, of the charges of the point symmetries and of the products of these, in
     /// reduced echelon form; empty if there is no gap.
     pub conserved: Vec<Conserved>,
 }
@@ -222,7 +222,7 @@ fn search(
     let found = singular(&plain.mixed(&rates)).ok_or(SymmetryError::NotFinite { what: "the rate of a quantity" })?;
     let separation = Separation::new(&found.values, tolerance);
     let zero = &found.vectors[..separation.count.unwrap_or(0)];
-    // What of every conserved quantity is no combination of known ones.
+    // The part of every conserved quantity that is not a combination of known ones.
     let mix = |share: &[f64], columns: &[Vec<f64>]| {
         let mut total = vec![0.0; columns.first().map_or(0, Vec::len)];
         share.iter().zip(columns).for_each(|(x, column)| super::null_space::add(&mut total, column, *x));

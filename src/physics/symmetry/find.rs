@@ -8,10 +8,10 @@ use super::{Algebra, Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
 
-/// Functions of which less is left beside the others count as their combinations, as `sin^2` beside `1` and `cos 2x`.
+/// Functions with a smaller part independent of the others count as combinations of them, as `sin^2` beside `1` and `cos 2x`.
 const DEPENDENT: f64 = 1e-7;
 
-/// Growth of the noise of a field that fewer functions are worth.
+/// Largest factor by which the noise of a field may grow to need fewer functions.
 const WORSE: f64 = 3.0;
 
 /// Fields times the cube of their unknown coefficients up to which fields of few functions are sought, half a minute.
@@ -33,12 +33,12 @@ pub struct Symmetries {
     pub fields: Vec<Field>,
     /// The Lie algebra that they form; `None` without symmetries and of more than 200.
     pub algebra: Option<Algebra>,
-    /// States that were looked at, and those of them at which the mass matrix is singular to working precision. There `L` is
+    /// States that were examined, and those of them at which the mass matrix is singular to working precision. There `L` is
     /// degenerate: it determines no motion, and whatever function multiplies a null direction of it may be a symmetry.
     pub states: usize,
     /// See `states`.
     pub singular_states: usize,
-    /// What is conserved because `L` does not depend on the parameter of the motion.
+    /// The quantity that is conserved because `L` does not depend on the parameter of the motion.
     pub invariant: Invariant,
     /// For every field, whether its charge is conserved: forces beside those of `L`, such as friction, do no work along the field.
     pub conserved: Vec<bool>,
@@ -202,14 +202,14 @@ struct Unknowns<'a> {
 }
 
 impl Unknowns<'_> {
-    /// Change of `L` along the field `function d_i` at all states, and its part that is no gauge.
+    /// Change of `L` along the field `function d_i` at all states, and its part that is not a gauge.
     fn change(&self, i: usize, f: usize) -> Vec<f64> {
         let n = self.sample.n;
         let rows = self.columns.values[f].iter().zip(&self.columns.rates[f]).zip(self.weight).enumerate();
         rows.map(|(k, ((x, dx), w))| w * (self.sample.g[k * n + i] * x + self.sample.p[k * n + i] * dx)).collect()
     }
 
-    /// Takes out of rows of coefficients what is noise of functions that nearly depend on each other.
+    /// Removes the noise of nearly dependent functions from rows of coefficients.
     fn refine(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
         let (n, functions) = (self.sample.n, self.columns.values.len());
         let column = |place: usize| match (place / functions, place % functions) {

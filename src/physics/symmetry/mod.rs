@@ -87,7 +87,7 @@ pub enum SymmetryError {
     /// Terms that are not finite.
     #[error("the terms of L are finite at only {found} of {states} states")]
     States {
-        /// States asked for.
+        /// States requested.
         states: usize,
         /// States with finite terms.
         found: usize,

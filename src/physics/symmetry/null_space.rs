@@ -5,7 +5,7 @@ use crate::lagrangian::EulerLagrange;
 use crate::linalg::{MatMut, MatRef, Workspace, gemm, solve};
 use serde::Serialize;
 
-/// Singular values cut into those that count as zero and the others.
+/// Singular values divided into those that count as zero and the others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Separation {
     /// Number of values that count as zero; `None` if there is no gap.
@@ -28,7 +28,7 @@ const ABOVE: f64 = 30.0;
 /// meant to be zero.
 pub(crate) const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
 
-/// Refuses a tolerance that is none of [`TOLERANCES`].
+/// Refuses a tolerance outside [`TOLERANCES`].
 ///
 /// # Errors
 /// [`SymmetryError::Tolerance`].
@@ -90,7 +90,7 @@ pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact
     all
 }
 
-/// States that are looked at for so many unknown coefficients, of a Lagrangian that is written down or of a model.
+/// States that are examined for so many unknown coefficients, of a Lagrangian that is written down or of a model.
 pub fn enough(unknowns: usize, exact: bool) -> usize {
     (2 * unknowns).max(if exact { 400 } else { 1000 })
 }
@@ -120,7 +120,7 @@ pub fn most_symmetries(
 
 /// Brings `rows` into reduced echelon form, in place: every row has a pivot 1, which the others have 0.
 ///
-/// Columns are weighed by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots,
+/// Columns are weighted by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots,
 /// as long as their entry is not much smaller than the largest that is left. What is below `noise` of the largest weighed entry of
 /// its row becomes 0. Rows are ordered by their pivots. The first `fixed` rows take part before the others. Entries beyond the
 /// weighed columns are carried along.
@@ -223,7 +223,7 @@ pub(crate) fn orthonormal(given: &[Vec<f64>], least: f64) -> Orthonormal {
 }
 
 impl Orthonormal {
-    /// The columns of the kept `given`, mixed as the orthonormal ones are.
+    /// The kept columns of `given`, combined like the orthonormal ones.
     pub fn mixed(&self, given: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let one = |mix: &Vec<f64>| {
             let mut sum = vec![0.0; given.first().map_or(0, Vec::len)];
@@ -284,7 +284,7 @@ pub(crate) fn add(a: &mut [f64], b: &[f64], factor: f64) {
 
 /// Parts of the largest entry below which entries are tried without, one after the other.
 const NEGLIGIBLE: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
-/// Residual of the null vector of few entries, in units of the one it replaces and of `1/NEGLIGIBLE` roundings.
+/// Residual of the null vector with few entries, in units of the one it replaces and of `1/NEGLIGIBLE` roundings.
 const WORSE: f64 = 10.0;
 
 /// Replaces a null vector of columns by one without its small entries, if that is one too.
@@ -359,7 +359,7 @@ fn fitted(
     Some(solution)
 }
 
-/// What a column explains below so many standard errors is chance.
+/// A column that explains less than this many standard errors counts as chance.
 const CERTAIN: f64 = 3.0;
 
 /// Coefficients of the least-squares fit of columns to a target, 0 for those that the fit does not know: columns that explain no more beside
@@ -375,7 +375,7 @@ pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) 
         plain.remove(&mut rest);
         let free = target.len().saturating_sub(plain.columns.len()).max(1) as f64;
         let square = dot(&rest, &rest) / free;
-        // What was left out explained no more than as many columns of noise do.
+        // The columns left out explained no more than as many columns of noise do.
         let left_out = (columns.len() - support.len()) as f64;
         if let Some((before, least)) = &found
             && square > least * (1.0 + CERTAIN * (2.0 * left_out).sqrt() / free)
@@ -412,7 +412,7 @@ const STEPS: usize = 12;
 const NOTHING: f64 = 2e-3;
 /// Price of an entry, in units of the squared noise.
 const PRICE: f64 = 0.3;
-/// Growth of the residual that few entries are worth.
+/// Largest growth of the residual that few entries justify.
 const WORTH: f64 = 2.0;
 
 /// The vector of fewest entries near `start` that solves `A x = 0` to about `noise`, where `gram` is `A^T A`; `None` if it is
@@ -525,7 +525,7 @@ mod tests {
         let target: Vec<f64> = a.iter().zip(&noise).map(|(a, x)| 3.0 * a + 0.1 * x).collect();
         let found = significant(&[a.clone(), b, c.clone()], &target, 1e-9);
         assert!((found[0] - 3.0).abs() < 0.05 && found[1..] == [0.0; 2], "{found:?}");
-        // Of two that explain it together neither is left out.
+        // Of two columns that explain it together, neither is left out.
         let both: Vec<f64> = a.iter().zip(&c).map(|(a, c)| a - 0.5 * c).collect();
         let found = significant(&[a, c], &both, 1e-9);
         assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] + 0.5).abs() < 1e-12, "{found:?}");
@@ -538,7 +538,7 @@ mod tests {
         let mut vector = vec![2.0 + 1e-6, -1.0, 1e-6];
         refine(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-6);
         assert!((vector[0] / vector[1] + 2.0).abs() < 1e-14 && vector[2] == 0.0, "{vector:?}");
-        // An entry that is needed stays, small as it is.
+        // A needed entry stays, however small.
         let columns = [vec![1.0, 0.0, 0.0], vec![1.0, 0.0, 1e-5], vec![0.0, 0.0, 1.0]];
         let mut vector = vec![1.0, -1.0, 1e-5];
         refine(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-12);

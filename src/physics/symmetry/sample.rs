@@ -1,4 +1,4 @@
-//! States at which a Lagrangian is asked for its terms, with the size of motion and of terms there.
+//! States at which the terms of a Lagrangian are evaluated, with typical sizes of motion and of terms there.
 
 use super::SymmetryError;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -197,7 +197,7 @@ impl Sample {
         self.force.get(k * self.n + i).copied().unwrap_or(0.0)
     }
 
-    /// What every motion conserves because `L` does not depend on its parameter.
+    /// The quantity that every motion conserves because `L` does not depend on its parameter.
     pub fn invariant(&self) -> Invariant {
         match 2 * self.indefinite > self.len() {
             _ if !self.force.is_empty() => Invariant::Nothing,
@@ -236,7 +236,7 @@ pub struct Region {
     pub velocity: Vec<[f64; 2]>,
 }
 
-/// Draws that are refused, for each that is taken, before it is given up.
+/// Largest number of refused draws for each accepted one.
 const REFUSED: usize = 100;
 
 impl Region {
@@ -271,7 +271,7 @@ impl Region {
     }
 }
 
-/// Part of every range of its training that a model is looked at: near the edges it is worst.
+/// Share of every training range over which a model is examined: near the edges it is worst.
 const INNER: f64 = 0.8;
 
 /// The middle of a range.

@@ -1,4 +1,4 @@
-//! What is said of symmetries.
+//! Report of symmetries.
 
 use super::{Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
@@ -28,15 +28,15 @@ pub struct SymmetrySummary {
     pub structure_constants: Vec<Vec<Vec<f64>>>,
     /// Negative, positive and zero eigenvalues of the Killing form.
     pub killing_form_signature: Option<[usize; 3]>,
-    /// Rest of the commutators beside combinations of the fields, relative; null where it was not looked at.
+    /// Relative remainder of the commutators beyond combinations of the fields; null if not computed.
     pub closure: Option<f64>,
-    /// Whether that is nothing but noise, so that the fields are an algebra.
+    /// Whether that remainder is only noise, so that the fields form an algebra.
     pub closes: Option<bool>,
     /// States at which the mass matrix is singular.
     pub singular_states: usize,
     /// The symmetry of the parameter of the motion, which is not counted, and what it conserves.
     pub time_translation: bool,
-    /// What is conserved by it.
+    /// The quantity that it conserves.
     pub invariant: Invariant,
     /// Of every field, whether its charge is conserved: friction may change it.
     pub conserved: Vec<bool>,
@@ -46,7 +46,7 @@ pub struct SymmetrySummary {
     pub basis: Degrees,
     /// Functions of the basis.
     pub functions: usize,
-    /// States that were looked at.
+    /// States that were examined.
     pub points: usize,
     /// Seed of the states.
     pub seed: u64,
@@ -113,7 +113,7 @@ impl Symmetries {
 }
 
 impl SymmetrySummary {
-    /// The number of symmetries, the fields, their algebra, and what was looked at.
+    /// The number of symmetries, the fields, their algebra, and the search that found them.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         self.say_count(&mut findings);
@@ -165,7 +165,7 @@ impl SymmetrySummary {
         findings.line(format!("{gap}{} functions ({}), {} states", self.functions, self.basis, self.points));
     }
 
-    /// What the fields are, in words.
+    /// Describes the fields in words.
     fn algebra(&self) -> String {
         match (self.closes, self.closure, self.name.as_deref()) {
             (Some(true), _, Some(name)) => format!("algebra {name}"),

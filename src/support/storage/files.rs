@@ -14,7 +14,7 @@ pub trait Files: Send + Sync {
     /// # Errors
     /// The system's.
     fn create(&self, path: &Path) -> io::Result<File>;
-    /// Writes some of the bytes and says how many.
+    /// Writes some of the bytes and returns how many.
     ///
     /// # Errors
     /// The system's.
@@ -438,13 +438,13 @@ pub fn remove_leftovers(files: &dyn Files, directory: &Path) {
         let name = entry.file_name();
         let dead = name.to_str().and_then(writer).is_some_and(|process| !processes.join(process.to_string()).exists());
         if dead {
-            // What cannot be removed does no harm.
+            // A file that cannot be removed does no harm.
             let _ = files.remove(&entry.path());
         }
     }
 }
 
-/// The process that a temporary file's name tells.
+/// The process named by a temporary file.
 fn writer(name: &str) -> Option<u32> {
     let mut parts = name.strip_prefix('.')?.strip_suffix(TEMPORARY)?.rsplit('.');
     parts.next()?.parse::<usize>().ok()?;

@@ -121,7 +121,7 @@ impl Drop for DirectoryLock {
 /// The beginning of a file, as far as it is text.
 fn text(file: &mut File) -> String {
     let mut text = String::new();
-    // What cannot be read says nothing about the holder; the lock itself is what counts.
+    // An unreadable file does not identify the holder; only the lock itself counts.
     let _ = file.take(MAX_BYTES).read_to_string(&mut text);
     text
 }

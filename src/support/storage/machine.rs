@@ -1,4 +1,4 @@
-//! Memory that the machine has left, and threads: as many as were asked for, or as many as the system starts.
+//! Memory that the machine has left, and threads: as many as were requested, or as many as the system starts.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -18,7 +18,7 @@ fn parse(text: &str) -> Option<u64> {
 /// Threads at most: more gain nothing on any machine, and thousands bring it down.
 pub const MOST_THREADS: usize = 256;
 
-/// `work` on so many threads at a time, this one among them; on fewer where the system starts no more.
+/// Runs `work` on a number of threads at a time, including this one; on fewer if the system starts no more.
 fn abreast(threads: usize, work: impl Fn() + Sync) {
     scope(|scope| {
         for _ in 1..threads.min(MOST_THREADS) {

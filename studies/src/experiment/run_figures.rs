@@ -152,7 +152,7 @@ mod tests {
         assert_eq!((figures[0].heading.as_str(), figures[0].caption.as_str()), ("Double pendulum: at rest", "or not"));
         assert_eq!((figures[1].heading.as_str(), figures[1].caption.as_str()), ("Double pendulum", ""));
         assert_eq!(found("training-range"), ["det_mass_matrix.svg", "det_mass_matrix_fast.svg"]);
-        // A report stays small, and says what it leaves out.
+        // A report stays small and names the pictures left out.
         let taken = |count| {
             (0..count).map(|_| RunPicture { svg: vec![b'x'; 300_000], heading: String::new(), caption: "a".into() })
         };

@@ -14,9 +14,9 @@ const LEGEND: (f64, f64, f64) = (12.5, 18.0, 22.0);
 const DECADES: f64 = 1e-18;
 /// Widths of a line, and of one that another is drawn over.
 const WIDTHS: (f64, f64) = (1.1, 3.4);
-/// Width of each of several lines that swing so often that they would fill the picture.
+/// Width of each of several lines that oscillate so fast that they would fill the picture.
 const DENSE: f64 = 0.7;
-/// Points from which on a line may be one of these.
+/// Points at and above which a line may be one of these.
 const MANY: usize = 500;
 /// The colour of a line that another is drawn over.
 const UNDER: &str = "#7FB8DC";
@@ -62,7 +62,7 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
     }
 
     let mut inner = Panel::new(area.width, area.height);
-    // What others are drawn over comes first.
+    // Lines that are drawn over others come last.
     let mut order: Vec<usize> = (0..series.len()).collect();
     order.sort_by_key(|&index| series[index].over);
     for index in order {
@@ -212,7 +212,7 @@ mod tests {
             let near = few.windows(2).map(|pair| distance(point, pair[0], pair[1])).fold(f64::INFINITY, f64::min);
             assert!(near <= 0.1 + 1e-12, "{near}");
         }
-        // What swings within a pixel keeps its extremes.
+        // Oscillations within a pixel keep their extremes.
         let noise: Vec<(f64, f64)> = (0..9000).map(|k| (0.01 * f64::from(k), f64::from(k % 7))).collect();
         let few = simplify(&noise, 0.1);
         assert!(

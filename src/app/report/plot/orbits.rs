@@ -72,7 +72,7 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
     for over in [false, true] {
         for (index, orbit) in orbits.iter().enumerate().filter(|(_, orbit)| orbit.over == over) {
             let (colour, width) = if over { (LINES[index % LINES.len()], OVER_WIDTH) } else { BELOW_LINE };
-            // Far outside is as good as anywhere outside.
+            // Any position outside will do.
             let near =
                 |(x, y): (f64, f64)| (x.clamp(-area.width, 2.0 * area.width), y.clamp(-area.height, 2.0 * area.height));
             let lines = stretches(&orbit.points).into_iter().filter(|stretch| stretch.len() > 1);
@@ -135,7 +135,7 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
     let piece = longest.div_ceil(PIECES).max(2);
     let mut panels = Vec::new();
     for path in &trace.paths {
-        // What leaves the window is a gap.
+        // Points outside the window form a gap.
         let gap = (f64::NAN, f64::NAN);
         let points: Vec<(f64, f64)> = path.points.iter().map(|p| if inside(p) { *p } else { gap }).collect();
         let Some(&first) = points.iter().find(|p| fine(p.0) && fine(p.1)) else { continue };

@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 0.08;
 /// Width of a letter over the size of its font, about.
 const LETTER: f64 = 0.56;
 
-/// Where a text stands.
+/// Position of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -105,7 +105,7 @@ impl Panel {
     pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], colour: &str, width: f64) {
         let mut d = String::new();
         for line in lines {
-            // Tenths of a pixel, each point relative to the one before.
+            // Tenths of a pixel, each point relative to the previous one.
             let mut points = simplify(line, TOLERANCE).into_iter();
             let tenths = |(x, y): (f64, f64)| ((10.0 * x).round() as i64, (10.0 * y).round() as i64);
             let Some(mut before) = points.next().map(tenths) else { continue };
@@ -183,9 +183,9 @@ pub(super) fn short(x: f64) -> String {
     if text == "-0" { "0".to_string() } else { text.to_string() }
 }
 
-/// Colours that people with any colour vision tell apart (Wong 2011), yellow left out.
+/// Colours that are distinguishable with any colour vision (Wong 2011), without yellow.
 pub(super) const LINES: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333"];
-/// Colour of what deserves attention: the start of a path, a wrong sign.
+/// Colour of highlights: the start of a path, a wrong sign.
 pub(super) const MARK: &str = "#D55E00";
 /// Colour of places without a value.
 pub(super) const GAP: [u8; 3] = [0xbb, 0xbb, 0xbb];

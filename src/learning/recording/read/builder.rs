@@ -12,7 +12,7 @@ const MOST: usize = 100_000;
 
 /// A trajectory while its rows come in.
 pub struct TrackBuilder {
-    /// Value of the column that tells trajectories apart.
+    /// Value of the column that distinguishes trajectories.
     pub label: Option<String>,
     /// Rows of its samples.
     pub rows: Rows,

@@ -49,7 +49,7 @@ pub enum Problem {
         /// Longest line.
         limit: u64,
     },
-    /// A used column stands twice in the header.
+    /// A used column appears twice in the header.
     #[error("row {row}: duplicate column {name}")]
     Duplicate {
         /// Row of the header.
@@ -91,7 +91,7 @@ pub enum Problem {
     Header {
         /// The row.
         row: u64,
-        /// Text that stands there.
+        /// Text found there.
         found: String,
     },
     /// A row with too few or too many fields.
@@ -113,7 +113,7 @@ pub enum Problem {
         row: u64,
         /// Name of the column.
         column: String,
-        /// Text that stands there.
+        /// Text found there.
         found: String,
     },
     /// A decimal comma.
@@ -123,7 +123,7 @@ pub enum Problem {
         row: u64,
         /// Name of the column.
         column: String,
-        /// Text that stands there.
+        /// Text found there.
         found: String,
     },
     /// Time stands still or goes back.
@@ -142,20 +142,20 @@ pub enum Problem {
         /// A possible reason.
         hint: &'static str,
     },
-    /// A standard deviation that is none.
+    /// An invalid standard deviation.
     #[error("row {row}, column {column}: expected a standard deviation above 0, found {found}")]
     Error {
         /// The row.
         row: u64,
         /// The column.
         column: String,
-        /// What stands there.
+        /// The text found there.
         found: f64,
     },
     /// A header and nothing below.
     #[error("no rows of numbers")]
     NoRows,
-    /// Too little to learn from.
+    /// Too few rows for a fit.
     #[error("expected at least {least} rows without a gap in time, found {found}")]
     TooFew {
         /// Fewest samples of a trajectory.

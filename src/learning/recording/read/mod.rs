@@ -31,7 +31,7 @@ const MAX_BYTES: u64 = 1 << 36;
 
 /// Reads recorded trajectories.
 ///
-/// Every file holds one trajectory, or several told apart by a column; long gaps in time cut them further. The format is recognised
+/// Every file holds one trajectory, or several distinguished by a column; long gaps in time cut them further. The format is recognised
 /// by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order),
 /// anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks, with or without a header and with
 /// comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Numbers are converted to SI; angles are

@@ -8,12 +8,12 @@ use std::f64::consts::TAU;
 
 /// Fewest samples of a trajectory.
 pub const LEAST: usize = 16;
-/// Difference in rad of two guesses of the way of an angle across a gap from which on neither is believed.
+/// Difference in rad of two guesses of the way of an angle across a gap at and above which neither is believed.
 const UNSURE: f64 = 1.5;
 
 /// Adds the stretches of a trajectory between long gaps, those of few samples left out; gives the samples of the longest.
 ///
-/// A trajectory goes on across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
+/// A trajectory continues across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
 /// is a guess, and where gaps are longer, it is cut unless it is to stay whole.
 pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedRecording) -> usize {
     let TrackBuilder { label, rows, mut track, error, .. } = builder;
@@ -80,7 +80,7 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
     most
 }
 
-/// Full turns by which the coordinates must be moved from sample `k + 1` on so that they go on across the gap before it as they moved
+/// Full turns by which the coordinates must be moved from sample `k + 1` on so that they continue across the gap before it as they moved
 /// before and after; none if that is a guess.
 fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize) -> Option<Vec<f64>> {
     let (n, gap) = (periodic.len(), track.times[k + 1] - track.times[k]);

@@ -24,7 +24,7 @@ pub struct Selection {
     pub values: Vec<Used>,
     /// `true` if the first of them is the time.
     pub timed: bool,
-    /// The column that tells trajectories apart.
+    /// The column that distinguishes trajectories.
     pub trajectory: Option<Used>,
 }
 

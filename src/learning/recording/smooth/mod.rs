@@ -306,7 +306,7 @@ impl Smoothing {
     }
 }
 
-/// Noise of positions over noise of velocities in s, within what steps of time can tell apart.
+/// Noise of positions over noise of velocities in s, within what steps of time can distinguish.
 fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
     let ratio = (position.sigma / velocity.sigma).clamp(1e-6 * step, 1e6 * step);
     ratio.is_finite().then_some(ratio)

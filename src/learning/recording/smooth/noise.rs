@@ -3,7 +3,7 @@
 use crate::recording::statistics::{rms, robust_deviation};
 use serde::Serialize;
 
-/// Most contrasts that are looked at for one estimate.
+/// Most contrasts that are examined for one estimate.
 const MOST: usize = 1 << 16;
 
 /// Orders of differences that are tried.
@@ -16,7 +16,7 @@ pub struct Noise {
     pub sigma: f64,
     /// Order of the differences that gave it.
     pub order: usize,
-    /// `true` if higher differences agree. If not, the motion is sampled too coarsely to be told from noise, and `sigma`
+    /// `true` if higher differences agree. If not, the motion is sampled too coarsely to be distinguished from noise, and `sigma`
     /// is an upper bound.
     pub resolved: bool,
 }

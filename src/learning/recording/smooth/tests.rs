@@ -58,7 +58,7 @@ fn relative_errors(smoothed: &Smoothed, i: usize, biased: f64) -> [Vec<f64>; 3] 
     })
 }
 
-/// Share of the errors that are no larger than so many times what is said.
+/// Share of the errors within a multiple of the stated ones.
 fn within(relative: &[f64], times: f64) -> f64 {
     relative.iter().filter(|x| x.abs() <= times).count() as f64 / relative.len() as f64
 }
@@ -73,7 +73,7 @@ fn errors_are_as_large_as_said() {
         (even(4000, 0.01), 1e-2, Some(0.05)),
     ] {
         let recording = recording(vec![track(times, sigma, velocity_sigma, 5)]);
-        // A short window: noise alone. The chosen one: noise and bias, which is no normal variable.
+        // A short window: noise alone. The chosen one: noise and bias, which is not a normal variable.
         for window in [Some(11), None] {
             let biased = if window.is_some() { 0.0 } else { 1.0 };
             let options = SmoothOptions { window, ..SmoothOptions::default() };

@@ -131,7 +131,7 @@ impl Accelerations {
 struct Course {
     /// Squared errors, bias and variance together, of the windows in their order; of those too long for the trajectory none.
     squares: Vec<f64>,
-    /// The part of each that is no chance.
+    /// The part of each that is not due to chance.
     sure: Vec<f64>,
     /// Number of the window with the least error, up to where the error is plainly larger again.
     best: usize,

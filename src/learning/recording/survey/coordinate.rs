@@ -21,7 +21,7 @@ pub struct CoordinateSurvey {
     pub noise: f64,
     /// The noise over the range.
     pub noise_relative: f64,
-    /// `true` if motion and noise can be told apart; if not, `noise` is an upper bound.
+    /// `true` if motion and noise can be distinguished; if not, `noise` is an upper bound.
     pub noise_resolved: bool,
     /// Root mean square of the velocity.
     pub velocity: f64,

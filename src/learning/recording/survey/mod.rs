@@ -18,7 +18,7 @@ use warnings::compare;
 
 /// Samples per period of the fast motion below which sampling is called coarse.
 pub(crate) const FEW_SAMPLES: f64 = 20.0;
-/// A step of an angle, in rad, from which on unwrapping is a guess.
+/// A step of an angle, in rad, at and above which unwrapping is a guess.
 const GUESS: f64 = 2.0;
 
 /// Settings of a survey.
@@ -55,11 +55,11 @@ pub(crate) struct TrajectorySurvey {
     pub end: f64,
     /// Samples per second, by the usual step.
     pub rate: f64,
-    /// Standard deviation of the steps that are no gaps over the usual one.
+    /// Standard deviation of the steps that are not gaps over the usual one.
     pub jitter: f64,
 }
 
-/// Everything there is to say.
+/// The full report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Survey {
     /// Files read.
@@ -74,7 +74,7 @@ pub struct Survey {
     pub(crate) tracks: Vec<TrajectorySurvey>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
-    /// Short gaps in time, across which trajectories go on.
+    /// Short gaps in time, across which trajectories continue.
     pub bridged: Bridged,
     /// Long gaps in time, which cut trajectories.
     pub cuts: Vec<Cut>,
@@ -94,7 +94,7 @@ pub struct Survey {
     pub(crate) held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
-    /// Names of coordinates that stand still: nothing can be learned from them.
+    /// Names of coordinates that stand still: nothing can be learned about them.
     pub motionless: Vec<String>,
     /// Names of coordinates that follow from those before them: nothing can be learned of both.
     pub copies: Vec<String>,
@@ -115,7 +115,7 @@ pub(crate) fn plan(recording: &Recording, options: &SmoothOptions) -> Result<(Sm
     Ok((alone, planned))
 }
 
-/// Looks at a recording. Every sample is looked at once; windows of smoothing are tried at places spread evenly, so that
+/// Looks at a recording. Every sample is examined once; windows of smoothing are tried at places spread evenly, so that
 /// ten million samples take seconds.
 ///
 /// # Errors
@@ -182,7 +182,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     Ok(survey)
 }
 
-/// Counts steps of an angle between samples that are too long to be unwrapped; gaps have been looked at where trajectories are cut.
+/// Counts steps of an angle between samples that are too long to be unwrapped; gaps have been examined where trajectories are cut.
 fn guesses(reading: &LoadedRecording, i: usize, coordinate: &mut CoordinateSurvey) {
     let n = reading.recording.n();
     for (track, rows) in reading.recording.tracks.iter().zip(&reading.rows) {

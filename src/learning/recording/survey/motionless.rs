@@ -1,13 +1,13 @@
-//! Coordinates that stand still, by themselves or beside others.
+//! Coordinates that stand still, individually or relative to others.
 
 use crate::names::number;
 use crate::recording::smooth::Smoothing;
 use crate::recording::{RecordedTrajectory, Recording};
 
-/// Samples scatter by so many standard deviations of the noise at least where something moves.
+/// Smallest standard deviation of moving samples, in standard deviations of the noise.
 const MOVES: f64 = 1.2;
 
-/// Way in which a coordinate stands still.
+/// How a coordinate stands still.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Stillness {
@@ -32,7 +32,7 @@ impl std::fmt::Display for Stillness {
     }
 }
 
-/// Samples that are looked at for copies, about; of more, evenly spaced ones.
+/// About how many samples are examined for copies; more are thinned evenly.
 const SAMPLES: usize = 1 << 16;
 /// Part of a coordinate's motion below which what others leave of it is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -47,7 +47,7 @@ pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, St
     found
 }
 
-/// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be told from noise may
+/// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be distinguished from noise may
 /// move.
 fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<Stillness> {
     let n = recording.n();
@@ -66,7 +66,7 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
         square += values(track).map(|x| (x - mean).powi(2)).sum::<f64>();
         count += samples;
     }
-    // Numbers whose squares overflow say nothing.
+    // Numbers whose squares overflow cannot be compared.
     let still = noise.resolved && noise.sigma.is_finite() && (square / count).sqrt() <= MOVES * noise.sigma;
     still.then_some(Stillness::Noise(noise.sigma))
 }

@@ -8,7 +8,7 @@ use crate::recording::smooth::Smoothing;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// Share of the rows from which on those that are missing or left out are worth a warning.
+/// Share of the rows at and above which those that are missing or left out are worth a warning.
 const MANY: f64 = 0.01;
 
 /// One sentence each.

@@ -13,7 +13,7 @@ const STATE: &str = "state";
 /// Counts above this are refused: no training reaches it, and adding to what passes cannot overflow.
 const MOST: u64 = 1 << 52;
 
-/// What is said of a checkpoint without reading its state.
+/// Summary of a checkpoint, read without its state.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Header {
@@ -200,7 +200,7 @@ mod tests {
         assert!(back == snapshot && back.is_shooting());
     }
 
-    /// What a checksum does not tell: numbers that were never a training's.
+    /// Errors that a checksum does not detect: numbers that no training produces.
     #[test]
     fn parts_that_do_not_fit_are_refused() {
         let refused = |change: fn(&mut Snapshot<f32>)| {

@@ -1,4 +1,4 @@
-//! Checkpoints in a directory: when to write one, the newest and the one before, going on from either.
+//! Checkpoints in a directory: when to write one, the newest and the previous one, continuing from either.
 
 use super::fingerprint::{Fingerprint, Saved};
 use super::format::{Header, decode, decode_header, encode};
@@ -31,19 +31,19 @@ pub enum CheckpointInterval {
     Seconds(f64),
 }
 
-/// Why there is nothing to go on from.
+/// Why there is nothing to continue from.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
     /// No checkpoint in the directory.
     #[error("there is no checkpoint")]
     Missing,
-    /// Neither the newest checkpoint nor the one before can be read.
+    /// Neither the newest checkpoint nor the previous one can be read.
     #[error("{LATEST}: {newest}; {PREVIOUS}: {previous}")]
     Damaged {
         /// Problem of the newest.
         newest: Box<ModelFileError>,
-        /// Problem of the one before.
+        /// Problem of the previous one.
         previous: Box<ModelFileError>,
     },
     /// Written by another version.
@@ -60,7 +60,7 @@ pub enum CheckpointError {
     Data(String),
 }
 
-/// The checkpoint to go on from.
+/// The checkpoint to continue from.
 #[derive(Clone, Debug)]
 pub struct Restored<T> {
     /// Content of the checkpoint.
@@ -116,7 +116,7 @@ impl CheckpointManager {
         }
     }
 
-    /// Writes a checkpoint; if that fails the one before stands, training goes on, and a
+    /// Writes a checkpoint; if that fails the previous one stands, training continues, and a
     /// warning in the log tells.
     pub(crate) fn save<S: Scalar>(&self, seconds: f64, outcome: &Outcome<S>, in_progress: Option<&PhaseState<S>>) {
         let began = Instant::now();
@@ -177,7 +177,7 @@ impl CheckpointManager {
     }
 }
 
-/// Removes the checkpoints in a directory: the training has ended, or begins anew.
+/// Removes the checkpoints in a directory: the training has ended, or starts again.
 ///
 /// # Errors
 /// That of the file system.
@@ -200,7 +200,7 @@ pub fn saved(files: &dyn Files, directory: &Path) -> Result<Restored<Saved>, Che
     newest_whole(files, directory, |bytes| decode_header(bytes).map(Header::into_saved))
 }
 
-/// Reads the newest checkpoint, or the one before if the newest is damaged or missing.
+/// Reads the newest checkpoint, or the previous one if the newest is damaged or missing.
 fn newest_whole<T>(
     files: &dyn Files,
     directory: &Path,

@@ -1,4 +1,4 @@
-//! Checkpoints: everything a training needs to go on as if it had never stopped.
+//! Checkpoints: everything a training needs to continue as if it had never stopped.
 //!
 //! A checkpoint is a safetensors file of the same make as a model file ([`container`](crate::storage::container)), metadata key
 //! `lnn-checkpoint`. Its description holds the configuration as text, checksums of the data, and the epochs and steps that are done. Its

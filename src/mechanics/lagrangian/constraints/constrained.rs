@@ -37,7 +37,7 @@ pub enum ConstraintError {
     },
     /// Constraints of another number of coordinates or parameters.
     Shape {
-        /// What there is of them.
+        /// What is constrained.
         what: &'static str,
         /// Number expected.
         expected: usize,
@@ -148,7 +148,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
     }
 
     /// The same without the constraints that follow from those before them at all of some states, `(batch, n)` each, which are
-    /// brought to the constraints first.
+    /// projected onto the constraints first.
     ///
     /// # Errors
     /// [`ConstraintError::Contradiction`] if none of the states can be, [`ConstraintError::TooMany`] if no motion is left.

@@ -44,7 +44,7 @@ impl ExpressionConstraints {
         Self::compiled((coordinates.len(), parameters.len()), formulas.iter().copied(), &mut compiler, &scope)
     }
 
-    /// What vanishes of one row.
+    /// The formula of one row that vanishes.
     pub(crate) fn value<R: Real>(&self, row: usize, parameters: &[R], q: &[R], v: &[R]) -> R {
         self.rows[row].value.evaluate(parameters, q, v)
     }
@@ -64,7 +64,7 @@ impl ExpressionConstraints {
         Self { rows: Arc::new(rows), ..self.clone() }
     }
 
-    /// Formulas whose names mean what `scope` says.
+    /// Formulas whose names `scope` defines.
     pub(in crate::mechanics::lagrangian) fn compiled<'a>(
         (coordinates, parameters): (usize, usize),
         formulas: impl Iterator<Item = (&'a str, &'a str)>,

@@ -83,7 +83,7 @@ impl Lagrangian for Free {
 }
 
 impl FormulaConstraints {
-    /// Formulas by the name of their constraint over coordinates `NAME` and velocities `NAME_dot`: what they say vanishes.
+    /// Formulas that vanish, by the name of their constraint, over coordinates `NAME` and velocities `NAME_dot`.
     ///
     /// # Errors
     /// [`FormulaError`].

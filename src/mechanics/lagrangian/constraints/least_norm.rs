@@ -17,7 +17,7 @@ pub struct LeastNorm<M>(
     pub M,
 );
 
-/// What was chosen at one state.
+/// The choice at one state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeastNormMotion<S> {
     /// `a`, `(n)`.

@@ -49,7 +49,7 @@ pub trait Manifold<S: Scalar>: Send + Sync {
     fn pull_back(&self, state: (&[S], &[S]), along: RowAdjoint<'_, S>, derivatives: (&mut [S], &mut [S]));
 }
 
-/// What [`Manifold::pull_back`] holds.
+/// Result of [`Manifold::pull_back`].
 #[derive(Clone, Copy, Debug)]
 pub struct RowAdjoint<'a, S> {
     /// The direction `x`, `(n)`.

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 /// Steps of Newton's method.
 const MAX_STEPS: usize = 60;
-/// Defects below this many roundings of the state are none.
+/// Defects below this many roundings of the state count as zero.
 const ROUNDINGS: f64 = 1024.0;
 
 /// A state from which no way to the constraints was found.
@@ -59,7 +59,7 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
     Ok([moved(&before[0], q), moved(&before[1], v)])
 }
 
-/// What a state misses of some rows: the values of functions of the coordinates, or the rates of all rows.
+/// Defects of a state in some rows: the values of functions of the coordinates, or the rates of all rows.
 struct Defects<'a, S: Scalar> {
     manifold: &'a dyn Manifold<S>,
     of_rates: bool,

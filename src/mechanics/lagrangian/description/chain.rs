@@ -32,7 +32,7 @@ const BOUNDS: (f64, f64) = (1.0, 3.0);
 /// Part of a sine or cosine that is rounding.
 const ROUNDING: f64 = 1e-15;
 
-/// What a chain of links has in common.
+/// Settings that all links of a chain share.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct ChainDescription {
@@ -377,7 +377,7 @@ impl Description {
         formulas.any(|text| text.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name))
     }
 
-    /// A sum of terms as one: a definition if it takes one.
+    /// A sum of terms as one expression, with a definition if needed.
     fn sum(&mut self, name: String, terms: &[Term]) -> Result<Term, DescriptionError> {
         let mut all: Vec<Term> = Vec::with_capacity(terms.len());
         for term in terms.iter().filter(|term| term.factor != 0.0) {

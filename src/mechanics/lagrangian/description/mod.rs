@@ -48,7 +48,7 @@ pub struct Description {
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
-    /// What the links have in common.
+    /// Settings that all links share.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     chain: Option<ChainDescription>,
     /// Links of a chain from its base on, each with the joint that moves it, one per coordinate; a Lagrangian and a dissipation function are
@@ -64,7 +64,7 @@ pub struct Description {
     /// Formulas that vanish, by the names of the constraints: of coordinates, or linear in velocities.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub constraints: BTreeMap<String, String>,
-    /// Where constraints of these names stand in the file, if that is known.
+    /// Lines of the file with constraints of these names, if known.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) constraint_lines: ConstraintLines,
     /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
@@ -256,7 +256,7 @@ impl DescriptionError {
     }
 }
 
-/// Lines of constraints in a file by their names. Descriptions are the same wherever these stand.
+/// Lines of constraints in a file by their names. They do not affect whether descriptions are equal.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ConstraintLines(pub(crate) BTreeMap<String, usize>);
 
@@ -266,7 +266,7 @@ impl PartialEq for ConstraintLines {
     }
 }
 
-/// A description with the Lagrangian that it comes to.
+/// A description with its compiled Lagrangian.
 #[derive(Clone, Debug)]
 pub struct Described {
     /// The description, links written out.

@@ -228,12 +228,12 @@ impl Description {
         Ok(())
     }
 
-    /// The Lagrangian as it is written.
+    /// The Lagrangian as written in the file.
     fn written(&self, text: &str, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Value> {
         let expression: Expression = text.parse().map_err(DescriptionError::formula("lagrangian"))?;
         let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula("lagrangian"))?;
         let velocities = compiler.velocities(value);
-        // What constraints move needs no inertia.
+        // Coordinates that constraints move need no inertia.
         for (i, coordinate) in self.coordinates.iter().enumerate().filter(|_| self.constraints.is_empty()) {
             if !velocities.contains(&i) {
                 let name = &coordinate.name;

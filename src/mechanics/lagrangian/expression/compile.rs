@@ -53,7 +53,7 @@ pub struct Compiler {
 }
 
 impl Compiler {
-    /// Adds a formula whose names mean what `scope` says; `still` refuses velocities.
+    /// Adds a formula whose names `scope` defines; `still` refuses velocities.
     ///
     /// # Errors
     /// A name that is not in scope or not allowed, or a program that becomes too long.

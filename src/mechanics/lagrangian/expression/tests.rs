@@ -76,8 +76,8 @@ fn mistakes_are_placed_and_explained() {
     refused("x**2", "column 3: expected a number, a name or a parenthesis, found `*`; a power is written ^");
     refused("x_dott", "column 1: unknown name \"x_dott\", did you mean \"x_dot\"?");
     refused("m*theta", "column 3: unknown name \"theta\", expected one of m, x, x_dot, y, y_dot, pi");
-    refused("sinn(x)", "column 1: `sinn` is no function; did you mean \"sin\"?");
-    refused("m(x + y)", "column 1: `m` is no function; a product needs a *, as in 2*(a + b)");
+    refused("sinn(x)", "column 1: `sinn` is not a function; did you mean \"sin\"?");
+    refused("m(x + y)", "column 1: `m` is not a function; a product needs a *, as in 2*(a + b)");
     refused("cos x", "column 5: expected `(` behind the function `cos`, found `x`");
     refused("sin(x, y)", "column 6: expected `)`: `sin` takes one number, found `,`");
     refused("atan2(x)", "column 8: expected a comma: `atan2` takes two numbers, found `)`");

@@ -154,7 +154,7 @@ pub struct Linearizer<'a, S: Scalar> {
     bordered: Bordered<S>,
     /// Derivatives of the equations, or weights.
     right: Vec<S>,
-    /// What was solved for: inverses, or weights.
+    /// The solution: inverses, or weights.
     solution: Vec<S>,
     workspace: Workspace<S>,
     linearization: Linearization<S>,
@@ -190,7 +190,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         self.under(q, v, None)
     }
 
-    /// What the last call gave.
+    /// The result of the last call.
     pub(super) fn last(&self) -> &Linearization<S> {
         &self.linearization
     }

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 pub(crate) struct SlopePrograms<S> {
     /// Numbers of coordinates, and of constraints that the part knows.
     size: (usize, usize),
-    /// Of the elements of `df/d(q, v)` that are not zero, and where they stand: row and column of `2 n`.
+    /// Nonzero elements of `df/d(q, v)` and their positions: row and column of `2 n`.
     matrices: Arc<Program<S>>,
     places: Arc<[(usize, usize)]>,
     /// Of the derivatives of `weights.f` by the state and the parameters.

@@ -34,7 +34,7 @@ pub(crate) struct Rate<S> {
     symmetric: bool,
 }
 
-/// What an input of a rate is.
+/// Kind of an input of a rate.
 enum Input {
     Position(usize),
     Velocity(usize),
@@ -120,7 +120,7 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, m), symmetric })
     }
 
-    /// What input this is.
+    /// The kind of this input.
     fn input(&self, k: usize) -> Input {
         let (n, m) = self.size;
         match k.checked_sub(4 * n) {

@@ -153,7 +153,7 @@ impl Dissipation for Cubic {
     }
 }
 
-/// A model that says nothing of its derivatives.
+/// A model that gives no information about its derivatives.
 struct Plain<M>(M);
 
 impl<M: EulerLagrange<f64>> EulerLagrange<f64> for Plain<M> {

@@ -49,9 +49,9 @@ pub(super) struct Row {
     pub slides: bool,
     /// Where the ten constants of the link stand among the parameters: `m`, `h`, `Ixx`, `Ixy`, `Ixz`, `Iyy`, `Iyz`, `Izz`.
     pub inertia: [usize; 10],
-    /// Where the inertia of the drive stands.
+    /// Index of the inertia of the drive.
     pub armature: Option<usize>,
-    /// Where viscous and dry friction stand.
+    /// Indices of viscous and dry friction.
     pub friction: Option<[usize; 2]>,
 }
 
@@ -99,7 +99,7 @@ struct Link<R> {
     dry: R,
 }
 
-/// What a recursion knows of each link on its way: its frame, and what the link alone takes to move.
+/// Data of each link during a recursion: its frame, and the forces that the link alone needs to move.
 pub(super) type Passes<R> = Vec<(Frame<R>, Load<R>)>;
 
 /// A chain of links with its constants.
@@ -186,7 +186,7 @@ impl<R: Real> Link<R> {
     }
 }
 
-/// Where a link is, seen from the one before: sines and cosines of twist and angle, and the place of its origin.
+/// Where a link is, seen from the previous one: sines and cosines of twist and angle, and the place of its origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame<R> {
     twist: [R; 2],
@@ -202,7 +202,7 @@ impl<R: Real> Frame<R> {
         [c * x + s * y, c * y - s * x, z]
     }
 
-    /// `R x`: a vector of this frame in the one before.
+    /// `R x`: a vector of this frame in the previous one.
     fn outward(&self, [x, y, z]: Vector<R>) -> Vector<R> {
         let ([sa, ca], [s, c]) = (self.twist, self.turn);
         let (x, y) = (c * x - s * y, s * x + c * y);
@@ -283,7 +283,7 @@ pub(super) struct Load<R> {
 }
 
 impl<R: Real> Load<R> {
-    /// In and about the frame before.
+    /// In and about the previous frame.
     fn seen(&self, frame: &Frame<R>) -> Self {
         let force = frame.outward(self.force);
         Self { force, moment: add(frame.outward(self.moment), cross(frame.place, force)) }
@@ -291,7 +291,7 @@ impl<R: Real> Load<R> {
     fn with(&self, other: Self) -> Self {
         Self { force: add(self.force, other.force), moment: add(self.moment, other.moment) }
     }
-    /// What the joint has to bear.
+    /// Forces and moments that the joint transmits.
     fn along(&self, slides: bool) -> R {
         if slides { self.force[2] } else { self.moment[2] }
     }

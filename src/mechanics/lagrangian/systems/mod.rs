@@ -36,7 +36,7 @@ macro_rules! catalogue {
         /// The catalogue entries of all systems.
         pub(super) static SYSTEMS: &[System] = &[$($module::$system),*];
 
-        /// Where each of them stands in [`SYSTEMS`].
+        /// Index of each system in [`SYSTEMS`].
         #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
         enum Place { $($system),* }
 

@@ -215,7 +215,7 @@ impl Variables {
             if empty(a) {
                 continue;
             }
-            // What the monomial `p` may be multiplied by.
+            // The monomials by which `p` may be multiplied.
             let others = match p {
                 0 => count(n, of_b.velocities),
                 _ if p <= n => count(n, of_b.velocities.min(1)),

@@ -38,7 +38,7 @@ pub(super) fn gelu<S: Scalar>(x: S) -> Jet<S> {
     let a = bounded(x, 40.0);
     let square = a * a;
     let decay = (square * constant(-0.5)).lane_exp();
-    // What rounding the square left: e^(-(s + d)/2) = e^(-s/2) (1 - d/2).
+    // The rounding error of the square: e^(-(s + d)/2) = e^(-s/2) (1 - d/2).
     let rest = a.lane_fused(a, -square) * constant(-0.5);
     let m = rest.lane_fused(decay.mantissa, decay.mantissa);
     let density = m * inverse_sqrt_two_pi;

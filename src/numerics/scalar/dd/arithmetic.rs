@@ -189,7 +189,7 @@ impl Num for Dd {
     }
 }
 
-/// A text that is no decimal number.
+/// A text that is not a decimal number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnreadableNumber;
 

@@ -104,7 +104,7 @@ fn mark<S: Scalar>(operations: &[Operation<S>], values: &mut [Value], output: us
             Operation::Elementwise(op) => is_output[op.x] = false,
             Operation::Function(op) => (is_output[op.a], is_output[op.b]) = (false, false),
             Operation::Product(op) => match (values[op.a].kind, values[op.b].kind) {
-                // A factor that nothing moves bends nothing, but its adjoint asks for what stands beside it.
+                // A constant factor has no second derivative, but its adjoint needs the other factor.
                 (Dependence::Constant, _) => {
                     (is_output[op.a], is_output[op.b]) = (false, is_output[op.b] && is_output[out])
                 }

@@ -87,7 +87,7 @@ impl Value {
     }
 }
 
-/// Where the planes of all values stand in a buffer, in numbers per state.
+/// Offsets of the planes of all values in a buffer, in numbers per state.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     starts: Vec<usize>,

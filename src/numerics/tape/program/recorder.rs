@@ -29,7 +29,7 @@ pub(in crate::numerics::tape) enum Node<S> {
     Dense(Dense),
 }
 
-/// A dense layer: where its inputs, its weights and its biases stand.
+/// A dense layer: the positions of its inputs, weights and biases.
 #[derive(Clone, Debug)]
 pub(in crate::numerics::tape) struct Dense {
     /// Rows of the inputs.

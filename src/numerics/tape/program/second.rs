@@ -18,7 +18,7 @@ use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// Numbers by rising direction; those left out are zero.
+/// Numbers by increasing direction; those left out are zero.
 type Sparse<R> = Vec<(u32, R)>;
 
 /// Directions along which second derivatives are taken, and which of them are wanted.
@@ -29,7 +29,7 @@ pub(crate) struct Directions<R> {
     /// Inputs by which the second derivative is taken, and the direction that is the input's own: of two such inputs the derivative
     /// stands with the later one.
     pub rows: Vec<Option<u32>>,
-    /// Directions from here on are nobody's own: derivatives along them stand with every input.
+    /// Directions from here on belong to no single input: derivatives along them are kept with every input.
     pub shared: u32,
     /// Numbers of tangents at most.
     pub budget: usize,
@@ -41,7 +41,7 @@ pub(crate) struct Derivatives<R> {
     pub value: R,
     /// By every input.
     pub first: Vec<R>,
-    /// By every input and along the directions that were asked for.
+    /// By every input and along the directions that were requested.
     pub second: Vec<Sparse<R>>,
 }
 
@@ -92,7 +92,7 @@ const LISTS: usize = 8;
 enum Partials<R> {
     /// `y = f(a)`, `f'`.
     One(Unary, R),
-    /// `y = f(a, b)`, both first ones.
+    /// `y = f(a, b)` with both first derivatives.
     Two(Binary, (R, R)),
 }
 
@@ -314,7 +314,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         Curve { long: vec![(self.tangents.len() - 1, None)], short: Vec::new() }
     }
 
-    /// The tangents of the adjoint of row `x` as they go on to so many operands: added now where that takes no more products than later.
+    /// The tangents of the adjoint of row `x` as they continue to so many operands: added now where that takes no more products than later.
     fn passed_on(&mut self, z: Curve<R>, x: usize, ways: usize) -> Curve<R> {
         let is_plain = z.long.iter().all(|(_, factor)| factor.is_none());
         let later = match z.long.len() {

@@ -20,7 +20,7 @@ enum VelocityFactor {
 struct Change {
     kind: VelocityFactor,
     function: usize,
-    /// Its usual size before the data are looked at.
+    /// Its typical size before the data are considered.
     size: f64,
 }
 
@@ -339,7 +339,7 @@ mod tests {
         let sum =
             |of: &[f64], at: usize| parts.iter().map(|((k, unit), sign)| sign * unit * of[at * count + k]).sum::<f64>();
         let mut terms = Terms::default();
-        // Its mass matrix may be anything: accelerations are not asked for.
+        // Its mass matrix does not matter, because no accelerations are requested.
         let wanted = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ | Request::ENERGY;
         Mechanics::new(Mixed, vec![]).terms(&q, &v, wanted, &mut terms).unwrap();
         for i in 0..2 {

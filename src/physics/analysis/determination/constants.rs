@@ -21,7 +21,7 @@ use std::ops::Range;
 const STRETCH: usize = 40;
 /// Fewest samples of a stretch.
 const LEAST: usize = 8;
-/// Samples that are looked at; of more, evenly spaced stretches.
+/// Samples that are examined; of more, evenly spaced stretches.
 const SAMPLES: usize = 6000;
 /// Corrections of the starts.
 const CORRECTIONS: usize = 4;

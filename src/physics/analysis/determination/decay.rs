@@ -24,7 +24,7 @@ pub struct Decay {
 }
 
 impl Decay {
-    /// `true` if the motion is damped by more than chance, by enough to matter, and moves as this says.
+    /// `true` if the motion is damped by more than chance and by enough to matter, and agrees with this model.
     pub fn is_certain(&self) -> bool {
         self.rate > 4.0 * self.error && self.share > SHARE && self.left < LEFT
     }

@@ -219,10 +219,10 @@ impl Linear {
     }
 }
 
-/// States at which the energy is looked at, at most.
+/// States at which the energy is examined, at most.
 const ENERGIES: usize = 256;
 
-/// Numbers of the model that are asked for.
+/// Numbers of the model that are requested.
 struct Wanted {
     mass: Vec<Linear>,
     friction: Vec<Linear>,

@@ -25,7 +25,7 @@ pub struct Observed {
     pub missed: Vec<f64>,
 }
 
-/// States that are looked at; of more, evenly spaced ones.
+/// States that are examined; of more, evenly spaced ones.
 const STATES: usize = 4000;
 
 impl Observed {

@@ -164,7 +164,7 @@ impl Data {
             .into_iter()
             .zip(&self.observed)
             .map(|(square, [size, _, independent])| {
-                // Nothing is known better than numbers have digits.
+                // No number is known more accurately than its digits.
                 let square = square.max(1e-20 * size).max(f64::MIN_POSITIVE.sqrt());
                 independent / (square * self.states() as f64)
             })
@@ -207,7 +207,7 @@ impl Data {
     }
 }
 
-/// Share of the deviation before the data that is left after them, from which on they leave a number open.
+/// Share of the deviation before the data that is left after them, at and above which they leave a number open.
 const OPEN: f64 = 0.5;
 /// Fewest states of a group.
 const LEAST: usize = 5;

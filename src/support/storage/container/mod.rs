@@ -50,7 +50,7 @@ impl Tensor {
         Self { name, shape, dtype: stored_dtype(precision), bytes }
     }
 
-    /// Bytes as they are.
+    /// Raw bytes.
     pub fn bytes(name: String, bytes: Vec<u8>) -> Self {
         Self { name, shape: vec![bytes.len()], dtype: Dtype::U8, bytes }
     }
@@ -158,7 +158,7 @@ impl Tensors<'_> {
         })
     }
 
-    /// Bytes as they are.
+    /// Raw bytes.
     ///
     /// # Errors
     /// They are missing, or of another type.

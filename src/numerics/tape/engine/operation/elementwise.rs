@@ -14,7 +14,7 @@ pub(crate) struct Elementwise {
     pub f: Unary,
     pub x: usize,
     pub units: usize,
-    /// Where the derivatives of `f` stand, in numbers per state.
+    /// Offsets of the derivatives of `f`, in numbers per state.
     pub slope: usize,
 }
 
@@ -186,7 +186,7 @@ impl Elementwise {
                         b0[u] = curved * xst[u] + d3[u] * outer[u] * (xs[u] * xt[u]);
                     }
                 }
-                // One direction or none: what would be multiplied by the other is left out.
+                // With one direction or none, products with the missing ones are left out.
                 (false, _) => {
                     for (u, b0) in b0.iter_mut().enumerate() {
                         let mut sum = if has(y0) { d1[u] * y0[u] } else { <S as Real>::zero() };

@@ -207,7 +207,7 @@ impl Product {
     }
 }
 
-/// Adjoints of the factor `x`, which stands beside `y`.
+/// Adjoints of the factor `x` of `x y`.
 fn add_to_factor<S: Scalar>((x, y): (usize, usize), out: usize, sweep: &mut MixedReverse<'_, S>) {
     let [own, cx, cy] = [out, x, y].map(|value| sweep.channels(value));
     let (factor, mixed, lanes) = (sweep.kept.forward.plane(y, 0), sweep.mixed, sweep.adjoints.lanes);

@@ -121,7 +121,7 @@ pub(super) struct MixedReverse<'a, S> {
     pub adjoints: Store<'a, S>,
     pub order: Order,
     pub gradient: &'a mut [S],
-    /// Derivatives by the scaled state, `(lanes, n)` each, if they are asked for.
+    /// Derivatives by the scaled state, `(lanes, n)` each, if they are requested.
     pub inputs: Option<(&'a mut [S], &'a mut [S])>,
     /// `true` if the second direction moves along `(v, 0)`.
     pub moving: bool,
@@ -173,7 +173,7 @@ impl<S: Scalar> Operation<S> {
 }
 
 impl<S: Scalar> MixedReverse<'_, S> {
-    /// `true` if adjoints of a value lead to anything asked for.
+    /// `true` if adjoints of a value lead to a requested result.
     pub fn wants(&self, value: usize) -> bool {
         let value = &self.kept.values[value];
         value.trainable || (self.inputs.is_some() && value.kind != Dependence::Constant)
