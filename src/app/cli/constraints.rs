@@ -29,7 +29,7 @@ pub struct Args {
     /// Largest total degree of the coefficients of the velocities.
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole(0, MOST_DEGREE))]
     velocity_degree: usize,
-    /// Write the table [constraints] to this file, for a system file or `lnn rollout --constraints`.
+    /// Write the table [constraints] to this file; system files and roll-outs take it.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Replace the file.

@@ -249,7 +249,7 @@ fn torques_of_a_log_tell_the_sums_of_the_constants_of_an_arm() {
     assert_eq!(rolled.code, Some(0), "{}", rolled.stderr);
     // Sensors are a matter of the motion.
     for follows in [["--offset", "q1"], ["--segment", "1"]] {
-        lnn(&[&asked[..7], &["--targets", "forces"], &follows].concat()).refused(2, &["--targets", "sensors"]);
+        lnn(&[&asked[..7], &["--targets", "forces"], &follows].concat()).refused(2, &["--targets", "sensor constants"]);
     }
     lnn(&["identify", &data, "--system", ARM, "--targets", "forces"]).refused(2, &["--targets", "known forces"]);
 }

@@ -120,8 +120,8 @@ fn a_motion_never_takes_the_place_of_its_model() {
         lnn(&[&base[..], more].concat())
     };
     for out in ["m", "d/../m", "./m", "d/link", "hard"] {
-        rollout(&path(out), &[]).refused(1, &["never overwritten"]);
-        rollout(&path(out), &["--overwrite"]).refused(1, &["never overwritten"]);
+        rollout(&path(out), &[]).refused(1, &["never overwrites"]);
+        rollout(&path(out), &["--overwrite"]).refused(1, &["never overwrites"]);
     }
     let other = folder.file("thesis.txt", "years of work");
     rollout(&other, &[]).refused(1, &["thesis.txt: there is a file already; --overwrite replaces it"]);
@@ -153,7 +153,7 @@ fn system_files_and_tables_are_replaced_on_demand_alone() {
         let run = |out: &str, more: &[&str]| lnn(&[command, &["--out", out], more].concat());
         run(&kept, &[]).refused(1, &["kept.toml: there is a file already; --overwrite replaces it"]);
         if own.ends_with(".toml") || command[0] == "constraints" {
-            run(own, &["--overwrite"]).refused(1, &["this command reads it", "never overwritten"]);
+            run(own, &["--overwrite"]).refused(1, &["this command reads it", "never overwrites"]);
         }
         assert_eq!(fs::read_to_string(&kept).unwrap(), "# months of work");
     }

@@ -98,7 +98,7 @@ fn held_out_states_outside_of_the_learned_ones_are_named() {
     let (run, found) = fitted(&folder, &data, "out", &columns);
     let share = found["outside"].as_f64().unwrap();
     assert!(share > 0.5, "{share}");
-    assert!(run.stdout.contains("outside of the learned"), "{}", run.stdout);
+    assert!(run.stdout.contains("outside the learned"), "{}", run.stdout);
 }
 
 #[test]

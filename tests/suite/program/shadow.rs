@@ -108,7 +108,7 @@ fn cameras_that_cannot_be_are_refused() {
         lnn(&[&["shadow", "--system", system, "--out", &out], more].concat()).refused(2, parts);
     };
     let hole = "kerr-cartesian";
-    refused(hole, &["--distance", "1.8"], &["--observer", "no camera rests"]);
+    refused(hole, &["--distance", "1.8"], &["--observer", "no camera can be at rest"]);
     refused(hole, &["--inclination", "181"], &["--inclination"]);
     refused(hole, &["--field-of-view", "180"], &["--field-of-view"]);
     refused(hole, &["--space", "x,y"], &["--space", "expected three names, found 2"]);
