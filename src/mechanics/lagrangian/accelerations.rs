@@ -105,7 +105,7 @@ impl<S: Scalar> Solved<'static, S> {
             Some(outputs)
         });
         let (program, parameters) = (Arc::new(program.ok()?), parameters.to_vec());
-        Some(Self { motion, program, parameters, pivots, linearized: Arc::default(), flag: None })
+        Some(Self { motion, program, parameters, pivots, linearized: Arc::new(OnceLock::new()), flag: None })
     }
 
     /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.

@@ -157,6 +157,7 @@ pub struct Certificate {
     #[cfg_attr(feature = "serde", serde(skip))]
     tree: Tree,
     /// Coordinates that are reduced to one turn before the Lagrangian sees them.
+    #[cfg_attr(feature = "serde", serde(skip))]
     wrapped: Vec<bool>,
 }
 
