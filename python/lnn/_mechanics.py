@@ -229,8 +229,6 @@ class Mechanics:
         points = None if points is None else whole("points", points, 1)
         tolerance = None if tolerance is None else real("tolerance", tolerance, positive=True)
         fields = read_result(self._subject.symmetries(bounds_of(region), basis, points, whole("seed", seed), tolerance))
-        for name in "system", "closes", "functions", "seed":
-            del fields[name]
         for name in "structure_constants", "singular_values":
             fields[name] = np.array(fields[name], float)
         return Symmetries(**fields)

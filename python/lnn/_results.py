@@ -180,14 +180,17 @@ class Symmetries(_Shown):
     time_translation : bool
         Whether what `invariant` names is conserved.
     singular_values : (unknowns,)
-    basis : dict of str to int
-        Highest degrees of the functions that fields are made of, by family.
+    basis : str
+        Highest degrees of the functions that fields are made of.
+    system : str
+    functions, seed : int
+        Functions of the basis, and the seed of the states.
     points, singular_states : int
         States that were looked at, and those among them at which the mass matrix is singular.
     killing_form_signature : (int, int, int) or None
         Negative, positive and zero eigenvalues of the Killing form.
-    closure : float or None
-        Rest of the commutators beside combinations of the fields, relative.
+    closure, closes : float or None, bool or None
+        Relative remainder of the commutators outside the span of the fields, and whether it is zero to rounding, so that the fields form an algebra.
     conserved : list of bool
         Of every field, whether its charge is conserved: friction may change it.
     invariant : str
@@ -202,13 +205,17 @@ class Symmetries(_Shown):
     structure_constants: np.ndarray
     time_translation: bool
     singular_values: np.ndarray
-    basis: dict[str, int]
+    basis: str
     points: int
     killing_form_signature: tuple[int, int, int] | None
     closure: float | None
     conserved: list[bool]
     invariant: str
     singular_states: int
+    system: str
+    closes: bool | None
+    functions: int
+    seed: int
     _text: str = field(repr=False)
     _html: str = field(repr=False)
 
@@ -381,13 +388,13 @@ class Formula(_Shown):
     coordinates: tuple[str, ...]
     toml: str = field(repr=False)
     rust: str = field(repr=False)
-    _latex: tuple[str, ...] = field(repr=False)
+    _latex: tuple[str, str] = field(repr=False)
     _text: str = field(repr=False)
     _html: str = field(repr=False)
 
     def latex(self, dissipation: bool = False) -> str:
         """L, or D, in LaTeX."""
-        return self._latex[dissipation] if dissipation < len(self._latex) else "0"
+        return self._latex[dissipation]
 
     def sympy(self, dissipation: bool = False) -> sympy.Expr:
         """L, or D, as an expression of SymPy in real symbols: ``x`` for a coordinate, ``x_dot`` for its velocity."""

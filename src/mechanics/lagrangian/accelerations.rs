@@ -16,8 +16,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 /// Number of products of an elimination that is always worth recording: it takes less time than a call of a solver.
 pub(super) const SMALL: usize = 60;
 
-/// Coordinates of a Lagrangian at most for which one program of the linearization takes less time than programs of its parts: in turns by
-/// `cargo bench --bench hessians -- linearization`, 0.4 times at two, 0.6 at four, the same at six and eight.
+/// Largest number of coordinates of a Lagrangian whose linearization is recorded as one program. Three turns of `cargo bench --bench hessians
+/// -- linearization` beside programs of the parts: 0.4 to 0.5 times the time at two coordinates, 0.4 to 1.4 at four.
 const WHOLE: usize = 4;
 
 /// Records the equations of motion of a model, at a state and with parameters that are being recorded.
@@ -36,7 +36,7 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
     }
 
     /// Largest number of coordinates for which the linearization has a separate program.
-    fn whole_coordinates(&self) -> usize {
+    fn linearized_up_to(&self) -> usize {
         0
     }
 }
@@ -134,7 +134,7 @@ impl<S: Scalar> RecordMotion<S> for Value<S> {
         Rate::of_lagrangian(&self.0).ok()?.slopes(x, parameters, &[])
     }
 
-    fn whole_coordinates(&self) -> usize {
+    fn linearized_up_to(&self) -> usize {
         WHOLE
     }
 }

@@ -154,7 +154,7 @@ pub struct FormulaSummary<'a> {
     lagrangian: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     dissipation: Option<String>,
-    latex: Vec<String>,
+    latex: [String; 2],
     rust: String,
     toml: String,
     coordinates: &'a [String],
@@ -421,12 +421,11 @@ impl FoundFormula {
 
     /// The formula as JSON, with the dissipation function if one was searched; `name` is the name of the system in its file.
     pub fn summary(&self, name: &str) -> FormulaSummary<'_> {
-        let wanted = if self.friction { &[false, true][..] } else { &[false] };
         FormulaSummary {
             verdict: self.verdict,
             lagrangian: self.text(false),
             dissipation: self.friction.then(|| self.text(true)),
-            latex: wanted.iter().map(|&dissipation| self.latex(dissipation)).collect(),
+            latex: [false, true].map(|dissipation| self.latex(dissipation)),
             rust: self.rust(),
             toml: self.system_file(name),
             coordinates: &self.coordinates,

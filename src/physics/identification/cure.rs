@@ -233,8 +233,10 @@ impl Examiner<'_> {
             (_, true) => {
                 return "fix one of the constants: no motion separates them, the equations contain only their combinations".into();
             }
-            (1, _) => cures.push("fix one of the constants in any case: no motion determines it".to_string()),
-            (never, _) => cures.push(format!("fix {never} of the constants in any case: no motion determines them")),
+            (1, _) => cures.push("in addition, fix one of the constants: no motion determines all of them".to_string()),
+            (never, _) => {
+                cures.push(format!("in addition, fix {never} of the constants: no motion determines all of them"))
+            }
         }
         cures.dedup();
         cures.join("; ")

@@ -1,7 +1,6 @@
 //! Functions of the coordinates: products of one factor per coordinate, of powers, harmonics, cotangents, hyperbolic functions.
 
 use crate::names::unknown;
-use serde::Serialize;
 use std::f64::consts::PI;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
@@ -39,7 +38,7 @@ impl Chart {
 }
 
 /// Highest degrees of the functions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Degrees {
     /// Total degree of the powers of the coordinates that are not angles; a reciprocal power counts as the power does.
     pub polynomial: usize,

@@ -3,7 +3,7 @@
 use super::{Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
 use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Singular values that are shown beyond the gap, and at most.
 const BEYOND: usize = 5;
@@ -42,7 +42,8 @@ pub struct SymmetrySummary {
     pub conserved: Vec<bool>,
     /// Ascending.
     pub singular_values: Vec<f64>,
-    /// Degrees of the functions that fields are made of.
+    /// Degrees of the functions that fields are made of, as [`Degrees`] are read.
+    #[serde(serialize_with = "as_text")]
     pub basis: Degrees,
     /// Functions of the basis.
     pub functions: usize,
@@ -53,6 +54,10 @@ pub struct SymmetrySummary {
     /// Quantities of second degree in the momenta, if they were looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadratic: Option<QuadraticSummary>,
+}
+
+fn as_text<S: Serializer>(basis: &Degrees, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(basis)
 }
 
 /// Conserved quantities of second degree in the momenta, in formulas.

@@ -12,6 +12,8 @@ pub mod kinds;
 pub mod matrices;
 pub mod nested;
 #[cfg(feature = "cli")]
+pub mod penalties;
+#[cfg(feature = "cli")]
 pub mod program;
 #[path = "../../../src/properties.rs"]
 mod properties;

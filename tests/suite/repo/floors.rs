@@ -40,7 +40,7 @@ fn position(module: &str) -> Option<usize> {
 }
 
 /// Source files below `src` that are not tests, by their path there, without comments and tests.
-fn sources() -> Vec<(String, String)> {
+pub(super) fn sources() -> Vec<(String, String)> {
     fn gather(folder: &Path, root: &Path, found: &mut Vec<(String, String)>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

@@ -1,29 +1,15 @@
 //! Sizes of the source that may shrink but not grow unseen: `tests/ratchets.txt`.
 
+use super::floors::sources;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 const TABLE: &str = "tests/ratchets.txt";
 
-/// Rust files below a folder, by their path there.
-fn files(folder: &Path, root: &Path, found: &mut Vec<(String, String)>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            files(&path, root, found);
-        } else if path.extension().is_some_and(|end| end == "rs") {
-            let name = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
-            // A checkout may have its own ends of lines.
-            found.push((name, fs::read_to_string(&path).unwrap().replace("\r\n", "\n")));
-        }
-    }
-}
-
-/// Lines of code: neither blank, nor comments, nor unit tests.
-fn code(text: &str) -> Vec<&str> {
-    let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
-    text.lines().filter(|line| !line.trim().is_empty() && !line.trim_start().starts_with("//")).collect()
+/// Lines of code that are not blank; comments and unit tests are none.
+fn lines(code: &str) -> Vec<&str> {
+    code.lines().filter(|line| !line.trim().is_empty()).collect()
 }
 
 /// Lines of the longest function: from its `fn` to the brace that stands below its first letter.
@@ -44,15 +30,12 @@ fn longest(lines: &[&str]) -> usize {
 
 /// What is counted.
 fn counts() -> BTreeMap<String, usize> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut sources = Vec::new();
-    files(&root, &root, &mut sources);
-    sources.retain(|(name, _)| !name.ends_with("tests.rs"));
+    let sources = sources();
     let mut counts = BTreeMap::new();
     let mut folders: BTreeMap<&str, usize> = BTreeMap::new();
     let mut add = |name: String, count: usize| *counts.entry(name).or_insert(0) += count;
-    for (name, text) in &sources {
-        let lines = code(text);
+    for (name, code) in &sources {
+        let lines = lines(code);
         let floor = name.split_once('/').map_or("crate", |(floor, _)| floor);
         add(format!("lines of code, {floor}"), lines.len());
         add("lines of code".into(), lines.len());
@@ -60,7 +43,7 @@ fn counts() -> BTreeMap<String, usize> {
         add("hidden items and re-exports".into(), hidden);
         *folders.entry(name.rsplit_once('/').map_or("", |(folder, _)| folder)).or_default() += 1;
     }
-    let sizes = sources.iter().map(|(_, text)| code(text));
+    let sizes = sources.iter().map(|(_, code)| lines(code));
     let (largest, function) = sizes.fold((0, 0), |most, lines| (most.0.max(lines.len()), most.1.max(longest(&lines))));
     counts.insert("lines of code of the largest file".into(), largest);
     counts.insert("lines of the longest function".into(), function);
@@ -95,8 +78,8 @@ fn nothing_grows_unseen() {
 }
 
 #[test]
-fn functions_and_code_are_counted() {
-    let text = "// x\nfn one() {\n    a();\n}\n\nimpl B {\n    pub const fn two(\n        a: u8,\n    ) -> u8 {\n        a\n    }\n}\n#[cfg(test)]\nmod tests {\n}\n";
-    let lines = code(text);
+fn functions_are_measured() {
+    let text = "fn one() {\n    a();\n}\n\nimpl B {\n    pub const fn two(\n        a: u8,\n    ) -> u8 {\n        a\n    }\n}\n";
+    let lines = lines(text);
     assert_eq!((lines.len(), longest(&lines)), (10, 5));
 }

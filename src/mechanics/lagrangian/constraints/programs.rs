@@ -108,8 +108,8 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
         Some(rows)
     }
 
-    fn whole_coordinates(&self) -> usize {
-        self.beneath.whole_coordinates()
+    fn linearized_up_to(&self) -> usize {
+        self.beneath.linearized_up_to()
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct Linearized<S> {
 impl<S: Scalar> Linearized<S> {
     /// Records the linearization of so many coordinates; `None` if its parts are faster, or not known.
     pub fn record(motion: &dyn RecordMotion<S>, n: usize, parameters: &[S]) -> Option<Self> {
-        if n > motion.whole_coordinates() {
+        if n > motion.linearized_up_to() {
             return None;
         }
         let mut pivots = 0;
@@ -67,12 +67,11 @@ impl<S: Scalar> Linearized<S> {
     ) -> bool {
         let (n, batch) = (self.n, q.len() / self.n.max(1));
         let Linearization { acceleration, by_q, by_v, by_force } = found;
-        for (field, width) in [(&mut *acceleration, n), (by_q, n * n), (by_v, n * n), (by_force, n * n)] {
-            field.resize(batch * width, S::nan());
-        }
+        acceleration.resize(batch * n, S::nan());
+        [&mut *by_q, by_v, by_force].into_iter().for_each(|field| field.resize(batch * n * n, S::nan()));
         guards.resize(batch * 2 * self.pivots, S::nan());
-        let Linearization { acceleration, by_q, by_v, by_force } = found;
-        let done = replay.evaluate(batch, &[q, v], &self.parameters, &mut [acceleration, by_q, by_v, by_force, guards]);
-        done.is_ok() && are_safe(guards) && are_finite(&found.acceleration)
+        let mut outputs = [&mut acceleration[..], by_q, by_v, by_force, guards];
+        let done = replay.evaluate(batch, &[q, v], &self.parameters, &mut outputs);
+        done.is_ok() && are_safe(guards) && are_finite(acceleration)
     }
 }

@@ -85,7 +85,7 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
         Some(rows)
     }
 
-    fn whole_coordinates(&self) -> usize {
+    fn linearized_up_to(&self) -> usize {
         usize::MAX
     }
 }
