@@ -71,6 +71,12 @@ impl Findings {
         self
     }
 
+    /// Adds the parts of another report.
+    pub fn append(&mut self, other: Self) -> &mut Self {
+        self.parts.extend(other.parts);
+        self
+    }
+
     /// The parts in order.
     pub fn parts(&self) -> &[Finding] {
         &self.parts

@@ -47,7 +47,6 @@ fn optional(argument: clap::Arg) -> clap::Arg {
             "Files of recorded motion, with --coords as for lnn check; or, without --coords, one trained model or system (name or file), \
              to list its constraints and degenerate directions",
         ),
-        "coords" => argument.required(false),
         _ => argument,
     }
 }
@@ -72,12 +71,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     {
         return examined(&one.to_string_lossy(), args);
     }
-    if args.recording.coords.is_empty() {
-        return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
-    }
     let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
     let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.overwrite)).transpose()?;
-    let recording = args.recording.read()?.recording;
+    let recording = args.recording.read()?.0.recording;
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
     let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
     let found = find_constraints(&samples, wanted).map_err(|error| match error {

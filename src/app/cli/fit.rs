@@ -5,8 +5,10 @@ use crate::cli::learn::{Learned, Session, open};
 use crate::cli::print_config::{PrintFormat, commented, fit_reference, training_reference};
 use crate::cli::recording_args::read;
 use crate::cli::resume::{Learner, Text, reopen};
+use crate::cli::watch::search;
 use crate::cli::{CliError, output};
-use crate::pipeline::{Begin, FitConfig, PipelineError, PreparedFit, fit};
+use crate::pipeline::{Begin, FirstLook, FitConfig, FitConstraints, NextStep, PipelineError, PreparedFit, fit};
+use crate::recording::LoadedRecording;
 use std::time::Instant;
 
 /// Learns and writes everything into the output directory.
@@ -19,6 +21,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.run.print_config == Some(PrintFormat::Markdown) {
         return output::print(&(fit_reference() + &training_reference()));
     }
+    let args = &args.complete()?;
     let (plan, resumed) = match &args.run.resume {
         None => (Plan::new(args, None)?, None),
         Some(path) => {
@@ -45,6 +48,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("{motion}: without known forces (--force) L and the friction cannot be separated"));
     }
     let config = plan.configure(&prepared)?;
+    advise(&plan, &reading)?;
     if args.run.print_config.is_some() {
         let table = toml::Table::try_from(&config).map_err(CliError::data)?;
         return output::print(&commented(FitConfig::KEYS, &table, &|_| None));
@@ -60,4 +64,21 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let (json, text, epochs) = (report.json().to_string(), format!("{}\n", report.text()), report.history.len());
         Learned { json, text, stop: report.stop, epochs, unfinished: report.unfinished }
     }))
+}
+
+/// Notes what would explain the motion better than a network, at the beginning of a fit that does not look for it itself.
+fn advise(plan: &Plan<'_>, reading: &LoadedRecording) -> Result<(), CliError> {
+    let run = &plan.args.run;
+    let asked = plan.config.formula || plan.config.constraints != FitConstraints::None;
+    if asked || run.json || run.resume.is_some() || run.print_config.is_some() {
+        return Ok(());
+    }
+    let look = FirstLook::new(reading, Vec::new(), &search()?)?;
+    look.laws().iter().for_each(|law| output::note(law));
+    if look.next == NextStep::Formula {
+        output::note(
+            "lnn formula states its constants with their errors; lnn identify fits those of a form that you know",
+        );
+    }
+    Ok(())
 }

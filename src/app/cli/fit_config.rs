@@ -34,12 +34,22 @@ pub struct Args {
 /// An argument that a configuration or a checkpoint may give instead.
 fn unless_known(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
-        "data" | "coords" => argument.required(false).required_unless_present_any(["config", "resume"]),
+        "data" => argument.required(false).required_unless_present_any(["config", "resume"]),
         _ => argument,
     }
 }
 
 impl Args {
+    /// The same with the columns that a guess finds, if neither these arguments, nor a configuration, nor a run to continue name them.
+    ///
+    /// # Errors
+    /// As of [`RecordingArgs::complete`].
+    pub fn complete(&self) -> Result<Self, CliError> {
+        let named = self.run.config.is_some() || self.run.resume.is_some() || !self.recording.coords.is_empty();
+        let recording = if named { self.recording.clone() } else { self.recording.complete()? };
+        Ok(Self { recording, ..self.clone() })
+    }
+
     /// Files that are read.
     pub fn inputs(&self) -> Vec<&Path> {
         self.recording.data.iter().chain(&self.run.config).map(PathBuf::as_path).collect()

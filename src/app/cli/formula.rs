@@ -89,7 +89,6 @@ fn motion_or_model(argument: clap::Arg) -> clap::Arg {
         "data" => argument.value_name("DATA|MODEL").help(
             "Files of recorded motion: CSV, NPY or NPZ, one of them - for standard input; or one model, a file or the directory of a run",
         ),
-        "coords" => argument.required(false),
         _ => argument,
     }
 }
@@ -171,15 +170,12 @@ fn is_model(path: &Path) -> bool {
 }
 
 fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
-    if args.recording.coords.is_empty() {
-        return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
-    }
-    let reading = args.recording.read()?;
+    let (reading, columns) = args.recording.read()?;
     let n = reading.recording.coordinates.len();
     if let Some(noise) = args.noise.as_ref().filter(|noise| noise.len() != n) {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
-    let units = args.recording.meaning().coordinate_units();
+    let units = columns.coordinate_units();
     formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
         .map_err(|error| in_file(error, &reading))
 }

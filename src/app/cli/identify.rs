@@ -89,9 +89,7 @@ impl From<Met> for Targets {
 /// Columns have the names of the system's coordinates unless others are given.
 fn of_the_system(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
-        "coords" => {
-            argument.required(false).help("Columns of the coordinates, in the order of the system [default: its names]")
-        }
+        "coords" => argument.help("Columns of the coordinates, in the order of the system [default: its names]"),
         "periodic" => argument.help("Coordinates that are angles, which are unwrapped [default: those of the system]"),
         _ => argument,
     }

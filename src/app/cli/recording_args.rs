@@ -1,9 +1,9 @@
 //! Files of recorded motion and the meaning of their columns, as arguments.
 
 use crate::cli::spool::read_spooled;
-use crate::cli::{CliError, number};
+use crate::cli::{CliError, number, output};
 use crate::recording::read::{DataError, Problem, read_recording};
-use crate::recording::{Columns, LoadedRecording};
+use crate::recording::{ColumnGuess, Columns, Guess, LoadedRecording, guess};
 use std::path::PathBuf;
 
 /// Recorded motion.
@@ -12,8 +12,9 @@ pub struct RecordingArgs {
     /// Files of recorded motion: CSV, NPY or NPZ; - is standard input. Each holds a trajectory, or several distinguished by a column.
     #[arg(required = true, value_name = "DATA")]
     pub data: Vec<PathBuf>,
-    /// Columns of the coordinates, by name or by number from 1.
-    #[arg(long, value_name = "q1,q2", value_delimiter = ',', required = true)]
+    /// Columns of the coordinates, by name or by number from 1 [default: guessed from names and numbers, with the meaning of the other
+    /// columns].
+    #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
     pub coords: Vec<String>,
     /// Columns of measured velocities, one per coordinate.
     #[arg(long, value_name = "v1,v2", value_delimiter = ',')]
@@ -73,12 +74,84 @@ impl RecordingArgs {
         }
     }
 
-    /// Reads the files.
+    /// Reads the files; without coordinates, after a guess of what the columns are, which a note states.
     ///
     /// # Errors
     /// As of [`read`].
-    pub fn read(&self) -> Result<LoadedRecording, CliError> {
-        read(&self.data, &self.meaning())
+    pub fn read(&self) -> Result<(LoadedRecording, Columns), CliError> {
+        let (reading, Guess { columns, table }) = self.load()?;
+        note(&columns, &table);
+        Ok((reading, columns))
+    }
+
+    /// Reads the files, and says what the columns were taken as.
+    ///
+    /// # Errors
+    /// As of [`read`].
+    pub fn load(&self) -> Result<(LoadedRecording, Guess), CliError> {
+        let mut guessed = Guess { columns: self.meaning(), table: Vec::new() };
+        let read = read_spooled(&self.data, |files| {
+            if self.coords.is_empty() {
+                guessed = guess(files, &guessed.columns)?;
+            }
+            read_recording(files, &guessed.columns)
+        });
+        match read {
+            Ok(reading) => Ok((reading, guessed)),
+            Err(error) => Err(refused(&error, &guessed.columns)),
+        }
+    }
+
+    /// The options of a meaning of the columns, each after a blank, for the files of these arguments.
+    pub fn command(&self, columns: &Columns) -> String {
+        let quoted = |text: &str| match text.chars().all(|c| c.is_ascii_alphanumeric() || "_-./,=+:".contains(c)) {
+            true if !text.is_empty() => text.to_string(),
+            _ => format!("'{}'", text.replace('\'', "'\\''")),
+        };
+        let mut line: String =
+            self.data.iter().map(|file| format!(" {}", quoted(&file.display().to_string()))).collect();
+        let units: Vec<String> = columns.units.iter().map(|(column, unit)| format!("{column}={unit}")).collect();
+        let one = |name: &Option<String>| name.iter().cloned().collect::<Vec<_>>();
+        for (option, values) in [
+            ("coords", &columns.coords),
+            ("velocity", &columns.velocity),
+            ("acceleration", &columns.acceleration),
+            ("force", &columns.force),
+            // The usual names need not be said.
+            ("time", &one(&columns.time.clone().filter(|name| name != "t" && name != "time"))),
+            ("rate", &one(&columns.rate.map(|rate| rate.to_string()))),
+            ("trajectory", &one(&columns.trajectory)),
+            ("periodic", &columns.periodic),
+            ("units", &units),
+            ("columns", &columns.names.clone().unwrap_or_default()),
+        ] {
+            if !values.is_empty() {
+                line += &format!(" --{option} {}", quoted(&values.join(",")));
+            }
+        }
+        line
+    }
+
+    /// These arguments with the columns of a guess.
+    ///
+    /// # Errors
+    /// As of [`read`].
+    pub fn complete(&self) -> Result<Self, CliError> {
+        let columns = self.meaning();
+        let Guess { columns, table } = guess(&self.data, &columns).map_err(|error| refused(&error, &columns))?;
+        note(&columns, &table);
+        let Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, .. } = columns;
+        let args = self.clone();
+        Ok(Self { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, ..args })
+    }
+}
+
+/// States what columns were taken as, if that was guessed.
+fn note(columns: &Columns, table: &[ColumnGuess]) {
+    if !table.is_empty() {
+        let (coords, angles) = (columns.coords.join(", "), columns.periodic.join(", "));
+        let angles = if angles.is_empty() { angles } else { format!(", angles {angles}") };
+        output::note(&format!("the columns are guessed: coordinates {coords}{angles}; lnn check lists the others"));
     }
 }
 
@@ -87,16 +160,22 @@ impl RecordingArgs {
 /// # Errors
 /// A usage error for columns that contradict each other, a data error for the first file that is not as said.
 pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, CliError> {
-    read_spooled(files, |files| read_recording(files, columns)).map_err(|error| match &error {
+    read_spooled(files, |files| read_recording(files, columns)).map_err(|error| refused(&error, columns))
+}
+
+/// A mistake in files or in the meaning of their columns.
+fn refused(error: &DataError, columns: &Columns) -> CliError {
+    match error {
         DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", help(columns, problem))),
         _ => CliError::usage(format_args!("{}{error}", option(&error.to_string()))),
-    })
+    }
 }
 
 /// The option that helps, with a colon before it.
 fn help(columns: &Columns, problem: &Problem) -> &'static str {
     match problem {
         Problem::NoTime { .. } => ": --time COLUMN or --rate HZ",
+        Problem::Names(_) => ": --coords names them",
         Problem::Missing { what: "time", .. } => ": --time COLUMN names it",
         Problem::Missing { what: "trajectory", .. } => ": --trajectory COLUMN names it",
         Problem::Missing { what: "coordinate", .. } => ": --coords names it",

@@ -56,6 +56,7 @@ mod experiment;
 mod experiment_directory;
 mod experiment_report;
 mod file_names;
+mod first_look;
 mod fit;
 mod fit_builder;
 mod fit_config;
@@ -106,6 +107,7 @@ pub use experiment_report::{Additions, Results};
 #[doc(hidden)]
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, LEARNED, PLAY, RECORD, SUMMARY};
+pub use first_look::{FirstLook, NextStep};
 pub use fit::FitReport;
 #[doc(hidden)]
 pub use fit::fit;

@@ -17,6 +17,7 @@
 
 mod clock;
 mod columns;
+mod guess;
 mod held;
 mod hermite;
 mod hold_out;
@@ -36,6 +37,7 @@ pub(crate) use clock::Clock;
 pub use columns::Columns;
 #[doc(hidden)]
 pub use columns::ColumnsError;
+pub use guess::{ColumnGuess, Guess, guess};
 pub(crate) use held::{Filled, filled, marks};
 pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;

@@ -38,6 +38,9 @@ pub enum Problem {
     /// Nothing in it.
     #[error("the file is empty")]
     Empty,
+    /// No coordinates were asked for; the columns that there are, by name or by number.
+    #[error("the coordinates are not named; the columns are {}", .0.join(", "))]
+    Names(Vec<String>),
     /// Bytes that are not text.
     #[error("row {0}: not UTF-8 text")]
     NotText(u64),

@@ -10,10 +10,12 @@ mod npz;
 mod pieces;
 mod select;
 mod shared;
+mod table;
 mod text;
 
 pub use error::{DataError, Problem};
 pub(crate) use pieces::LEAST;
+pub(crate) use table::RawTable;
 #[cfg(feature = "cli")]
 pub(crate) use text::{Separator, comment, line_end, names_in, split};
 

@@ -31,6 +31,10 @@ pub struct Selection {
 impl Selection {
     /// Finds the columns among `names`, or by number if a file has no names; `row` is that of the header.
     pub fn new(columns: &Columns, names: Option<&[String]>, width: usize, row: u64) -> Result<Self, Problem> {
+        if columns.coords.is_empty() {
+            let numbers = || (1..=width).map(|k| k.to_string()).collect();
+            return Err(Problem::Names(names.map_or_else(numbers, <[String]>::to_vec)));
+        }
         let find = |what: &'static str, name: &str| -> Result<Used, Problem> {
             let named = names.unwrap_or(&[]);
             let mut places = named.iter().enumerate().filter(|(_, known)| *known == name).map(|(k, _)| k);

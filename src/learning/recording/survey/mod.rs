@@ -2,6 +2,7 @@
 
 mod coordinate;
 mod motionless;
+mod says;
 mod suspicious;
 mod warnings;
 

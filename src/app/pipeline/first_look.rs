@@ -1,0 +1,189 @@
+//! A first look at recorded motion: what it is, whether a simple law explains it, and what to do next.
+
+use crate::cancellation::{Cancellation, Cancelled};
+use crate::configuration::Precision;
+use crate::constraints::{ConstraintSearch, ConstraintSearchError, FoundConstraints, MotionSamples, find_constraints};
+use crate::findings::Findings;
+use crate::formula::{FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_motion};
+use crate::pipeline::{FitOptions, PipelineError, PreparedFit};
+use crate::recording::smooth::SmoothOptions;
+use crate::recording::survey::{Survey, SurveyOptions, survey};
+use crate::recording::{ColumnGuess, LoadedRecording, RecordedTrajectory, Recording};
+use serde::{Serialize, Serializer};
+
+/// Samples in which laws are looked for, at most: seconds of searching.
+const SAMPLES: usize = 2000;
+/// Samples that a trajectory keeps at least.
+const LEAST: usize = 200;
+/// Coordinates up to which a formula is looked for: the number of terms grows with their fourth power.
+const COORDINATES: usize = 4;
+/// Nothing accelerates if the accelerations of no coordinate exceed their error.
+const ACCELERATES: f64 = 1.0;
+
+/// What to do next with recorded motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NextStep {
+    /// Mend the data: nothing can learn from them.
+    Mend,
+    /// Record other motion: nothing accelerates.
+    Record,
+    /// Take the formula that explains the motion.
+    Formula,
+    /// Learn a network under the constraints that hold the motion.
+    FitConstrained,
+    /// Learn a network.
+    Fit,
+}
+
+/// The survey of a recording, the laws that were looked for, and the advice that follows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FirstLook {
+    /// What the columns were taken as; empty where all were named.
+    pub guessed: Vec<ColumnGuess>,
+    /// The survey.
+    #[serde(flatten)]
+    pub survey: Survey,
+    /// Why no fit can learn from the data, if none can.
+    pub obstacle: Option<String>,
+    /// Constraints that the motion obeys; none if they were not looked for.
+    pub constraints: Option<FoundConstraints>,
+    /// The formula that explains the motion, if there is one among small ones.
+    #[serde(serialize_with = "text_of")]
+    pub formula: Option<FoundFormula>,
+    /// The advice.
+    pub next: NextStep,
+}
+
+/// A formula as its text.
+fn text_of<S: Serializer>(formula: &Option<FoundFormula>, to: S) -> Result<S::Ok, S::Error> {
+    formula.as_ref().map(|found| found.text(false)).serialize(to)
+}
+
+impl FirstLook {
+    /// Looks at a recording; `guessed` is what its columns were taken as. Constraints and formulas are looked for in parts of the trajectories,
+    /// of at most 2000 samples together.
+    ///
+    /// # Errors
+    /// [`PipelineError::Smooth`] for trajectories too short for any window, [`PipelineError::Interrupted`].
+    pub fn new(
+        reading: &LoadedRecording,
+        guessed: Vec<ColumnGuess>,
+        cancellation: &Cancellation,
+    ) -> Result<Self, PipelineError> {
+        let survey = survey(reading, &SurveyOptions::default())?;
+        // A fit is possible if its preparation succeeds.
+        let prepared = PreparedFit::new(reading, &FitOptions::default());
+        let obstacle = prepared.and_then(|prepared| prepared.suggest("", Precision::F64)).err();
+        let obstacle = obstacle.map(|error| error.to_string());
+        let accelerates = survey.accelerates();
+        let some = part(&reading.recording);
+        let search = obstacle.is_none() && accelerates && survey.motionless.is_empty();
+        let constraints = if search { constraints(&some, cancellation)? } else { None };
+        let held = constraints.as_ref().is_some_and(|found| found.count > 0);
+        let formula = if search && !held { formula(&some, cancellation)? } else { None };
+        let next = match (&obstacle, &formula) {
+            (Some(_), _) => NextStep::Mend,
+            _ if !accelerates => NextStep::Record,
+            (None, Some(_)) => NextStep::Formula,
+            _ if held => NextStep::FitConstrained,
+            _ => NextStep::Fit,
+        };
+        Ok(Self { guessed, survey, obstacle, constraints, formula, next })
+    }
+
+    /// The verdict, what the columns are taken as, the survey, the laws, and the warnings.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        findings.line(match &self.obstacle {
+            Some(obstacle) => format!("A fit cannot learn from these data: {obstacle}."),
+            None => self.survey.headline(),
+        });
+        if !self.guessed.is_empty() {
+            let rows = self.guessed.iter().map(|g| [g.column.as_str(), g.meaning.as_str(), g.because.as_str()]);
+            findings.gap().table(&["column", "taken as", "because"], rows);
+        }
+        findings.gap().append(self.survey.findings());
+        if self.obstacle.is_none() {
+            findings.gap().append(self.survey.advice());
+        }
+        findings.lines(self.laws()).lines(self.survey.warnings.iter().map(|warning| format!("warning: {warning}")));
+        findings
+    }
+
+    /// The laws that were found, each in a sentence: what to use instead of a network that knows nothing.
+    pub fn laws(&self) -> Vec<String> {
+        let mut laws = Vec::new();
+        if self.next == NextStep::Record {
+            laws.push(
+                "nothing accelerates here beyond the noise: no Lagrangian can be learned from this motion".to_string(),
+            );
+        }
+        let constraints = self.constraints.iter().flat_map(|found| found.formulas().into_values());
+        laws.extend(constraints.map(|formula| format!("the motion stays on {formula} = 0: add --constraints find")));
+        if let Some(found) = &self.formula {
+            laws.push(format!("a formula explains this motion: L = {}", found.text(false)));
+            if self.has_friction() {
+                laws.push(format!("its friction is D = {}", found.text(true)));
+            }
+        }
+        laws
+    }
+
+    /// `true` if the formula has terms of friction.
+    pub fn has_friction(&self) -> bool {
+        self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
+    }
+}
+
+impl Survey {
+    /// `true` if the acceleration of a coordinate exceeds its error.
+    fn accelerates(&self) -> bool {
+        self.coordinates.iter().any(|c| c.acceleration_error_relative < ACCELERATES)
+    }
+}
+
+/// The beginnings of the trajectories, as many samples of each as all together may have.
+fn part(recording: &Recording) -> Recording {
+    let most = (SAMPLES / recording.tracks.len().max(1)).max(LEAST);
+    let n = recording.n();
+    let cut = |track: &RecordedTrajectory| {
+        let samples = track.len().min(most);
+        let of = |values: &Vec<f64>| values[..values.len().min(samples * n)].to_vec();
+        RecordedTrajectory {
+            name: track.name.clone(),
+            times: track.times[..samples].to_vec(),
+            q: of(&track.q),
+            v: of(&track.v),
+            a: of(&track.a),
+            force: of(&track.force),
+        }
+    };
+    let tracks = recording.tracks.iter().take(SAMPLES / LEAST).map(cut).collect();
+    Recording { tracks, ..recording.clone() }
+}
+
+/// The constraints of motion of several coordinates; none if the search is not possible.
+fn constraints(recording: &Recording, stop: &Cancellation) -> Result<Option<FoundConstraints>, PipelineError> {
+    if recording.n() < 2 {
+        return Ok(None);
+    }
+    let Ok(samples) = MotionSamples::of(recording, &SmoothOptions::default()) else { return Ok(None) };
+    match find_constraints(&samples.watched(stop), ConstraintSearch::default()) {
+        Err(ConstraintSearchError::Cancelled(_)) => Err(PipelineError::Interrupted),
+        found => Ok(found.ok()),
+    }
+}
+
+/// A formula that explains motion of few coordinates, with friction if it has some.
+fn formula(recording: &Recording, stop: &Cancellation) -> Result<Option<FoundFormula>, PipelineError> {
+    if recording.n() > COORDINATES {
+        return Ok(None);
+    }
+    let options =
+        FormulaOptions { friction: true, bootstraps: 0, cancellation: stop.clone(), ..FormulaOptions::default() };
+    match formula_of_motion(recording, &options) {
+        Err(FormulaError::Cancelled(Cancelled)) => Err(PipelineError::Interrupted),
+        found => Ok(found.ok().filter(|found| found.verdict == Verdict::Found && found.doubts.is_empty())),
+    }
+}

@@ -1,0 +1,50 @@
+//! Which coordinates are angles, and in which unit.
+
+use super::names::{in_degrees, is_angle};
+use std::f64::consts::TAU;
+
+/// Largest deviation of a jump from a full turn, as a share of it: the motion of one step.
+const NEAR: f64 = 0.25;
+/// Share of a turn by which the range may exceed it, by noise.
+const BEYOND: f64 = 1.05;
+
+/// An angle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Angle {
+    /// `true` if it is in degrees.
+    pub degrees: bool,
+    /// The reason.
+    pub because: String,
+}
+
+/// Whether a coordinate is an angle: it jumps by a turn, or its name says so. `restarts` are rows at which a trajectory begins.
+pub fn angle(name: &str, values: &[f64], restarts: &[usize]) -> Option<Angle> {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let steps = || (1..values.len()).filter(|k| !restarts.contains(k)).map(|k| (values[k] - values[k - 1]).abs());
+    let jumps = |turn: f64| match high - low <= BEYOND * turn && high - low > (1.0 - NEAR) * turn {
+        true => steps().filter(|step| (step / turn - 1.0).abs() < NEAR).count(),
+        false => 0,
+    };
+    // A few long steps among many short ones.
+    let few = |count: usize| count > 0 && count * 4 <= values.len();
+    if few(jumps(TAU)) {
+        return Some(Angle { degrees: false, because: "it jumps by a full turn".to_string() });
+    }
+    if few(jumps(360.0)) {
+        return Some(Angle { degrees: true, because: "it jumps by 360".to_string() });
+    }
+    if in_degrees(name) {
+        return Some(Angle { degrees: true, because: "its name".to_string() });
+    }
+    if !is_angle(name) {
+        return None;
+    }
+    // Beyond a turn to either side, and within one in degrees.
+    let degrees = low.abs().max(high.abs()) > 2.0 * TAU && low >= -360.0 && high <= 360.0;
+    let because = if degrees {
+        format!("its name; in degrees, because it reaches {:.0}", low.abs().max(high.abs()))
+    } else {
+        "its name".to_string()
+    };
+    Some(Angle { degrees, because })
+}

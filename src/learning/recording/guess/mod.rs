@@ -1,0 +1,48 @@
+//! What the columns of recorded motion probably are: time, trajectories, coordinates, angles, velocities, accelerations and forces.
+//!
+//! Names decide first, then the numbers: a time increases, a velocity is the derivative of a position, an angle jumps by a turn.
+
+mod angles;
+mod names;
+mod roles;
+mod time;
+
+use crate::recording::read::RawTable;
+use crate::recording::{Columns, DataError};
+use serde::Serialize;
+use std::path::Path;
+
+/// What a column is taken as.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ColumnGuess {
+    /// Its name, or its number in a file without a header.
+    pub column: String,
+    /// Its meaning in a word or two, such as `time` or `velocity of x`; `left out` of a column that is not used.
+    pub meaning: String,
+    /// The reason.
+    pub because: String,
+}
+
+/// What the columns of a file are taken as.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Guess {
+    /// The meaning of the columns, as it is read.
+    #[serde(skip)]
+    pub columns: Columns,
+    /// One entry for every column, in the order of the file.
+    pub table: Vec<ColumnGuess>,
+}
+
+/// Guesses the meaning of the columns of the first of some files, as far as `given` does not say it.
+///
+/// A given time, rate, trajectory, force, velocity or acceleration is kept; given angles and units are added to those that are seen.
+///
+/// # Errors
+/// [`DataError`] for a file that cannot be read as a table, or in which no column can be a coordinate or the time.
+pub fn guess<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, DataError> {
+    let Some(file) = files.first().map(AsRef::as_ref) else { return Err(DataError::NoFiles) };
+    roles::guess(file, &RawTable::read(file, given.names.as_deref())?, given)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,382 @@
+//! The meaning of all columns of a table together.
+
+use super::angles::{Angle, angle};
+use super::names::{is_acceleration, is_force, is_index, is_position, is_trajectory, is_velocity};
+use super::time::{self, Time, counts};
+use super::{ColumnGuess, Guess};
+use crate::recording::read::{RawTable, read_recording};
+use crate::recording::{Columns, DataError, Problem};
+use std::path::Path;
+
+/// Samples at which derivatives are compared.
+const SAMPLES: usize = 4000;
+/// Rows between the samples of a difference; of noisy positions longer ones show more.
+const REACHES: [usize; 5] = [1, 2, 4, 8, 16];
+/// Smallest correlation with the derivative of a position, for a column whose name says velocity and for any other.
+const NAMED: f64 = 0.8;
+const UNNAMED: f64 = 0.995;
+/// Largest relative difference from that derivative, for a column that no name tells.
+const LIKE: f64 = 0.03;
+
+/// What a column is.
+#[derive(Clone, Debug, PartialEq)]
+enum Role {
+    Time,
+    Trajectory,
+    Coordinate,
+    /// A derivative of a coordinate, of this order.
+    Derivative(usize, usize),
+    Force,
+    /// What an option says.
+    Given(&'static str),
+    Unused,
+}
+
+/// A table while its columns are told apart.
+struct Roles<'a> {
+    table: &'a RawTable,
+    given: &'a Columns,
+    time: Option<Time>,
+    roles: Vec<Option<(Role, String)>>,
+}
+
+/// Guesses the meaning of every column.
+pub fn guess(file: &Path, table: &RawTable, given: &Columns) -> Result<Guess, DataError> {
+    let mut roles = Roles { table, given, time: None, roles: vec![None; table.names.len()] };
+    roles.take_given();
+    roles.find_time();
+    roles.set_aside();
+    roles.find_trajectories(file);
+    roles.find_forces();
+    roles.find_derivatives();
+    roles.find_coordinates();
+    let (angles, columns) = roles.columns();
+    if columns.coords.is_empty() {
+        let names = table.names.clone();
+        return Err(DataError::File { file: file.display().to_string(), problem: Problem::Names(names) });
+    }
+    Ok(Guess { table: roles.explain(&angles), columns })
+}
+
+impl Roles<'_> {
+    fn open(&self) -> Vec<usize> {
+        (0..self.roles.len()).filter(|&k| self.roles[k].is_none()).collect()
+    }
+
+    fn set(&mut self, column: usize, role: Role, because: impl Into<String>) {
+        self.roles[column] = Some((role, because.into()));
+    }
+
+    fn of(&self, role: &Role) -> Vec<usize> {
+        (0..self.roles.len()).filter(|&k| self.roles[k].as_ref().is_some_and(|(found, _)| found == role)).collect()
+    }
+
+    fn restarts(&self) -> &[usize] {
+        self.time.as_ref().map_or(&[], |time| &time.restarts)
+    }
+
+    /// Takes what the reader has been told.
+    fn take_given(&mut self) {
+        let place = |name: &String| self.table.names.iter().position(|known| known == name);
+        let lists: [(&[String], Role); 6] = [
+            (self.given.time.as_slice(), Role::Time),
+            (self.given.trajectory.as_slice(), Role::Trajectory),
+            (&self.given.force, Role::Force),
+            (&self.given.velocity, Role::Given("velocity")),
+            (&self.given.acceleration, Role::Given("acceleration")),
+            (&self.given.error, Role::Given("standard error")),
+        ];
+        let found: Vec<(usize, Role)> = lists
+            .into_iter()
+            .flat_map(|(names, role)| names.iter().filter_map(place).map(move |k| (k, role.clone())))
+            .collect();
+        for (k, role) in found {
+            self.set(k, role, "as given");
+        }
+    }
+
+    fn find_time(&mut self) {
+        let (table, given) = (self.table, self.given);
+        let told = self.of(&Role::Time).first().copied();
+        self.time = match told {
+            Some(column) => {
+                let restarts = table.numbers[column].as_deref().and_then(time::restarts).unwrap_or_default();
+                Some(Time { column, unit: None, restarts, because: "as given".to_string() })
+            }
+            None if given.rate.is_some() => None,
+            None => time::find(&table.names, &table.numbers),
+        };
+        if let Some(Time { column, because, .. }) = self.time.clone() {
+            self.set(column, Role::Time, because);
+        }
+    }
+
+    /// Sets aside what is no measurement: text, constants, counters, copies.
+    fn set_aside(&mut self) {
+        for k in self.open() {
+            let Some(values) = &self.table.numbers[k] else { continue };
+            let name = &self.table.names[k];
+            let copied = (0..k).find(|&j| self.table.numbers[j].as_ref().is_some_and(|other| copies(values, other)));
+            if values.windows(2).all(|pair| pair[0] == pair[1]) {
+                self.set(k, Role::Unused, "it has one value");
+            } else if (is_index(name) || self.time.is_some()) && counts(values) {
+                self.set(k, Role::Unused, "it counts rows");
+            } else if let Some(other) = copied {
+                let because = format!("it is {} times a factor", self.table.names[other]);
+                self.set(k, Role::Unused, because);
+            }
+        }
+    }
+
+    /// Finds the column that distinguishes trajectories: by its name, or where a time that begins anew is in order with it.
+    fn find_trajectories(&mut self, file: &Path) {
+        let named = self.of(&Role::Trajectory);
+        if !named.is_empty() {
+            return;
+        }
+        let labels = self.open().into_iter().filter(|&k| self.labels(k)).collect::<Vec<_>>();
+        let (first, others): (Vec<usize>, Vec<usize>) =
+            labels.into_iter().partition(|&k| is_trajectory(&self.table.names[k]));
+        let anew = !self.restarts().is_empty();
+        let found = first.iter().copied().chain(others.into_iter().filter(|_| anew)).find(|&k| self.in_order(k, file));
+        if let Some(k) = found {
+            let because = if first.contains(&k) { "its name" } else { "its value changes where the time begins anew" };
+            self.set(k, Role::Trajectory, because);
+        }
+        for k in self.open() {
+            if self.table.numbers[k].is_none() {
+                self.set(k, Role::Unused, "not every row has a number there");
+            }
+        }
+    }
+
+    /// `true` for text, and for whole numbers of few values.
+    fn labels(&self, k: usize) -> bool {
+        let Some(values) = &self.table.numbers[k] else { return true };
+        let mut distinct: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
+        distinct.sort_unstable();
+        distinct.dedup();
+        distinct.len() > 1 && distinct.len() * 16 <= values.len() && values.iter().all(|x| x.fract() == 0.0)
+    }
+
+    /// `true` if the rows of every trajectory that a column distinguishes are in the order of time.
+    fn in_order(&self, k: usize, file: &Path) -> bool {
+        let Some(time) = &self.time else { return true };
+        let other = self.open().into_iter().find(|&j| j != k && self.table.numbers[j].is_some());
+        let Some(other) = other else { return false };
+        let columns = Columns {
+            coords: vec![self.table.names[other].clone()],
+            time: Some(self.table.names[time.column].clone()),
+            trajectory: Some(self.table.names[k].clone()),
+            names: self.given.names.clone(),
+            ..Columns::default()
+        };
+        read_recording(&[file], &columns).is_ok_and(|read| read.recording.tracks.len() > 1)
+    }
+
+    fn find_forces(&mut self) {
+        if self.of(&Role::Force).is_empty() {
+            let forces: Vec<usize> = self.open().into_iter().filter(|&k| is_force(&self.table.names[k])).collect();
+            // Where nothing else is left, they are coordinates.
+            if forces.len() < self.open().len() {
+                forces.into_iter().for_each(|k| self.set(k, Role::Force, "its name"));
+            }
+        }
+    }
+
+    /// Finds velocities and accelerations among what is left.
+    fn find_derivatives(&mut self) {
+        for order in [2, 1] {
+            let says = if order == 1 { is_velocity } else { is_acceleration };
+            for k in self.open() {
+                let name = &self.table.names[k];
+                let named = says(name);
+                if !named && (order == 2 || is_position(name)) {
+                    continue;
+                }
+                let sources = self.open().into_iter().filter(|&j| {
+                    let other = &self.table.names[j];
+                    j != k && !is_velocity(other) && !is_acceleration(other)
+                });
+                let of = |j: usize| {
+                    let (correlation, factor) = self.derivative(j, k, order)?;
+                    let back = self
+                        .derivative(k, j, 1)
+                        .is_some_and(|(c, f)| c.abs() > UNNAMED && (f.abs() - 1.0).abs() < 3.0 * LIKE);
+                    let alike = correlation > UNNAMED && (factor - 1.0).abs() < LIKE && !back;
+                    ((named && correlation > NAMED) || alike).then_some((j, correlation))
+                };
+                let best = sources.filter_map(of).max_by(|a, b| a.1.total_cmp(&b.1));
+                match best {
+                    Some((j, _)) => {
+                        let because =
+                            format!("it is the {}derivative of {}", ["", "", "second "][order], self.table.names[j]);
+                        self.set(k, Role::Derivative(order, j), because);
+                    }
+                    None if named => {
+                        let what = ["", "velocity", "acceleration"][order];
+                        self.set(k, Role::Unused, format!("its name says {what}, but it is of no other column"));
+                    }
+                    None => {}
+                }
+            }
+        }
+    }
+
+    /// Correlation of column `k` with the derivative of column `j`, and their ratio by least squares.
+    fn derivative(&self, j: usize, k: usize, order: usize) -> Option<(f64, f64)> {
+        let (x, y) = (self.table.numbers[j].as_ref()?, self.table.numbers[k].as_ref()?);
+        let times = self.time.as_ref().and_then(|time| self.table.numbers[time.column].as_ref());
+        let scale = self
+            .time
+            .as_ref()
+            .and_then(|time| time.unit)
+            .map_or(1.0, |unit| crate::recording::factor(unit).unwrap_or(1.0));
+        let step = 1.0 / self.given.rate.unwrap_or(1.0);
+        let time = |row: usize| times.map_or(row as f64 * step, |times| times[row] * scale);
+        let stride = (x.len() / SAMPLES).max(1);
+        let compared = |reach: usize| {
+            let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
+            for at in (reach..x.len().saturating_sub(reach)).step_by(stride) {
+                let (before, after) = (time(at) - time(at - reach), time(at + reach) - time(at));
+                if before <= 0.0 || after <= 0.0 {
+                    continue;
+                }
+                let (rise, next) = ((x[at] - x[at - reach]) / before, (x[at + reach] - x[at]) / after);
+                let d = if order == 1 { (rise + next) / 2.0 } else { 2.0 * (next - rise) / (before + after) };
+                (xy, xx, yy) = (xy + d * y[at], xx + d * d, yy + y[at] * y[at]);
+            }
+            (xx > 0.0 && yy > 0.0).then(|| (xy / (xx * yy).sqrt(), xy / xx))
+        };
+        REACHES.iter().filter_map(|&reach| compared(reach)).max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Takes what is left as coordinates; beside positions whose velocities were measured, only what a name tells.
+    fn find_coordinates(&mut self) {
+        let sources: Vec<usize> = self
+            .roles
+            .iter()
+            .flatten()
+            .filter_map(|(role, _)| match role {
+                Role::Derivative(_, of) => Some(*of),
+                _ => None,
+            })
+            .collect();
+        for k in self.open() {
+            if sources.is_empty() || sources.contains(&k) || is_position(&self.table.names[k]) {
+                let because = if sources.contains(&k) { "another column is its derivative" } else { "it varies" };
+                self.set(k, Role::Coordinate, because);
+            } else {
+                self.set(k, Role::Unused, "no other column is its derivative, while other coordinates have theirs");
+            }
+        }
+        // One force for each coordinate, and one derivative for each, or none.
+        let coordinates = self.of(&Role::Coordinate);
+        let forces = self.of(&Role::Force);
+        if !forces.is_empty() && forces.len() != coordinates.len() && self.given.force.is_empty() {
+            let because =
+                format!("expected a force for each of {} coordinates, found {}", coordinates.len(), forces.len());
+            forces.into_iter().for_each(|k| self.set(k, Role::Unused, because.clone()));
+        }
+        for order in [1, 2] {
+            let of = |roles: &Self, j: usize| roles.of(&Role::Derivative(order, j)).first().copied();
+            if !coordinates.iter().all(|&j| of(self, j).is_some()) {
+                for &j in &coordinates {
+                    for k in self.of(&Role::Derivative(order, j)) {
+                        self.set(k, Role::Unused, "not every coordinate has such a column");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The angles among the coordinates, and everything as it is read.
+    fn columns(&self) -> (Vec<(usize, Angle)>, Columns) {
+        let names = |places: Vec<usize>| places.into_iter().map(|k| self.table.names[k].clone()).collect::<Vec<_>>();
+        let coordinates = self.of(&Role::Coordinate);
+        let derivative = |order: usize| {
+            let places = coordinates.iter().filter_map(|&j| self.of(&Role::Derivative(order, j)).first().copied());
+            names(places.collect())
+        };
+        let units = &self.given.units;
+        let known = |name: &String| units.iter().any(|(column, _)| column == name);
+        let found =
+            |&k: &usize| Some((k, angle(&self.table.names[k], self.table.numbers[k].as_ref()?, self.restarts())?));
+        let angles: Vec<(usize, Angle)> = coordinates.iter().filter_map(found).collect();
+        let mut guessed: Vec<(String, String)> = Vec::new();
+        for (k, Angle { degrees, .. }) in &angles {
+            let derivatives =
+                [(1, "deg/s"), (2, "deg/s2")].map(|(order, unit)| (self.of(&Role::Derivative(order, *k)), unit));
+            let own = [(vec![*k], "deg")].into_iter().chain(derivatives);
+            for (place, unit) in own.flat_map(|(places, unit)| places.into_iter().map(move |place| (place, unit))) {
+                if *degrees {
+                    guessed.push((self.table.names[place].clone(), unit.to_string()));
+                }
+            }
+        }
+        if let Some(Time { column, unit: Some(unit), .. }) = &self.time {
+            guessed.push((self.table.names[*column].clone(), (*unit).to_string()));
+        }
+        guessed.retain(|(name, _)| !known(name));
+        let given = self.given.clone();
+        let some = |given: Vec<String>, found: Vec<String>| if given.is_empty() { found } else { given };
+        let columns = Columns {
+            coords: names(coordinates.clone()),
+            velocity: some(given.velocity, derivative(1)),
+            acceleration: some(given.acceleration, derivative(2)),
+            force: some(given.force, names(self.of(&Role::Force))),
+            time: self.time.as_ref().map(|time| self.table.names[time.column].clone()),
+            trajectory: names(self.of(&Role::Trajectory)).pop(),
+            periodic: some(given.periodic, names(angles.iter().map(|(k, _)| *k).collect())),
+            units: given.units.into_iter().chain(guessed).collect(),
+            ..given
+        };
+        (angles, columns)
+    }
+
+    /// One entry for every column.
+    fn explain(&self, angles: &[(usize, Angle)]) -> Vec<ColumnGuess> {
+        let name = |k: usize| self.table.names[k].clone();
+        let entry = |(k, role): (usize, &Option<(Role, String)>)| {
+            let (role, because) = role.clone()?;
+            let (meaning, because) = match role {
+                Role::Time => {
+                    let unit = self.time.as_ref().and_then(|time| time.unit);
+                    (unit.map_or("time".to_string(), |unit| format!("time in {unit}")), because)
+                }
+                Role::Trajectory => ("trajectory".to_string(), because),
+                Role::Coordinate => match angles.iter().find(|(place, _)| *place == k) {
+                    Some((_, Angle { degrees: true, because })) => ("angle in degrees".to_string(), because.clone()),
+                    Some((_, Angle { because, .. })) => ("angle".to_string(), because.clone()),
+                    None => ("coordinate".to_string(), because),
+                },
+                Role::Derivative(1, j) => (format!("velocity of {}", name(j)), because),
+                Role::Derivative(_, j) => (format!("acceleration of {}", name(j)), because),
+                Role::Force => ("force".to_string(), because),
+                Role::Given(what) => (what.to_string(), because),
+                Role::Unused => ("left out".to_string(), because),
+            };
+            Some(ColumnGuess { column: name(k), meaning, because })
+        };
+        self.roles.iter().enumerate().filter_map(entry).collect()
+    }
+}
+
+/// `true` if a column is another one times a factor, plus a constant, to rounding.
+fn copies(values: &[f64], other: &[f64]) -> bool {
+    let far = |values: &[f64]| {
+        let (low, high) = (0..values.len()).fold((0, 0), |(l, h), k| {
+            (if values[k] < values[l] { k } else { l }, if values[k] > values[h] { k } else { h })
+        });
+        (low, high)
+    };
+    let (low, high) = far(other);
+    let spread = other[high] - other[low];
+    if spread == 0.0 {
+        return false;
+    }
+    let factor = (values[high] - values[low]) / spread;
+    let size = (values[high] - values[low]).abs();
+    let off = |k: usize| (values[k] - values[low] - factor * (other[k] - other[low])).abs();
+    size > 0.0 && (0..values.len()).all(|k| off(k) <= 1e-6 * size)
+}

@@ -1,0 +1,71 @@
+//! All columns of a file, before anybody says what they are.
+
+use super::builder::Builder;
+use super::{MAX_BYTES, Problem, parse};
+use crate::recording::{Columns, DataError};
+use crate::storage::open_regular;
+use std::path::Path;
+
+/// Most columns of which each is read on its own, if some do not hold numbers.
+const MOST: usize = 256;
+
+/// The columns of a file in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawTable {
+    /// Names; numbers from 1 where the file has none, or has one twice.
+    pub names: Vec<String>,
+    /// Numbers of each column as they stand in the file, `(rows)`; none of a column that does not hold a number in every row.
+    pub numbers: Vec<Option<Vec<f64>>>,
+}
+
+impl RawTable {
+    /// Reads every column of a file; `named` are the names of a file without a header.
+    ///
+    /// # Errors
+    /// [`DataError::File`] for a file that cannot be read as a table.
+    pub fn read(path: &Path, named: Option<&[String]>) -> Result<Self, DataError> {
+        Self::of(path, named).map_err(|problem| DataError::File { file: path.display().to_string(), problem })
+    }
+
+    fn of(path: &Path, named: Option<&[String]>) -> Result<Self, Problem> {
+        // One sample a second: no column needs to be the time.
+        let asked = |coords: &[String]| Columns {
+            coords: coords.to_vec(),
+            rate: Some(1.0),
+            names: named.map(<[String]>::to_vec),
+            whole: true,
+            ..Columns::default()
+        };
+        let names = match rows(path, &asked(&[])) {
+            Err(Problem::Names(names)) => names,
+            Err(problem) => return Err(problem),
+            Ok(_) => Vec::new(),
+        };
+        let twice = names.iter().enumerate().any(|(k, name)| names[..k].contains(name));
+        let names = if twice { (1..=names.len()).map(|k| k.to_string()).collect() } else { names };
+        let numbers = match rows(path, &asked(&names)) {
+            Ok(rows) => columns(&rows, names.len()).into_iter().map(Some).collect(),
+            Err(problem) if names.len() > MOST => return Err(problem),
+            Err(_) => names
+                .iter()
+                .map(|name| {
+                    let rows = rows(path, &asked(std::slice::from_ref(name))).ok()?;
+                    columns(&rows, 1).pop()
+                })
+                .collect(),
+        };
+        Ok(Self { names, numbers })
+    }
+}
+
+/// The rows of a file, `(rows, columns)`.
+fn rows(path: &Path, columns: &Columns) -> Result<Vec<f64>, Problem> {
+    let (file, size) = open_regular(path, MAX_BYTES)?;
+    let Builder { tracks, .. } = parse(file, size, columns)?;
+    Ok(tracks.into_iter().flat_map(|track| track.track.q).collect())
+}
+
+/// Rows as columns.
+fn columns(rows: &[f64], width: usize) -> Vec<Vec<f64>> {
+    (0..width).map(|k| rows.iter().skip(k).step_by(width).copied().collect()).collect()
+}
