@@ -79,6 +79,19 @@ impl Cancellation {
         Self { reports: Some(Arc::new(reports)), ..self }
     }
 
+    /// A cancellation of its own that is raised with this one, and after a time. It is noticed when the search reports.
+    #[must_use]
+    pub fn within(&self, limit: Duration) -> Self {
+        let (outer, inner, started) = (self.clone(), Self::default(), Instant::now());
+        let flag = Arc::clone(&inner.flag);
+        inner.reporting(move |progress| {
+            if outer.is_cancelled() || started.elapsed() > limit {
+                flag.store(true, Ordering::SeqCst);
+            }
+            outer.report(|now| *now = progress);
+        })
+    }
+
     /// The flag.
     pub fn flag(&self) -> &AtomicBool {
         &self.flag
@@ -160,5 +173,20 @@ mod tests {
         assert!((2..20).contains(&seen.len()), "{seen:?}");
         let last = SearchProgress { stage: "first", iteration: 1, residual: Some(1.5), pieces: 1000 };
         assert_eq!((seen[0].stage, seen[seen.len() - 1]), ("first", last));
+    }
+
+    #[test]
+    fn a_limit_of_time_ends_the_inner_search_alone() {
+        let outer = Cancellation::default();
+        let (long, short) = (outer.within(Duration::from_secs(3600)), outer.within(Duration::ZERO));
+        let ends = |search: &Cancellation| {
+            (0..100).any(|_| {
+                std::thread::sleep(EVERY / 4);
+                !search.go_on()
+            })
+        };
+        assert!(ends(&short) && !outer.is_cancelled() && !long.is_cancelled());
+        outer.cancel();
+        assert!(ends(&long));
     }
 }

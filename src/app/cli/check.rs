@@ -1,10 +1,10 @@
 //! `lnn check`: what recorded motion is, whether a simple law explains it, and which command to run next.
 
+use crate::cancellation::Cancellation;
 use crate::cli::recording_args::RecordingArgs;
-use crate::cli::watch::search;
-use crate::cli::{CliError, output};
-use crate::pipeline::{FirstLook, NextStep};
-use crate::recording::{Columns, Guess};
+use crate::cli::{CliError, interrupt, output};
+use crate::pipeline::{FirstLook, NextStep, PipelineError};
+use crate::recording::{ColumnGuess, Columns, Guess, LoadedRecording};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -22,7 +22,7 @@ pub struct Args {
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let (reading, Guess { columns, table }) = args.recording.load()?;
-    let look = FirstLook::new(&reading, table, &search()?)?;
+    let look = first_look(&reading, table)?;
     if args.json {
         return output::print(&output::json(&look)?);
     }
@@ -31,6 +31,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         findings.gap().line("next:").line(format!("  {next}"));
     }
     output::print(&findings.to_string())
+}
+
+/// A first look at recorded motion.
+///
+/// # Errors
+/// A data error for motion that cannot be smoothed, an interruption.
+pub fn first_look(reading: &LoadedRecording, guessed: Vec<ColumnGuess>) -> Result<FirstLook, CliError> {
+    let stop = Cancellation::by(&interrupt::flag().map_err(CliError::signals)?);
+    FirstLook::new(reading, guessed, &stop).map_err(|error| match error {
+        PipelineError::Interrupted => CliError::nothing_written(),
+        error => error.into(),
+    })
 }
 
 /// The command to run next, if there is one.

@@ -1,13 +1,13 @@
 //! `lnn fit`: learns from recorded motion, tests the model on held-out motion, writes the results.
 
+use crate::cli::check::first_look;
 use crate::cli::fit_config::{Args, Plan, Saved};
 use crate::cli::learn::{Learned, Session, open};
 use crate::cli::print_config::{PrintFormat, commented, fit_reference, training_reference};
 use crate::cli::recording_args::read;
 use crate::cli::resume::{Learner, Text, reopen};
-use crate::cli::watch::search;
 use crate::cli::{CliError, output};
-use crate::pipeline::{Begin, FirstLook, FitConfig, FitConstraints, NextStep, PipelineError, PreparedFit, fit};
+use crate::pipeline::{Begin, FitConfig, NextStep, PipelineError, PreparedFit, fit};
 use crate::recording::LoadedRecording;
 use std::time::Instant;
 
@@ -21,7 +21,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.run.print_config == Some(PrintFormat::Markdown) {
         return output::print(&(fit_reference() + &training_reference()));
     }
-    let args = &args.complete()?;
+    let completed = args.complete()?;
+    let first = args.recording.coords != completed.recording.coords;
+    let args = &completed;
     let (plan, resumed) = match &args.run.resume {
         None => (Plan::new(args, None)?, None),
         Some(path) => {
@@ -48,10 +50,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("{motion}: without known forces (--force) L and the friction cannot be separated"));
     }
     let config = plan.configure(&prepared)?;
-    advise(&plan, &reading)?;
     if args.run.print_config.is_some() {
         let table = toml::Table::try_from(&config).map_err(CliError::data)?;
         return output::print(&commented(FitConfig::KEYS, &table, &|_| None));
+    }
+    if first {
+        advise(&reading)?;
     }
     let (folder, begin) = match resumed {
         Some(folder) => (folder, Begin::Resume),
@@ -66,14 +70,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }))
 }
 
-/// Notes what would explain the motion better than a network, at the beginning of a fit that does not look for it itself.
-fn advise(plan: &Plan<'_>, reading: &LoadedRecording) -> Result<(), CliError> {
-    let run = &plan.args.run;
-    let asked = plan.config.formula || plan.config.constraints != FitConstraints::None;
-    if asked || run.json || run.resume.is_some() || run.print_config.is_some() {
-        return Ok(());
-    }
-    let look = FirstLook::new(reading, Vec::new(), &search()?)?;
+/// Notes what would explain the motion better than a network.
+fn advise(reading: &LoadedRecording) -> Result<(), CliError> {
+    let look = first_look(reading, Vec::new())?;
     look.laws().iter().for_each(|law| output::note(law));
     if look.next == NextStep::Formula {
         output::note(

@@ -10,6 +10,7 @@ use crate::recording::smooth::SmoothOptions;
 use crate::recording::survey::{Survey, SurveyOptions, survey};
 use crate::recording::{ColumnGuess, LoadedRecording, RecordedTrajectory, Recording};
 use serde::{Serialize, Serializer};
+use std::time::Duration;
 
 /// Samples in which laws are looked for, at most: seconds of searching.
 const SAMPLES: usize = 2000;
@@ -17,6 +18,8 @@ const SAMPLES: usize = 2000;
 const LEAST: usize = 200;
 /// Coordinates up to which a formula is looked for: the number of terms grows with their fourth power.
 const COORDINATES: usize = 4;
+/// Time in which a formula is looked for, at most.
+const LIMIT: Duration = Duration::from_secs(3);
 /// Nothing accelerates if the accelerations of no coordinate exceed their error.
 const ACCELERATES: f64 = 1.0;
 
@@ -51,6 +54,8 @@ pub struct FirstLook {
     /// The formula that explains the motion, if there is one among small ones.
     #[serde(serialize_with = "text_of")]
     pub formula: Option<FoundFormula>,
+    /// `true` if the search for a formula ended at its limit of time.
+    pub unfinished: bool,
     /// The advice.
     pub next: NextStep,
 }
@@ -62,7 +67,7 @@ fn text_of<S: Serializer>(formula: &Option<FoundFormula>, to: S) -> Result<S::Ok
 
 impl FirstLook {
     /// Looks at a recording; `guessed` is what its columns were taken as. Constraints and formulas are looked for in parts of the trajectories,
-    /// of at most 2000 samples together.
+    /// of at most 2000 samples together, and formulas for at most 3 s.
     ///
     /// # Errors
     /// [`PipelineError::Smooth`] for trajectories too short for any window, [`PipelineError::Interrupted`].
@@ -81,21 +86,24 @@ impl FirstLook {
         let search = obstacle.is_none() && accelerates && survey.motionless.is_empty();
         let constraints = if search { constraints(&some, cancellation)? } else { None };
         let held = constraints.as_ref().is_some_and(|found| found.count > 0);
-        let formula = if search && !held { formula(&some, cancellation)? } else { None };
+        let (formula, unfinished) = if search && !held { formula(&some, cancellation)? } else { (None, false) };
         let next = match (&obstacle, &formula) {
-            (Some(_), _) => NextStep::Mend,
             _ if !accelerates => NextStep::Record,
+            (Some(_), _) => NextStep::Mend,
             (None, Some(_)) => NextStep::Formula,
             _ if held => NextStep::FitConstrained,
             _ => NextStep::Fit,
         };
-        Ok(Self { guessed, survey, obstacle, constraints, formula, next })
+        Ok(Self { guessed, survey, obstacle, constraints, formula, unfinished, next })
     }
 
     /// The verdict, what the columns are taken as, the survey, the laws, and the warnings.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.line(match &self.obstacle {
+            _ if self.next == NextStep::Record => {
+                "Nothing accelerates here beyond the noise: no Lagrangian can be learned from this motion.".to_string()
+            }
             Some(obstacle) => format!("A fit cannot learn from these data: {obstacle}."),
             None => self.survey.headline(),
         });
@@ -113,19 +121,17 @@ impl FirstLook {
 
     /// The laws that were found, each in a sentence: what to use instead of a network that knows nothing.
     pub fn laws(&self) -> Vec<String> {
-        let mut laws = Vec::new();
-        if self.next == NextStep::Record {
-            laws.push(
-                "nothing accelerates here beyond the noise: no Lagrangian can be learned from this motion".to_string(),
-            );
-        }
         let constraints = self.constraints.iter().flat_map(|found| found.formulas().into_values());
-        laws.extend(constraints.map(|formula| format!("the motion stays on {formula} = 0: add --constraints find")));
+        let mut laws: Vec<String> =
+            constraints.map(|formula| format!("the motion stays on {formula} = 0: add --constraints find")).collect();
         if let Some(found) = &self.formula {
             laws.push(format!("a formula explains this motion: L = {}", found.text(false)));
             if self.has_friction() {
                 laws.push(format!("its friction is D = {}", found.text(true)));
             }
+        }
+        if self.unfinished {
+            laws.push(format!("no formula was found within {} s; lnn formula searches on", LIMIT.as_secs()));
         }
         laws
     }
@@ -175,15 +181,16 @@ fn constraints(recording: &Recording, stop: &Cancellation) -> Result<Option<Foun
     }
 }
 
-/// A formula that explains motion of few coordinates, with friction if it has some.
-fn formula(recording: &Recording, stop: &Cancellation) -> Result<Option<FoundFormula>, PipelineError> {
+/// A formula that explains motion of few coordinates, with friction if it has some, and whether the search ran out of time.
+fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFormula>, bool), PipelineError> {
     if recording.n() > COORDINATES {
-        return Ok(None);
+        return Ok((None, false));
     }
-    let options =
-        FormulaOptions { friction: true, bootstraps: 0, cancellation: stop.clone(), ..FormulaOptions::default() };
+    let cancellation = stop.within(LIMIT);
+    let options = FormulaOptions { friction: true, bootstraps: 0, cancellation, ..FormulaOptions::default() };
     match formula_of_motion(recording, &options) {
-        Err(FormulaError::Cancelled(Cancelled)) => Err(PipelineError::Interrupted),
-        found => Ok(found.ok().filter(|found| found.verdict == Verdict::Found && found.doubts.is_empty())),
+        Err(FormulaError::Cancelled(Cancelled)) if stop.is_cancelled() => Err(PipelineError::Interrupted),
+        Err(FormulaError::Cancelled(Cancelled)) => Ok((None, true)),
+        found => Ok((found.ok().filter(|found| found.verdict == Verdict::Found && found.doubts.is_empty()), false)),
     }
 }

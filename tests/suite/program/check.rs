@@ -63,7 +63,7 @@ fn good_data_are_described() {
 
     let run = check(&files, &["--coords", "x,y"]);
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
-    for part in ["3 files, 3 trajectories, 4500 samples", "x ", "advice: learn from smoothed", "held out", "100.0"] {
+    for part in ["3 files, 3 trajectories, 4500 samples", "x ", "targets: smoothed", "held out", "100.0"] {
         assert!(run.stdout.contains(part), "{part:?} is not in\n{}", run.stdout);
     }
 }
@@ -216,7 +216,6 @@ fn contradicting_arguments_are_refused() {
     let folder = Folder::new();
     let file = folder.file("good.csv", csv("t,x,y", &swing(40, 1)));
     let refused = |more: &[&str], part: &str| check(&[&file], more).refused(2, &[part]);
-    refused(&[], "--coords");
     refused(&["--coords", "x", "--velocity", "y,t"], "velocity: expected 1 column, one per coordinate, found 2");
     refused(&["--coords", "x,x"], "column x is used twice");
     refused(&["--coords", "x", "--periodic", "z"], "unknown coordinate \"z\"");

@@ -106,7 +106,7 @@ fn arguments_of_a_fit_that_goes_on_are_checked() {
     fs::create_dir(&none).unwrap();
     lnn(&["fit", "--resume", &none]).refused(1, &["no checkpoint"]);
     lnn(&["fit", "--resume", &none, "--overwrite"]).refused(2, &["--overwrite"]);
-    lnn(&["fit", "--hidden", "4"]).refused(2, &["--coords"]);
+    lnn(&["fit", "--hidden", "4"]).refused(2, &["DATA"]);
     for value in ["0", "0s", "x"] {
         lnn(&["fit", "x.csv", "--coords", "x", "--checkpoint-every", value]).refused(2, &["--checkpoint-every"]);
     }

@@ -285,7 +285,7 @@ fn the_commands_of_the_readme_run() {
         assert_eq!(result.code, Some(0), "{line}: {}", result.stderr);
         run.push(words[0].clone());
     }
-    assert_eq!(run, ["train", "rollout", "evaluate", "page", "check", "fit"]);
+    assert_eq!(run, ["train", "rollout", "evaluate", "page", "check", "formula", "fit"]);
     for file in ["trained/report.html", "motion.csv", "evaluation/report.html", "fitted/report.html"] {
         assert!(folder.path(file).exists(), "no {file}: {:?}", folder.names());
     }
