@@ -4,6 +4,7 @@ use crate::cli::files::OutputFile;
 use crate::cli::number::whole;
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
+use crate::cli::result_page::{self, PageArgs};
 use crate::cli::watch::search;
 use crate::cli::{CliError, config, output};
 use crate::constraints::{
@@ -32,8 +33,10 @@ pub struct Args {
     /// Write the table [constraints] to this file; system files and roll-outs take it.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Replace the file.
-    #[arg(long, requires = "out")]
+    #[command(flatten)]
+    page: PageArgs,
+    /// Replace the files that are there.
+    #[arg(long)]
     overwrite: bool,
     /// One JSON object instead of text.
     #[arg(long)]
@@ -73,6 +76,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
     let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.overwrite)).transpose()?;
+    let page = args.page.claim(&inputs, args.overwrite)?;
     let recording = args.recording.read()?.0.recording;
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
     let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
@@ -84,6 +88,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(out) = &out {
         write_table(out, &found)?;
     }
+    result_page::write(page, "Constraints of recorded motion", &found.findings(), &[])?;
     OutputFile::print(out, &output::shown(&found, args.json, FoundConstraints::findings)?)
 }
 
@@ -110,6 +115,8 @@ fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if examined.states == 0 {
         return Err(CliError::data(format_args!("{}: the mass matrix is not finite at any sampled state", probe.name)));
     }
+    let page = args.page.claim(&[Path::new(name)], args.overwrite)?;
+    result_page::write(page, "Constraints of a Lagrangian", &examined.findings(), &[])?;
     output::print(&output::shown(&examined, args.json, ExaminedLagrangian::findings)?)
 }
 

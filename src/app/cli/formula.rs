@@ -4,6 +4,7 @@ use crate::cli::files::OutputFile;
 use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
+use crate::cli::result_page::{self, PageArgs};
 use crate::cli::watch::search;
 use crate::cli::{CliError, output, parse_system};
 use crate::formula::{
@@ -62,8 +63,10 @@ pub struct Args {
     /// Write the formula as a system file for train, rollout and certify, with its constants as parameters.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Replace the file.
-    #[arg(long, requires = "out")]
+    #[command(flatten)]
+    page: PageArgs,
+    /// Replace the files that are there.
+    #[arg(long)]
     overwrite: bool,
     /// Name of the system in the file.
     #[arg(long, value_name = "NAME", default_value = "formula", value_parser = system_name)]
@@ -139,6 +142,7 @@ impl Args {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
     let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
+    let page = args.page.claim(&inputs, args.overwrite)?;
     let found = match args.recording.data.as_slice() {
         [path] if is_model(path) => of_model(args, path)?,
         _ => of_motion(args)?,
@@ -149,6 +153,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             .map_err(|(_, problem)| CliError::usage(format_args!("--out: no system file: {problem}")))?;
         out.write(text.as_bytes())?;
     }
+    result_page::write(page, "The Lagrangian as a formula", &found.findings(), &[])?;
     if args.json {
         return OutputFile::print(out, &output::json(&found.summary(&args.name))?);
     }

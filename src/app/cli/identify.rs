@@ -3,6 +3,7 @@
 use crate::cli::files::OutputFile;
 use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::{RecordingArgs, read as read_files};
+use crate::cli::result_page::{self, PageArgs};
 use crate::cli::source::parameter;
 use crate::cli::watch::search;
 use crate::cli::{CliError, output, parse_system, system_arg};
@@ -10,6 +11,7 @@ use crate::identification::{Between, Identified, IdentifyError, IdentifyOptions,
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::pluralize;
 use crate::recording::{Columns, LoadedRecording, Targets};
+use crate::report::identification_figures;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -63,8 +65,10 @@ pub struct Args {
     /// Write the system with the identified constants, as a file for rollout, train and grey boxes.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Replace the file.
-    #[arg(long, requires = "out")]
+    #[command(flatten)]
+    page: PageArgs,
+    /// Replace the files that are there.
+    #[arg(long)]
     overwrite: bool,
 }
 
@@ -108,6 +112,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let inputs: Vec<&Path> =
         args.recording.data.iter().map(PathBuf::as_path).chain([Path::new(&args.system)]).collect();
     let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
+    let page = args.page.claim(&inputs, args.overwrite)?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
     let reading = read(args, &instance)?;
@@ -131,6 +136,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         write(out, &instance, &found)?;
     }
     let found = found.with_rows_of(&reading);
+    let title = format!("Constants of {}", instance.system.name);
+    result_page::write(page, &title, &found.findings(), &identification_figures(&found))?;
     OutputFile::print(out, &output::shown(&found, args.json, Identified::findings)?)
 }
 

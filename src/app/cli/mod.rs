@@ -43,6 +43,7 @@ mod print_config;
 mod probe;
 mod progress;
 mod recording_args;
+mod result_page;
 mod results;
 mod resume;
 mod rollout;

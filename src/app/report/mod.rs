@@ -4,6 +4,7 @@ mod evaluation;
 mod experiment;
 mod grids;
 mod html;
+mod identification;
 mod page;
 mod plot;
 mod table;
@@ -14,6 +15,7 @@ pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
 pub use grids::{Fit, GridComparison, grid_figures};
 pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
+pub(crate) use identification::identification_figures;
 pub use page::{PageError, page};
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,

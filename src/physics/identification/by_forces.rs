@@ -8,7 +8,7 @@ use super::IdentifyError;
 use super::bootstrap::{self, COPIES};
 use super::covariance::Root;
 use super::follow::{Follower, LANES, Segment};
-use super::found::{Identified, Outlier, Residual};
+use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
@@ -16,7 +16,7 @@ use super::stages::Fitted;
 use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::{Smoothed, Smoothing, noise};
-use crate::recording::{deviation, quantile, rms};
+use crate::recording::{RecordedTrajectory, Recording, deviation, quantile, rms};
 
 /// Largest number of updates of the coordinates' weights, and the relative change of all weights that ends the updates; failing to reach it is
 /// reported.
@@ -138,10 +138,30 @@ pub(super) fn identify(
         over_noise,
         outliers,
         outlier_count,
+        paths: paths(recording, &states.places, &raw),
         inflation,
         samples: count,
         ..unknowns(instance, problem, &fitted, (&start, 1.0), (Met::Forces, &normal_at))
     })
+}
+
+/// Known forces at successive places of each trajectory, and their residuals `(states, n)`.
+fn paths(recording: &Recording, places: &[(usize, usize)], residuals: &[f64]) -> Vec<ResidualPath> {
+    let n = recording.n();
+    let rows: Vec<(usize, usize, &[f64])> =
+        places.iter().zip(residuals.chunks_exact(n)).map(|(&(track, sample), r)| (track, sample, r)).collect();
+    let path = |rows: &[(usize, usize, &[f64])]| {
+        let mut path = ResidualPath::default();
+        for &(track, sample, residuals) in rows {
+            let RecordedTrajectory { times, force, .. } = &recording.tracks[track];
+            path.times.push(times[sample]);
+            // Without a known force, the friction and the terms of L balance to zero.
+            path.measured.extend((0..n).map(|i| force.get(sample * n + i).copied().unwrap_or(0.0)));
+            path.residuals.extend(residuals);
+        }
+        path
+    };
+    rows.chunk_by(|a, b| a.0 == b.0).map(path).collect()
 }
 
 /// Fits the constants and updates the weights of coordinates by the sizes of their averages until both settle; returns the normal equations

@@ -156,6 +156,17 @@ pub struct Correlations {
     pub matrix: Vec<Vec<f64>>,
 }
 
+/// Measured numbers and their residuals at successive samples of a trajectory: positions, or the known forces where these were fitted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ResidualPath {
+    /// Times in s, `(samples)`.
+    pub times: Vec<f64>,
+    /// What was measured, in SI, `(samples, n)`.
+    pub measured: Vec<f64>,
+    /// Measured minus fitted, in SI, `(samples, n)`; `NaN` where nothing was fitted.
+    pub residuals: Vec<f64>,
+}
+
 /// Constants with their standard errors, and how far these can be trusted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Identified {
@@ -207,6 +218,9 @@ pub struct Identified {
     pub substeps: usize,
     /// Interpolation of known forces between the samples; none without forces.
     pub between: Option<Between>,
+    /// What was fitted, stretch by stretch, for pictures.
+    #[serde(skip)]
+    pub paths: Vec<ResidualPath>,
 }
 
 impl Identified {

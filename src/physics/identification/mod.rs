@@ -57,7 +57,8 @@ mod ways;
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
 pub use found::{
-    Bodies, Combination, Constant, Correlations, Identified, Outlier, Residual, SensorConstant, Undetermined,
+    Bodies, Combination, Constant, Correlations, Identified, Outlier, Residual, ResidualPath, SensorConstant,
+    Undetermined,
 };
 pub(crate) use innovations::Disturbances;
 pub(crate) use solve::{Linear, Problem};

@@ -3,7 +3,7 @@
 use super::choices::{check_errors, chosen, met, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::follow::{Course, Segment};
-use super::found::{Identified, Outlier, Residual};
+use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::innovations::Disturbances;
 use super::pieces::{LEAST_SEGMENT, Pieces};
 use super::quality::{
@@ -581,6 +581,7 @@ fn result(
         residuals: by_coordinate,
         outliers,
         outlier_count,
+        paths: paths(problem, &fitted.segments, &residuals),
         inflation,
         force_noise: problem.disturbances.force.clone(),
         samples: fitted.segments.iter().map(|segment| segment.samples).sum(),
@@ -597,6 +598,21 @@ fn result(
             (Met::Accelerations, &normal_at),
         )
     }
+}
+
+/// Positions of the segments and their residuals, in SI; `residuals` are in units of the noise.
+fn paths(problem: &Problem<'_>, segments: &[Segment], residuals: &[Vec<f64>]) -> Vec<ResidualPath> {
+    let n = problem.sigma.len();
+    let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
+        let (track, end) = (&problem.course.recording.tracks[segment.track], segment.first + segment.samples);
+        let unit = |k: usize| problem.sigma_at(segment.track, segment.first + k / n, k % n);
+        ResidualPath {
+            times: track.times[segment.first..end].to_vec(),
+            measured: track.q[segment.first * n..end * n].to_vec(),
+            residuals: residuals.iter().enumerate().map(|(k, r)| r * unit(k)).collect(),
+        }
+    };
+    segments.iter().zip(residuals).map(of).collect()
 }
 
 /// Normal equations whose covariance is that of the residuals, and the factor by which correlated residuals increase variances. Correlated
