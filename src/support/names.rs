@@ -158,12 +158,21 @@ pub fn percent(fraction: f64) -> String {
     if fraction.is_finite() { format!("{} %", percentage(fraction)) } else { "-".to_string() }
 }
 
-/// A number with so many significant digits in LaTeX, without zeros at the end: `1.25 \times 10^{-9}`. See [`rounded`].
-pub fn latex_number(x: f64, digits: usize) -> String {
+/// [`rounded`] without zeros at the end: `3`, `1.25e-9`.
+pub fn trimmed(x: f64, digits: usize) -> String {
     let text = rounded(x, digits);
-    let (mantissa, exponent) = text.split_once('e').map_or((text.as_str(), None), |(m, e)| (m, Some(e)));
-    let mantissa = if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
-    exponent.map_or(mantissa.to_string(), |exponent| format!("{mantissa} \\times 10^{{{exponent}}}"))
+    let (mantissa, exponent) = text.split_at(text.find('e').unwrap_or(text.len()));
+    let short = if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
+    format!("{short}{exponent}")
+}
+
+/// [`trimmed`] in LaTeX: `1.25 \times 10^{-9}`.
+pub fn latex_number(x: f64, digits: usize) -> String {
+    let text = trimmed(x, digits);
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => format!("{mantissa} \\times 10^{{{exponent}}}"),
+        None => text,
+    }
 }
 
 /// A name in LaTeX: Greek letters by their commands, digits at the end as an index.
@@ -378,6 +387,7 @@ mod tests {
     fn numbers_in_latex_have_powers_of_ten() {
         let of = |x: f64| latex_number(x, 7);
         assert_eq!([of(3.0), of(-0.25), of(1200.0), of(0.0)], ["3", "-0.25", "1200", "0"]);
+        assert_eq!((trimmed(1.5e-9, 7), trimmed(0.25, 1)), ("1.5e-9".to_string(), "0.2".to_string()));
         assert_eq!([of(1.5e-9), of(-2e12)], ["1.5 \\times 10^{-9}", "-2 \\times 10^{12}"]);
     }
 }

@@ -8,7 +8,7 @@ use crate::cli::surfaces::Line;
 use crate::cli::{CliError, input, output, states, tensors};
 use crate::geometry::{GeometryError, MOST_COORDINATES, PointReport, at_once, depends_on_velocity, point_reports};
 use crate::lagrangian::EulerLagrange;
-use crate::names::rounded;
+use crate::names::trimmed;
 use crate::scalar::{Dd, Real, Scalar};
 use std::path::{Path, PathBuf};
 
@@ -151,7 +151,7 @@ fn print_points<S: Scalar>(
 
 /// A point in words.
 fn heading<S: Scalar>(names: &[String], q: &[S]) -> String {
-    let parts = names.iter().zip(q).map(|(name, x)| format!("{name} = {}", rounded(x.to_f64(), 7)));
+    let parts = names.iter().zip(q).map(|(name, x)| format!("{name} = {}", trimmed(x.to_f64(), 7)));
     parts.collect::<Vec<_>>().join(", ")
 }
 
