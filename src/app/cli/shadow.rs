@@ -162,7 +162,7 @@ impl Args {
         let time = place("--time", &self.time)?;
         let cartesian = ["x", "y", "z"].map(String::from);
         let others: Vec<String> = coordinates.iter().filter(|name| **name != self.time).cloned().collect();
-        let usual = if others.len() != 3 || cartesian.iter().all(|name| others.contains(name)) {
+        let usual = if others.len() != 3 || cartesian.iter().all(|name| coordinates.contains(name)) {
             &cartesian[..]
         } else {
             &others

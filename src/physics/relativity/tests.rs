@@ -289,7 +289,7 @@ fn a_wormhole_shows_its_other_side() {
         let model = TwoSided::new(Mechanics::new(Wormhole(throat), vec![]), 0, [1, 2, 3], radius, far).unwrap();
         let camera = Camera { field_of_view: 2.0, ..small(model.distance(radius), inclination) };
         let [far, second] = [far, -far].map(|l| model.distance(l));
-        let tracing = Tracing { far, second, ..Tracing::of(&camera) };
+        let tracing = Tracing { far, second, tolerance: 1e-7, ..Tracing::of(&camera) };
         let found = outline(&model, &camera, &tracing, 12).unwrap().unwrap();
         let exact = (throat / throat.hypot(radius)).asin();
         for edge in &found.edges {

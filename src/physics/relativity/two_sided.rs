@@ -23,8 +23,8 @@ pub struct TwoSided<M> {
     scale: f64,
 }
 
-/// Least sine of the angle from the axis, where the angle about it is not determined: a place that is nearer is moved by this share of its
-/// distance.
+/// Least sine of the angle from the axis, where the angle about it is not determined: a state that is nearer is turned away to this angle,
+/// and its acceleration back.
 const AXIS: f64 = 1e-6;
 /// Deviation of the area of distant spheres from that of flat space.
 const FLAT: f64 = 0.1;
@@ -87,13 +87,14 @@ impl<M: EulerLagrange<f64>> TwoSided<M> {
     fn place(&self, x: [f64; 3]) -> Place {
         let (rho, across) = (norm(x), x[0].hypot(x[1]));
         let (mut sine, mut cosine) = (across / rho, x[2] / rho);
+        let (sin, cos) = x[1].atan2(x[0]).sin_cos();
+        let legs = [[sine * cos, sine * sin, cosine], [cosine * cos, cosine * sin, -sine], [-sin, cos, 0.0]];
         if sine < AXIS {
             (sine, cosine) = (AXIS, cosine.signum());
         }
-        let (sin, cos) = x[1].atan2(x[0]).sin_cos();
         Place {
             rho,
-            legs: [[sine * cos, sine * sin, cosine], [cosine * cos, cosine * sin, -sine], [-sin, cos, 0.0]],
+            legs,
             sine,
             cosine,
             coordinates: [rho - 0.25 * self.scale.powi(2) / rho, sine.atan2(cosine), x[1].atan2(x[0])],
