@@ -54,7 +54,6 @@ pub use shadow::Difference;
 pub use shadow::{Edge, Outline, Shadow, outline, shadow};
 #[doc(hidden)]
 pub use sky::{Image, Sky, difference_image};
-#[doc(hidden)]
 pub use two_sided::TwoSided;
 
 use crate::geometry::GeometryError;

@@ -53,10 +53,11 @@ pub struct Sky {
 /// Colours of the quadrants: upper left, upper right, lower left, lower right.
 const QUADRANTS: [[u8; 3]; 4] = [[76, 175, 80], [229, 72, 77], [66, 118, 220], [245, 196, 66]];
 /// Colours of the quadrants of the second sky, and of the lines over them.
-const SECOND: [[u8; 3]; 4] = [[38, 30, 84], [84, 28, 92], [16, 62, 84], [66, 52, 40]];
+const SECOND: [[u8; 3]; 4] = [[92, 70, 176], [170, 62, 150], [30, 132, 150], [150, 110, 70]];
 const SECOND_LINES: [u8; 3] = [244, 236, 208];
-/// Half of the width of a line, in sides of a square.
-const LINE: f64 = 0.08;
+/// Distance of two lines in sides of a square, and half of the width of a line over it.
+const LINES: f64 = 2.0;
+const LINE: f64 = 0.06;
 /// Brightness of every other square.
 const DARK: f64 = 0.55;
 /// Colour of rays that were left unfinished.
@@ -88,7 +89,7 @@ impl Sky {
         (left, above, usize::from(left < 0.0) + 2 * usize::from(above < 0.0))
     }
 
-    /// Colour of a direction in the second region: a grid of bright lines at the sides of the squares on dark quadrants, a white disc around
+    /// Colour of a direction in the second region: a grid of bright lines on quadrants of other colours, a white disc around
     /// the point that the ray of the centre shows.
     fn second_colour(&self, direction: [f64; 3]) -> [u8; 3] {
         let mirrored = direction.map(|x| -x);
@@ -96,7 +97,8 @@ impl Sky {
             return [255; 3];
         }
         let (left, above, quadrant) = self.angles(mirrored);
-        let from_line = |x: f64| (x / self.square - (x / self.square).round()).abs();
+        let side = LINES * self.square;
+        let from_line = |x: f64| (x / side - (x / side).round()).abs();
         // Meridians are as wide as circles of latitude.
         let is_line = from_line(above) < LINE || from_line(left) * above.cos() < LINE;
         if is_line { SECOND_LINES } else { SECOND[quadrant] }

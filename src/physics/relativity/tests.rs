@@ -268,16 +268,19 @@ fn tolerances_have_ends() {
     }
 }
 
-/// The wormhole of Ellis with a throat of radius `b`: `-dt^2 + dl^2 + (b^2 + l^2) (dtheta^2 + sin^2 theta dphi^2)`.
-struct Wormhole(f64);
+/// A wormhole of a throat of radius `b`, with a lapse at it: `-N dt^2 + dl^2 + A (dtheta^2 + sin^2 theta dphi^2)`, `A = b^2 + l^2`,
+/// `N = 1 - lapse/(A + 1)`. Without a lapse it is that of Ellis.
+pub(super) struct Wormhole(pub f64, pub f64);
 
 impl Lagrangian for Wormhole {
     fn coordinates(&self) -> usize {
         4
     }
     fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+        let area = q[1].sqr() + R::of(self.0 * self.0);
+        let lapse = R::one() - R::of(self.1) / (area + R::one());
         let sphere = v[2].sqr() + (q[2].sin() * v[3]).sqr();
-        (v[1].sqr() + (q[1].sqr() + R::of(self.0 * self.0)) * sphere - v[0].sqr()) * R::half()
+        (v[1].sqr() + area * sphere - lapse * v[0].sqr()) * R::half()
     }
 }
 
@@ -286,7 +289,7 @@ impl Lagrangian for Wormhole {
 fn a_wormhole_shows_its_other_side() {
     let (throat, far) = (1.5, 4e3);
     for (radius, inclination) in [(6.0, 1.2), (0.5, FRAC_PI_2), (30.0, 0.0)] {
-        let model = TwoSided::new(Mechanics::new(Wormhole(throat), vec![]), 0, [1, 2, 3], radius, far).unwrap();
+        let model = TwoSided::new(Mechanics::new(Wormhole(throat, 0.0), vec![]), 0, [1, 2, 3], radius, far).unwrap();
         let camera = Camera { field_of_view: 2.0, ..small(model.distance(radius), inclination) };
         let [far, second] = [far, -far].map(|l| model.distance(l));
         let tracing = Tracing { far, second, tolerance: 1e-7, ..Tracing::of(&camera) };
@@ -311,7 +314,7 @@ fn a_wormhole_shows_its_other_side() {
 /// Light straight through the throat comes from the place behind it, other light turns about the throat by the integral over its way.
 #[test]
 fn places_in_the_second_region_have_their_angles() {
-    let model = TwoSided::new(Mechanics::new(Wormhole(1.0), vec![]), 0, [1, 2, 3], 5.0, 1e6).unwrap();
+    let model = TwoSided::new(Mechanics::new(Wormhole(1.0, 0.0), vec![]), 0, [1, 2, 3], 5.0, 1e6).unwrap();
     let camera = Camera { azimuth: 0.7, ..small(model.distance(5.0), 1.1) };
     let [far, second] = [1e6, -1e6].map(|l| model.distance(l));
     let tracing = Tracing { far, second, tolerance: 1e-10, ..Tracing::of(&camera) };

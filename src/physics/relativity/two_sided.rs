@@ -185,24 +185,9 @@ pub(super) fn beyond(x: [f64; 3], k: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::Wormhole;
     use super::*;
-    use crate::lagrangian::{Lagrangian, Mechanics, build};
-    use crate::scalar::Real;
-
-    /// A wormhole of a throat `b = 2` whose time runs slower at the throat, and flat space-time in the same coordinates for `b = 0`.
-    pub(crate) struct Wormhole(pub f64, pub f64);
-
-    impl Lagrangian for Wormhole {
-        fn coordinates(&self) -> usize {
-            4
-        }
-        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
-            let area = q[1].sqr() + R::of(self.0 * self.0);
-            let lapse = R::one() - R::of(self.1) / (area + R::one());
-            let sphere = v[2].sqr() + (q[2].sin() * v[3]).sqr();
-            (v[1].sqr() + area * sphere - lapse * v[0].sqr()) * R::half()
-        }
-    }
+    use crate::lagrangian::{Mechanics, build};
 
     /// The accelerations are those of the Lagrangian `g_ij v_i v_j/2` of the mass matrix that is given.
     #[test]
