@@ -158,6 +158,41 @@ pub fn percent(fraction: f64) -> String {
     if fraction.is_finite() { format!("{} %", percentage(fraction)) } else { "-".to_string() }
 }
 
+/// [`rounded`] without zeros at the end: `3`, `1.25e-9`.
+pub fn trimmed(x: f64, digits: usize) -> String {
+    let text = rounded(x, digits);
+    let (mantissa, exponent) = text.split_at(text.find('e').unwrap_or(text.len()));
+    let short = if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
+    format!("{short}{exponent}")
+}
+
+/// [`trimmed`] in LaTeX: `1.25 \times 10^{-9}`.
+pub fn latex_number(x: f64, digits: usize) -> String {
+    let text = trimmed(x, digits);
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => format!("{mantissa} \\times 10^{{{exponent}}}"),
+        None => text,
+    }
+}
+
+/// A name in LaTeX: Greek letters by their commands, digits at the end as an index.
+pub fn latex_name(name: &str) -> String {
+    const GREEK: [&str; 20] = [
+        "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi",
+        "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
+    ];
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let index = &name[stem.len()..];
+    let (stem, index) =
+        (stem.trim_end_matches('_'), if index.is_empty() { String::new() } else { format!("_{{{index}}}") });
+    let stem = match stem {
+        greek if GREEK.contains(&greek) => format!("\\{greek}"),
+        letter if letter.chars().count() == 1 => letter.to_string(),
+        word => format!("\\mathrm{{{}}}", word.replace('_', "\\_")),
+    };
+    stem + &index
+}
+
 /// Columns of a terminal that texts and tables keep to.
 pub const WIDTH: usize = 120;
 
@@ -339,5 +374,20 @@ mod tests {
             "  --seed <N>  seed of the\n              states and of\n              the weights\n"
         );
         assert!(wrap_text(&"word ".repeat(100), WIDTH).lines().all(|line| width(line) <= WIDTH));
+    }
+
+    #[test]
+    fn names_are_written_as_letters() {
+        assert_eq!(latex_name("theta12"), "\\theta_{12}");
+        assert_eq!((latex_name("x"), latex_name("r2")), ("x".to_string(), "r_{2}".to_string()));
+        assert_eq!(latex_name("arm_angle"), "\\mathrm{arm\\_angle}");
+    }
+
+    #[test]
+    fn numbers_in_latex_have_powers_of_ten() {
+        let of = |x: f64| latex_number(x, 7);
+        assert_eq!([of(3.0), of(-0.25), of(1200.0), of(0.0)], ["3", "-0.25", "1200", "0"]);
+        assert_eq!((trimmed(1.5e-9, 7), trimmed(0.25, 1)), ("1.5e-9".to_string(), "0.2".to_string()));
+        assert_eq!([of(1.5e-9), of(-2e12)], ["1.5 \\times 10^{-9}", "-2 \\times 10^{12}"]);
     }
 }

@@ -36,7 +36,7 @@ pub struct Args {
     /// The same for the velocities; a velocity that a mass shell determines is not used.
     #[arg(long, value_name = "LOW:HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = bounds)]
     velocities: Vec<(f64, f64)>,
-    /// Time span of the motions, in seconds (relativistic systems: proper time in metres) [default: the paper's].
+    /// Time span of the motions, in the time unit of the system, for geodesics of the proper time [default: the paper's].
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = positive)]
     until: Option<f64>,
     /// Relative tolerance of a step of the learned motion, at least 2e-15; the absolute one is a hundredth of it.

@@ -1,23 +1,27 @@
-//! `lnn geometry`: metric, connection and curvature of points, full digits.
+//! `lnn geometry`: metric, connection and curvature of points.
 
-use crate::cli::format::{CHUNK, TableOrJson, report_failures};
-use crate::cli::number::{Precision, count, list};
+use crate::cli::format::{CHUNK, report_failures};
+use crate::cli::number::{Precision, count, list, named};
 use crate::cli::source::{Source, SystemOrModel, require_at_most};
-use crate::cli::states::parse_table;
+use crate::cli::states::{Table, parse_table};
 use crate::cli::surfaces::Line;
 use crate::cli::{CliError, input, output, states, tensors};
-use crate::geometry::{GeometryError, MOST_COORDINATES, at_once, geometries};
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::geometry::{GeometryError, MOST_COORDINATES, PointReport, at_once, depends_on_velocity, point_reports};
+use crate::lagrangian::EulerLagrange;
+use crate::names::trimmed;
 use crate::scalar::{Dd, Real, Scalar};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     subject: SystemOrModel,
+    /// A point, by a number or a formula of numbers for every coordinate, in any order: t=0,r=4,theta=pi/2,phi=0.
+    #[arg(long, value_name = "NAME=VALUE,..", allow_hyphen_values = true, conflicts_with_all = ["surface", "points"])]
+    at: Option<String>,
     /// CSV of points, or - for standard input. Its header has the coordinates, in any order; other columns are ignored.
-    #[arg(long, value_name = "FILE.csv", required_unless_present = "surface", conflicts_with = "surface")]
+    #[arg(long, value_name = "FILE.csv", required_unless_present_any = ["surface", "at"], conflicts_with = "surface")]
     points: Option<PathBuf>,
     /// Instead of the geometry at points, print the points of a line where the determinant of a block of the metric changes its sign, by
     /// the coordinates of the block. The time finds ergosurfaces and static horizons, the time with the angle about the axis the horizons
@@ -40,12 +44,24 @@ pub struct Args {
     /// Precision of everything, the reading of the points included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
-    /// One JSON object per line, or text: the nonzero components, without repeating those equal by symmetry.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
-    format: TableOrJson,
+    /// One JSON object per line with every component and digit; or the nonzero components, without those that follow by symmetry, as a
+    /// table or as LaTeX [default: table with --at, otherwise json].
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    format: Option<Format>,
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
+}
+
+/// Form of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// One object per line.
+    Json,
+    /// Text.
+    Table,
+    /// An align* environment.
+    Latex,
 }
 
 /// Pieces of a line, at most: seconds of a metric that is written down.
@@ -81,71 +97,75 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
         Some(text) => list("--velocity", text, names)?,
         None => vec![<S as Real>::zero(); n],
     };
+    let usual = if args.at.is_some() { Format::Table } else { Format::Json };
+    let format = if args.json { Format::Json } else { args.format.unwrap_or(usual) };
     if let (Some(from), Some(to)) = (&args.from, &args.to) {
+        if format == Format::Latex {
+            return Err(CliError::usage("--format latex: expected json or table with --surface"));
+        }
         let ends: [Vec<S>; 2] = [list("--from", from, names)?, list("--to", to, names)?];
         note_velocity(&*source.model, &ends[0], &velocity);
         let line = Line { block: &args.surface, ends: (&ends[0], &ends[1]), velocity: &velocity, steps: args.steps };
-        return line.print(&source, !args.json && args.format == TableOrJson::Table);
+        return line.print(&source, format == Format::Table);
     }
     if n > MOST_COORDINATES {
         return Err(CliError::usage(GeometryError::TooMany { found: n, most: MOST_COORDINATES }));
     }
+    if let Some(text) = &args.at {
+        let point = named("--at", text, names)?;
+        note_velocity(&*source.model, &point, &velocity);
+        let report = point_reports(&*source.model, names, &point, &velocity).map_err(CliError::data)?.remove(0);
+        output::print(&written(format, &report, &heading(names, &point)))?;
+        return report.problem.map_or(Ok(()), |problem| Err(CliError::data(format_args!("--at: {problem}"))));
+    }
     let Some(points) = &args.points else { return Err(CliError::usage("--points: expected a file")) };
-    let place = input::name(points);
-    let refused = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
-    let bytes = input::read(points, states::MAX_BYTES).map_err(|e| refused(&e))?;
-    let table = parse_table::<S>(&bytes, names).map_err(|e| refused(&e))?;
-    drop(bytes);
-    note_velocity(&*source.model, &table.values[..n], &velocity);
+    print_points(points, &*source.model, (names, &velocity), format)
+}
 
+/// Prints the geometry of the points of a file.
+fn print_points<S: Scalar>(
+    file: &Path,
+    model: &dyn EulerLagrange<S>,
+    (names, velocity): (&[String], &[S]),
+    format: Format,
+) -> Result<(), CliError> {
+    let (n, place) = (names.len(), input::name(file));
+    let refused = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
+    let bytes = input::read(file, states::MAX_BYTES).map_err(|e| refused(&e))?;
+    let Table { values, rows } = parse_table::<S>(&bytes, names).map_err(|e| refused(&e))?;
+    drop(bytes);
+    note_velocity(model, &values[..n], velocity);
     let chunk = at_once(n).min(CHUNK);
     let mut failures: Vec<(usize, String)> = Vec::new();
-    for (points, rows) in table.values.chunks(chunk * n).zip(table.rows.chunks(chunk)) {
-        let found = geometries(&*source.model, points, &velocity).map_err(CliError::data)?;
+    for (points, rows) in values.chunks(chunk * n).zip(rows.chunks(chunk)) {
+        let reports = point_reports(model, names, points, velocity).map_err(CliError::data)?;
         let mut text = String::new();
-        for ((found, q), &row) in found.into_iter().zip(points.chunks(n)).zip(rows) {
-            let problem = found.as_ref().err().map(GeometryError::to_string);
-            let fields = match &found {
-                Ok(found) => tensors::fields(&found.metric.components, Some(found)),
-                Err(_) => tensors::fields(&metric(&*source.model, q, &velocity), None),
-            };
-            text += &match args.format {
-                TableOrJson::Json => tensors::object(n, &fields, problem.as_deref()),
-                TableOrJson::Table => tensors::block(names, row, &fields, problem.as_deref()),
-            };
-            failures.extend(problem.map(|problem| (row, problem)));
+        for ((report, q), &row) in reports.into_iter().zip(points.chunks(n)).zip(rows) {
+            text += &written(format, &report, &format!("row {row}: {}", heading(names, q)));
+            failures.extend(report.problem.map(|problem| (row, problem)));
         }
         output::print(&text)?;
     }
     report_failures(&place, &failures)
 }
 
-/// The metric of a point, whatever it is like.
-fn metric<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<S> {
-    let mut terms = Terms::default();
-    // It is filled where it is not finite too.
-    let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
-    terms.mass_matrix
+/// A point in words.
+fn heading<S: Scalar>(names: &[String], q: &[S]) -> String {
+    let parts = names.iter().zip(q).map(|(name, x)| format!("{name} = {}", trimmed(x.to_f64(), 7)));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+fn written<S: Scalar>(format: Format, report: &PointReport<S>, heading: &str) -> String {
+    match format {
+        Format::Json => tensors::object(report),
+        Format::Table => report.findings(heading).to_string(),
+        Format::Latex => report.latex(heading),
+    }
 }
 
 /// Says so if the velocity matters to the metric.
 fn note_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) {
-    if varies(model, q, v) {
+    if depends_on_velocity(model, q, v) {
         output::note("the mass matrix depends on the velocity; it is taken at --velocity, by default at rest");
     }
-}
-
-/// `true` if the mass matrix of a point is another one at another velocity, beyond rounding.
-fn varies<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> bool {
-    let n = q.len();
-    let moved = v.iter().enumerate().map(|(i, &v)| v + S::of_f64(0.25 / (i + 1) as f64));
-    let both: Vec<S> = v.iter().copied().chain(moved).collect();
-    let mut terms = Terms::default();
-    if model.terms(&q.repeat(2), &both, Request::MASS_MATRIX, &mut terms).is_err() {
-        return false;
-    }
-    let (first, second) = terms.mass_matrix.split_at(n * n);
-    let most = first.iter().map(|x| x.abs().to_f64()).fold(0.0, f64::max);
-    let tolerance = most * S::epsilon().to_f64() * 1e4;
-    first.iter().zip(second).any(|(&a, &b)| (a - b).abs().to_f64() > tolerance)
 }

@@ -10,7 +10,7 @@ use crate::lagrangian::{
     EulerLagrange, LeastNorm, Linearizer, ManifoldRows, MechanicsError, ReducedMass, Request, Terms,
 };
 use crate::linalg::{Workspace, eigenvalues};
-use crate::scalar::{Dd, Scalar};
+use crate::scalar::{Dd, Real, Scalar};
 use crate::symmetry::{Canonical, CanonicalForm, SymmetryError};
 use std::path::PathBuf;
 
@@ -120,11 +120,13 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let held = ConstrainedState::of(model.as_ref(), q, v, &terms);
+        let squares = squares((n, v), &terms, &spectrum);
         let slopes = linearizer.as_mut().map(|linearizer| Slopes::of(linearizer, n, (q, v)));
         let mut failed = failed.into_iter().peekable();
         for (k, &row) in rows.iter().enumerate() {
             let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
             let mut fields = fields(n, k, &terms, &spectrum, &held[k], factor.as_ref());
+            fields.extend(squares.get(k..=k).map(|values| Field { name: "g(v, v)", values, shape: Shape::Number }));
             fields.extend(slopes.iter().flat_map(|slopes| slopes[k].fields()));
             text += &show(format, row, &fields, problem.as_deref());
             failures.extend(problem.map(|text| (row, text)));
@@ -176,6 +178,22 @@ fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
     // The matrix that fails has NaN eigenvalues already; the state itself is reported by its terms.
     let _ = eigenvalues(n, matrices, &mut values, &mut Workspace::new());
     values
+}
+
+/// `g(v, v)` of a batch of states of geodesics of a metric with a time, whose `L` is the energy, `g(v, v)/2`; nothing of another model.
+fn squares<S: Scalar>((n, v): (usize, &[S]), terms: &Terms<S>, spectrum: &[S]) -> Vec<S> {
+    let zero = <S as Real>::zero();
+    let rounding = S::of_f64(ROUNDINGS) * S::epsilon();
+    let values = terms.lagrangian.iter().zip(&terms.energy);
+    let is_energy = |(k, (&l, &energy)): (usize, (&S, &S))| {
+        let speed = v[k * n..(k + 1) * n].iter().fold(<S as Real>::one(), |sum, &v| sum + v * v);
+        let size = terms.mass_matrix[k * n * n..(k + 1) * n * n].iter().fold(zero, |sum, g| sum + g.abs()) * speed;
+        let signs = (spectrum[k * n] < zero, spectrum[(k + 1) * n - 1] > zero);
+        // A state that is not finite says nothing.
+        !size.is_finite() || (signs == (true, true) && (l - energy).abs() <= rounding * size)
+    };
+    let all = terms.force.is_empty() && values.enumerate().all(is_energy);
+    if all { terms.energy.iter().map(|&energy| energy + energy).collect() } else { Vec::new() }
 }
 
 /// What constraints say of a state, and where its Lagrangian is degenerate.

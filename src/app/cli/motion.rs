@@ -4,15 +4,20 @@ use crate::cli::charges::Charges;
 use crate::cli::files::cannot_write;
 use crate::cli::tube::{MotionTube, TubeFacts};
 use crate::cli::{CliError, input, output};
+use crate::lagrangian::EulerLagrange;
 use crate::names::{pluralize, rounded};
 use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
 use crate::rollout::{Domain, Trajectory};
 use crate::storage::{AtomicWriter, Disk, remove_leftovers, write_atomically};
+use crate::symmetry::Invariant;
 use serde::Serialize;
+use std::ops::Range;
 use std::path::Path;
 
 /// Points of a curve beyond which every second one is left out.
 const MOST_POINTS: usize = 4000;
+/// States of a motion by which its conserved quantity is recognized.
+const STATES: usize = 24;
 
 /// The first sample outside the states that a model was trained on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -44,6 +49,8 @@ pub struct Watch {
     columns: Vec<String>,
     /// Where it left the training range.
     pub leaving: Option<Leaving>,
+    /// Value of `p.v - L` at the start, and its largest distance from that.
+    pub energy: (f64, f64),
     /// Times, and values of every column and of the energy, of every `stride`-th sample.
     times: Vec<f64>,
     values: Vec<Vec<f64>>,
@@ -56,7 +63,8 @@ impl Watch {
     pub fn new(domain: Domain<f64>, columns: &[String]) -> Self {
         let values = vec![Vec::new(); columns.len() + 1];
         let columns = columns.to_vec();
-        Self { domain, columns, leaving: None, times: Vec::new(), values, stride: 1, seen: 0 }
+        let energy = (f64::NAN, 0.0);
+        Self { domain, columns, leaving: None, energy, times: Vec::new(), values, stride: 1, seen: 0 }
     }
 
     /// Takes the next samples.
@@ -71,9 +79,13 @@ impl Watch {
                 self.leaving =
                     Some(Leaving { t: piece.t[k], column, value: state[component], trained_on: [low, high] });
             }
+            let energy = piece.energy.as_ref().and_then(|energy| energy.get(k)).copied().unwrap_or(f64::NAN);
+            match self.seen {
+                0 => self.energy.0 = energy,
+                _ => self.energy.1 = (energy - self.energy.0).abs().max(self.energy.1),
+            }
             if self.seen.is_multiple_of(self.stride) {
                 self.times.push(piece.t[k]);
-                let energy = piece.energy.as_ref().and_then(|energy| energy.get(k)).copied().unwrap_or(f64::NAN);
                 for (values, x) in self.values.iter_mut().zip(state.into_iter().chain([energy])) {
                     values.push(x);
                 }
@@ -87,12 +99,28 @@ impl Watch {
         }
     }
 
+    /// What a model without friction conserves along its motion; `None` where its terms say nothing.
+    pub fn invariant(&self, model: &dyn EulerLagrange<f64>) -> Option<Invariant> {
+        let n = self.columns.len() / 2;
+        let states = (0..self.times.len()).step_by(self.times.len().div_ceil(STATES).max(1));
+        let part = |columns: Range<usize>| {
+            states.clone().flat_map(move |k| self.values[columns.clone()].iter().map(move |values| values[k]))
+        };
+        let (q, v): (Vec<f64>, Vec<f64>) = (part(0..n).collect(), part(n..2 * n).collect());
+        Invariant::of(model, &q, &v).ok().filter(|found| *found != Invariant::Nothing)
+    }
+
     /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, by the end of the
     /// file's name; with the ends of a tube around the coordinates.
     ///
     /// # Errors
     /// A data error for a motion that has no finite sample, or a file that cannot be written.
-    pub fn plot(&self, path: &Path, title: &str, time_unit: &str, tube: Option<&MotionTube>) -> Result<(), CliError> {
+    pub fn plot(
+        &self,
+        path: &Path,
+        (title, parameter, energy): (&str, &str, &str),
+        tube: Option<&MotionTube>,
+    ) -> Result<(), CliError> {
         let n = self.columns.len() / 2;
         let (mut names, mut positions) = (self.columns[..n].to_vec(), self.values[..n].to_vec());
         if let Some(tube) = tube {
@@ -104,20 +132,20 @@ impl Watch {
             if let Some(leaving) = &self.leaving {
                 report = report.paragraph(&format!("The motion {}.", leaving.text()));
             }
-            let energy = ["energy".to_string()];
+            let (capital, energy) = (capitalized(energy), [energy.to_string()]);
             let parts = [
                 ("Coordinates", &names[..], &positions[..]),
                 ("Velocities", &self.columns[n..], &self.values[n..2 * n]),
-                ("Energy of the model", &energy[..], &self.values[2 * n..]),
+                (&*format!("{capital} of the model"), &energy[..], &self.values[2 * n..]),
             ];
             for (what, names, values) in parts {
-                let picture = self.picture(what, names, values, time_unit)?;
-                let heading = format!("{what} against time");
+                let picture = self.picture(what, names, values, parameter)?;
+                let heading = format!("{what} against {}", parameter.split(" [").next().unwrap_or_default());
                 report = report.figures(&[Figure { file: String::new(), heading, picture, caption: String::new() }]);
             }
             report.to_html().into_bytes()
         } else {
-            self.picture(title, &names, &positions, time_unit)?.to_svg().into_bytes()
+            self.picture(title, &names, &positions, parameter)?.to_svg().into_bytes()
         };
         write_atomically(path, &bytes).map_err(|e| cannot_write(path, e))
     }
@@ -133,10 +161,10 @@ impl Watch {
         ends
     }
 
-    fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], unit: &str) -> Result<Picture, CliError> {
+    fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], label: &str) -> Result<Picture, CliError> {
         let plot = LinePlot {
             title: title.to_string(),
-            x_label: if unit.is_empty() { "time".to_string() } else { format!("time [{unit}]") },
+            x_label: label.to_string(),
             y_label: names.join(", "),
             log_y: false,
             series: names.iter().zip(values).map(|(name, y)| Series::new(name, &self.times, y)).collect(),
@@ -145,6 +173,14 @@ impl Watch {
         };
         line_plot(&plot).map_err(CliError::data)
     }
+}
+
+/// A text whose first letter is a capital, unless it is a formula.
+fn capitalized(text: &str) -> String {
+    if text.contains(|c: char| !c.is_alphabetic()) {
+        return text.to_string();
+    }
+    text.chars().take(1).flat_map(char::to_uppercase).chain(text.chars().skip(1)).collect()
 }
 
 fn thin(values: &mut Vec<f64>) {
@@ -176,8 +212,11 @@ pub struct Facts<'a> {
     pub samples: usize,
     /// Time of the last sample.
     pub t_end: f64,
-    /// Unit of times, if the system is one of the catalogue's.
+    /// Unit of times, if the system is known.
     pub time_unit: Option<&'a str>,
+    /// Name of the parameter of the motion, `t`, or `tau` beside a coordinate `t`.
+    #[serde(skip)]
+    pub parameter: &'static str,
     /// Steps taken.
     pub steps: usize,
     /// States whose terms were evaluated.
@@ -192,6 +231,9 @@ pub struct Facts<'a> {
     pub dissipated: Option<f64>,
     /// Energy that is not accounted for.
     pub energy_defect: Option<f64>,
+    /// What the motion conserves without friction and forces, as far as it is kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conserved: Option<Kept>,
     /// Where the motion left the training range.
     pub left_training_range: Option<&'a Leaving>,
     /// Charges of the symmetries along the motion, if requested.
@@ -202,6 +244,33 @@ pub struct Facts<'a> {
     pub tube: Option<TubeFacts<'a>>,
     /// The file of the samples.
     pub out: String,
+}
+
+/// A conserved quantity along a motion.
+#[derive(Debug, Serialize)]
+pub struct Kept {
+    /// `energy`, `g(v, v)` of geodesics of a metric with a time, or `p.v - L`.
+    pub quantity: Invariant,
+    /// Value at the start.
+    pub start: f64,
+    /// Largest distance from it.
+    pub largest_change: f64,
+}
+
+impl Kept {
+    /// By the value of `p.v - L`, half of `g(v, v)`, at the start and its largest change.
+    pub fn new(quantity: Invariant, (start, change): (f64, f64)) -> Self {
+        let factor = if quantity == Invariant::Square { 2.0 } else { 1.0 };
+        Self { quantity, start: factor * start, largest_change: factor * change }
+    }
+
+    fn text(&self) -> String {
+        let name = match self.quantity {
+            Invariant::Square => "g(v, v)",
+            other => other.charge(),
+        };
+        format!("conserved: {name} = {}, largest change {}\n", rounded(self.start, 10), rounded(self.largest_change, 2))
+    }
 }
 
 /// Place that the samples are written to.
@@ -252,7 +321,7 @@ impl<'a> Target<'a> {
 impl Facts<'_> {
     /// In words, a line each for the motion and its energy.
     pub fn text(&self) -> String {
-        let unit = self.time_unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let unit = self.time_unit.filter(|unit| *unit != "1").map_or(String::new(), |unit| format!(" {unit}"));
         let iterations = self
             .iterations
             .map_or(String::new(), |count| format!(" in {}", pluralize(count, "iteration", "iterations")));
@@ -266,10 +335,12 @@ impl Facts<'_> {
             ),
             _ => String::new(),
         };
+        let kept = self.conserved.as_ref().map_or(String::new(), Kept::text);
         let charges = self.charges.map_or(String::new(), Charges::text);
         format!(
-            "{} to t = {}{unit}, {}, {}{iterations}, in {}\n{balance}{charges}",
+            "{} to {} = {}{unit}, {}, {}{iterations}, in {}\n{balance}{kept}{charges}",
             pluralize(self.samples, "sample", "samples"),
+            self.parameter,
             self.t_end,
             pluralize(self.steps, "step", "steps"),
             pluralize(self.evaluations, "evaluation", "evaluations"),
@@ -313,10 +384,12 @@ mod tests {
         assert_eq!((leaving.t, leaving.column.as_str(), leaving.trained_on), (5001.0, "x", [-1.0, 5000.0]));
         let directory = tempfile::tempdir().unwrap();
         let [svg, page] = ["a.svg", "a.html"].map(|name| directory.path().join(name));
-        watch.plot(&svg, "Motion", "s", None).unwrap();
-        watch.plot(&page, "Motion", "", None).unwrap();
+        watch.plot(&svg, ("Motion", "time [s]", "energy"), None).unwrap();
+        watch.plot(&page, ("Motion", "affine parameter", "g(v, v)/2"), None).unwrap();
         assert!(std::fs::read(&svg).unwrap().starts_with(b"<svg"));
         let page = std::fs::read_to_string(&page).unwrap();
+        assert!(page.contains("g(v, v)/2 of the model against affine parameter") && !page.contains("nergy"), "{page}");
+        assert_eq!((watch.energy, capitalized("energy")), ((0.5, 0.0), "Energy".to_string()));
         assert!(page.matches("<figure").count() == 3 && page.contains("left the training range at t = 5001"));
         assert!(picture_file("a.SVG").is_ok() && picture_file("a.png").is_err() && picture_file("a").is_err());
     }

@@ -5,6 +5,7 @@ use crate::cli::source::Source;
 use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, forces};
 use crate::lagrangian::EulerLagrange;
+use crate::report::with_unit;
 use crate::rollout::Domain;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,8 @@ pub struct MotionSource {
     pub domain: Option<Domain<f64>>,
     /// Unit of times; a system that was only recorded has none, nor has one of another version.
     pub time_unit: Option<String>,
+    /// `true` if a time is among the coordinates, so that the parameter of the motion is another one.
+    pub time_like: bool,
     /// The file it was read from.
     pub file: Option<PathBuf>,
 }
@@ -35,9 +38,10 @@ impl MotionSource {
         let learned = Learned::<f64>::load(path)?;
         let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
         let time_unit = learned_system(&learned.header).ok().map(|system| system.time_unit.to_string());
+        let time_like = learned.header.architecture.time_like.is_some();
         let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        Ok(Self { name, model, columns, forces, domain, time_unit, file })
+        Ok(Self { name, model, columns, forces, domain, time_unit, time_like, file })
     }
 
     /// A system by name or by file.
@@ -49,7 +53,14 @@ impl MotionSource {
         let Source { model, columns, forces } = Source::configured(system.clone(), given)?;
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
-        Ok(Self { name, model, columns, forces, domain: None, time_unit, file })
+        let time_like = system.time_like.is_some();
+        Ok(Self { name, model, columns, forces, domain: None, time_unit, time_like, file })
+    }
+
+    /// Label of the parameter of the motion: a time, or the affine parameter of geodesics, which is the proper time of matter.
+    pub fn parameter(&self) -> String {
+        let parameter = if self.time_like { "affine parameter" } else { "time" };
+        with_unit(parameter, self.time_unit.as_deref().unwrap_or_default())
     }
 
     /// The states that it is watched to stay within: those a model was trained on, all states for a system.

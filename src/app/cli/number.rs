@@ -1,6 +1,8 @@
 //! Numbers of the command line, with their ranges.
 
 use crate::cli::CliError;
+use crate::lagrangian::quantity;
+use crate::names::unknown;
 use crate::rollout::Options;
 use crate::scalar::Scalar;
 use crate::storage::MOST_THREADS;
@@ -103,6 +105,46 @@ pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec
     }
 }
 
+/// A value for each of `names` from `NAME=VALUE,..` in any order, numbers or formulas of numbers, read in the precision of `S`;
+/// `option` is what asked for them.
+///
+/// # Errors
+/// A usage error that names an unknown, repeated or missing name, or a value that is not a finite number.
+pub fn named<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec<S>, CliError> {
+    let refused = |problem: String| CliError::usage(format_args!("{option}: {problem}"));
+    let mut values: Vec<Option<S>> = vec![None; names.len()];
+    for part in outer_parts(text) {
+        let Some((name, value)) = part.split_once('=') else {
+            return Err(refused(format!("expected NAME=VALUE, found {:?}", part.trim())));
+        };
+        let (name, value) = (name.trim(), value.trim());
+        let place = names.iter().position(|known| known == name);
+        let place = place.ok_or_else(|| refused(unknown("coordinate", name, names.iter().map(String::as_str))))?;
+        let number = quantity::<S>(value).map_err(|error| refused(format!("{name}: {error}")))?;
+        if !number.is_finite() {
+            return Err(refused(format!("{name}: expected a finite number, found {value:?}")));
+        }
+        if values[place].replace(number).is_some() {
+            return Err(refused(format!("{name} is given twice")));
+        }
+    }
+    let missing: Vec<&str> =
+        names.iter().zip(&values).filter(|(_, value)| value.is_none()).map(|(name, _)| name.as_str()).collect();
+    if !missing.is_empty() {
+        return Err(refused(format!("expected a value of {}, missing {}", names.join(", "), missing.join(", "))));
+    }
+    Ok(values.into_iter().flatten().collect())
+}
+
+/// The parts of a text between the commas that stand outside of parentheses.
+fn outer_parts(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0_i32;
+    text.split(move |c: char| {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        c == ',' && depth <= 0
+    })
+}
+
 /// A number of threads.
 pub fn thread_count(text: &str) -> Result<usize, String> {
     whole(1, MOST_THREADS)(text)
@@ -145,6 +187,26 @@ mod tests {
         assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
         for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2", "-1e308:1e308"] {
             assert!(bounds(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn named_values_are_read_in_any_order() {
+        let names = ["t", "r", "phi"].map(String::from);
+        let read = |text: &str| named::<f64>("--at", text, &names).map_err(|error| error.to_string());
+        assert_eq!(read("phi = pi/2, t=-1,r=max(2,3)").unwrap(), [-1.0, 3.0, std::f64::consts::FRAC_PI_2]);
+        for (bad, parts) in [
+            ("r=1", ["missing", "t, phi"]),
+            ("r=1,t=1,phi=1,r=2", ["r", "twice"]),
+            ("r=1,t=1,ph=1", ["\"ph\"", "\"phi\""]),
+            ("r=1,t=1,phi=1/0", ["phi", "finite"]),
+            ("r=1,t=1,phi=inf", ["phi", "finite"]),
+            ("r=1,t=1,phi=x", ["phi", "\"x\""]),
+            ("r=1,t=1,phi", ["NAME=VALUE", "phi"]),
+            ("", ["NAME=VALUE", "\"\""]),
+        ] {
+            let problem = read(bad).unwrap_err();
+            assert!(parts.iter().all(|part| problem.contains(part)), "{bad}: {problem}");
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::cli::charges::Charges;
 use crate::cli::constraints::constrained;
 use crate::cli::files::{OutputFile, require_free};
 use crate::cli::forces::ForceArgs;
-use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
+use crate::cli::motion::{Facts, Kept, Target, Watch, picture_file, place};
 use crate::cli::motion_source::MotionSource;
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::probe::Probe;
@@ -14,6 +14,7 @@ use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
 use crate::rollout::{Driven, Ending, EnergyBalance, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
+use crate::symmetry::Invariant;
 use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -35,8 +36,8 @@ pub struct Args {
     /// constraints it is moved onto them if it is off by less than a thousandth of its size, and refused otherwise.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
-    /// Time of the last sample, in seconds (relativistic systems: proper time in metres). For a time before the start the
-    /// motion runs backwards.
+    /// Time of the last sample, in the time unit of the system; for geodesics of a space-time an affine parameter, the proper time of
+    /// matter. For a time before the start the motion runs backwards.
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
     t_end: f64,
     /// Time of the start, in the same unit; it matters only with recorded forces.
@@ -231,8 +232,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     target.finish()?;
     if let Some(plot) = &args.plot {
-        let (title, unit) = (format!("{}: roll-out", source.name), source.time_unit.as_deref().unwrap_or_default());
-        watch.plot(plot, &title, unit, tube.as_ref())?;
+        let (title, parameter) = (format!("{}: roll-out", source.name), source.parameter());
+        let energy = watch.invariant(network).map_or("energy", Invariant::charge);
+        watch.plot(plot, (&title, &parameter, energy), tube.as_ref())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
@@ -265,11 +267,16 @@ impl Args {
         (charges, tube): (Option<&Charges>, Option<&MotionTube>),
     ) -> Result<(), CliError> {
         let (statistics, balance) = (&result.statistics, result.balance.as_ref());
+        let model = source.model.as_ref();
+        // Constraints that move and forces change it.
+        let is_free = !is_driven && balance.is_none() && model.manifold().is_none();
+        let invariant = if is_free { watch.invariant(model) } else { None };
         let facts = Facts {
             system: &source.name,
             samples: result.samples,
             t_end: self.t_end,
             time_unit: source.time_unit.as_deref(),
+            parameter: if source.columns.iter().any(|name| name == "t") { "tau" } else { "t" },
             steps: statistics.accepted,
             evaluations: statistics.evaluations,
             iterations: self.method.is_structure_preserving().then_some(statistics.iterations),
@@ -277,6 +284,7 @@ impl Args {
             work: balance.filter(|_| is_driven).map(|balance| balance.work),
             dissipated: balance.map(|balance| balance.dissipated),
             energy_defect: balance.map(EnergyBalance::defect),
+            conserved: invariant.map(|invariant| Kept::new(invariant, watch.energy)),
             left_training_range: watch.leaving.as_ref(),
             charges,
             tube: tube.map(MotionTube::facts),

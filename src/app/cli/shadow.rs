@@ -11,8 +11,8 @@ use crate::lagrangian::{EulerLagrange, Interruptible, MechanicsError};
 use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
 use crate::relativity::{
-    Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, difference_image, outline,
-    shadow, time_moves_alone,
+    Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, TwoSided, difference_image,
+    outline, shadow, time_moves_alone,
 };
 use crate::report::png;
 use std::path::PathBuf;
@@ -40,10 +40,12 @@ pub struct Args {
     /// Time coordinate; a metric that depends on it is refused.
     #[arg(long, value_name = "NAME", default_value = "t")]
     time: String,
-    /// Spatial coordinates, Cartesian around the centre; the last is the axis.
-    #[arg(long, value_name = "X,Y,Z", default_value = "x,y,z", value_delimiter = ',')]
+    /// Spatial coordinates: Cartesian around the centre, the last one the axis; or those of a wormhole, a radial one that goes to minus and
+    /// to plus infinity, the angle from the axis, and the periodic angle about it [default: x,y,z if there are such, otherwise the three
+    /// beside the time in their order].
+    #[arg(long, value_name = "X,Y,Z|L,THETA,PHI", value_delimiter = ',')]
     space: Vec<String>,
-    /// Distance of the camera from the centre, in the unit of the coordinates.
+    /// Distance of the camera from the centre, or its radial coordinate, in the unit of the coordinates.
     #[arg(long, value_name = "R", default_value = "20", allow_hyphen_values = true, value_parser = number(NEAREST, FARTHEST))]
     distance: f64,
     /// Angle of the camera from the axis, in degrees, 0 to 180.
@@ -113,6 +115,8 @@ fn image_file(text: &str) -> Result<PathBuf, String> {
 struct Metrics {
     system: String,
     coordinates: Vec<String>,
+    /// For each of them, whether it is known to be a periodic angle.
+    periodic: Vec<bool>,
     /// Unit of the coordinates, if it is known.
     unit: Option<String>,
     /// Name of each, and its terms.
@@ -122,7 +126,7 @@ struct Metrics {
 impl Args {
     /// Reads what there is to look through.
     fn metrics(&self) -> Result<Metrics, CliError> {
-        let (mut system, mut columns, mut unit, mut models) = (String::new(), Vec::new(), None, Vec::new());
+        let (mut system, mut columns, mut known, mut models) = (String::new(), Vec::new(), None, Vec::new());
         let learned = self.model.as_deref().map(Learned::<f64>::load_free).transpose()?;
         if let Some(name) = &self.system {
             let configured = match &learned {
@@ -132,18 +136,20 @@ impl Args {
             };
             let source = Source::<f64>::configured(configured.system.clone(), &self.param)?;
             (system, columns) = (configured.system.name.to_string(), source.columns);
-            unit = Some(configured.system.time_unit.to_string());
+            known = Some(configured.system);
             models.push(("exact", source.model));
         }
         if let Some(Learned { header, network }) = learned {
             if models.is_empty() {
-                unit = system_arg::learned_system(&header).ok().map(|system| system.time_unit.to_string());
+                known = system_arg::learned_system(&header).ok();
             }
             (system, columns) = (header.system, header.columns);
             models.push(("learned", Box::new(network)));
         }
         let coordinates = columns[..columns.len() / 2].to_vec();
-        Ok(Metrics { system, coordinates, unit, models })
+        let unit = known.as_ref().map(|system| system.time_unit.to_string());
+        let periodic = known.map(|system| system.coordinates(coordinates.len()).iter().map(|c| c.periodic).collect());
+        Ok(Metrics { system, periodic: periodic.unwrap_or_default(), coordinates, unit, models })
     }
 
     fn chart(&self, coordinates: &[String]) -> Result<Chart, CliError> {
@@ -153,11 +159,44 @@ impl Args {
                 CliError::usage(format_args!("{option}: {problem}"))
             })
         };
-        let [x, y, z] = self.space.as_slice() else {
-            return Err(CliError::usage(format_args!("--space: expected three names, found {}", self.space.len())));
-        };
         let time = place("--time", &self.time)?;
+        let cartesian = ["x", "y", "z"].map(String::from);
+        let others: Vec<String> = coordinates.iter().filter(|name| **name != self.time).cloned().collect();
+        let usual = if others.len() != 3 || cartesian.iter().all(|name| coordinates.contains(name)) {
+            &cartesian[..]
+        } else {
+            &others
+        };
+        let space = if self.space.is_empty() { usual } else { &self.space };
+        let [x, y, z] = space else {
+            return Err(CliError::usage(format_args!("--space: expected three names, found {}", space.len())));
+        };
         Ok(Chart { time, space: [place("--space", x)?, place("--space", y)?, place("--space", z)?] })
+    }
+
+    /// Distance of the sky.
+    fn far(&self) -> f64 {
+        self.far.unwrap_or(self.distance * if self.model.is_none() { FAR } else { LEARNED_FAR })
+    }
+
+    /// The camera in Cartesian coordinates and its choices; the metrics of wormholes are brought into such coordinates.
+    fn scene(&self, metrics: &mut Metrics) -> Result<(Camera, Tracing), CliError> {
+        let chart = self.chart(&metrics.coordinates)?;
+        let far = self.far();
+        let camera = self.camera(chart);
+        let usual = Tracing { tolerance: self.tolerance, threads: threads(self.threads), ..Tracing::of(&camera) };
+        if metrics.periodic.get(chart.space[2]) != Some(&true) {
+            return Ok((camera, Tracing { far, ..usual }));
+        }
+        let (mut distances, mut models) = ([0.0; 3], Vec::new());
+        for (name, model) in metrics.models.drain(..) {
+            let sided = TwoSided::new(model, chart.time, chart.space, self.distance, far).map_err(refused)?;
+            distances = [self.distance, far, -far].map(|radius| sided.distance(radius));
+            models.push((name, Box::new(sided) as Box<dyn EulerLagrange<f64>>));
+        }
+        metrics.models = models;
+        let [distance, far, second] = distances;
+        Ok((Camera { chart: Chart::default(), distance, ..camera }, Tracing { far, second, ..usual }))
     }
 
     fn camera(&self, chart: Chart) -> Camera {
@@ -182,11 +221,9 @@ impl Args {
 /// A usage error for an unknown system, wrong parameters, a camera that cannot be; a data error for a bad model and for a picture that cannot be
 /// written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let Metrics { system, coordinates, unit, models } = args.metrics()?;
-    let camera = args.camera(args.chart(&coordinates)?);
-    let mut tracing = Tracing { tolerance: args.tolerance, threads: threads(args.threads), ..Tracing::of(&camera) };
-    let exact = if args.model.is_none() { FAR * camera.distance } else { tracing.far };
-    tracing.far = args.far.unwrap_or(exact);
+    let mut metrics = args.metrics()?;
+    let (camera, tracing) = args.scene(&mut metrics)?;
+    let Metrics { system, unit, models, .. } = metrics;
     let model = args.model.as_deref().map(model_file).transpose()?;
     let file = args.system.as_ref().filter(|name| system_arg::is_file(name)).map(PathBuf::from);
     let inputs: Vec<_> = model.iter().chain(&file).map(PathBuf::as_path).collect();
@@ -237,6 +274,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         system: &system,
         unit: unit.as_deref(),
         camera: &camera,
+        distance: args.distance,
+        far: args.far(),
         tracing: &tracing,
         views: &views,
         free_factor: args.model.is_some() && models.iter().any(|(_, model)| alone(&**model)),
@@ -255,6 +294,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 
 /// Distance of the sky of an exact metric over that of the camera.
 const FAR: f64 = 100.0;
+/// The same of a learned one, which was trained that far.
+const LEARNED_FAR: f64 = 2.0;
 /// White columns between pictures.
 const GAP: usize = 8;
 
@@ -282,6 +323,9 @@ fn refused(error: RelativityError) -> CliError {
         RelativityError::Mechanics(MechanicsError::Interrupted) => {
             CliError::interrupted("interrupted before the first ray")
         }
+        RelativityError::OneSided { .. } => CliError::usage(format_args!(
+            "--space: the last coordinate is an angle: {error}; or use Cartesian coordinates"
+        )),
         RelativityError::Chart { .. } => CliError::usage("--time, --space: expected four different coordinates"),
         RelativityError::Coordinates { .. } => CliError::usage(error),
         _ => CliError::data(error),

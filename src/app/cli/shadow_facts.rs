@@ -27,6 +27,11 @@ impl View<'_> {
         [left, right, below, above].map(Some)
     }
 
+    /// Angular radius of the image of the second region, in degrees.
+    fn throat(&self) -> Option<f64> {
+        self.outline.as_ref().map(|outline| outline.radius().to_degrees())
+    }
+
     fn rays_per_second(&self) -> f64 {
         self.shadow.rays.len() as f64 / self.seconds
     }
@@ -40,6 +45,10 @@ pub struct Facts<'a> {
     pub unit: Option<&'a str>,
     /// The camera.
     pub camera: &'a Camera,
+    /// Distance of the camera from the centre, or its radial coordinate.
+    pub distance: f64,
+    /// Distance of the sky, or its radial coordinate.
+    pub far: f64,
     /// Choices of the tracing.
     pub tracing: &'a Tracing,
     /// The exact metric, the learned one, or both.
@@ -49,6 +58,11 @@ pub struct Facts<'a> {
 }
 
 impl Facts<'_> {
+    /// `true` if there is a second region.
+    fn is_two_sided(&self) -> bool {
+        self.tracing.second > 0.0
+    }
+
     /// Difference of the two views, if there are two, and the share of the pixels whose colours differ.
     fn difference(&self, images: &[Image]) -> Result<Option<(Difference, f64)>, RelativityError> {
         let ([a, b], [first, second, ..]) = (self.views, images) else { return Ok(None) };
@@ -61,23 +75,23 @@ impl Facts<'_> {
     /// # Errors
     /// Views of different sizes.
     pub fn json(&self, images: &[Image]) -> Result<String, RelativityError> {
-        let Self { system, unit, camera, tracing, views, free_factor } = self;
+        let Self { system, unit, camera, tracing, views, free_factor, .. } = self;
         let mut object = Map::new();
         let mut put = |key: &str, value: Value| _ = object.insert(key.to_string(), value);
         put("system", json!(system));
         put("unit", json!(unit));
         put("width", json!(camera.width));
         put("height", json!(camera.height));
-        put("distance", json!(camera.distance));
+        put("distance", json!(self.distance));
         put("inclination", json!(camera.inclination.to_degrees()));
         put("azimuth", json!(camera.azimuth.to_degrees()));
         put("field_of_view", json!(camera.field_of_view.to_degrees()));
-        put("far", json!(tracing.far));
+        put("far", json!(self.far));
         put("tolerance", json!(tracing.tolerance));
         put("threads", json!(tracing.threads));
         for view in *views {
             let [left, right, bottom, top] = view.extents();
-            let value = json!({
+            let mut value = json!({
                 "share": view.shadow.share(),
                 "area": view.outline.as_ref().map(|outline| outline.area),
                 "left": left,
@@ -90,6 +104,10 @@ impl Facts<'_> {
                 "seconds": view.seconds,
                 "rays_per_second": view.rays_per_second(),
             });
+            if self.is_two_sided() {
+                value["second_share"] = json!(view.shadow.crossed());
+                value["throat_radius"] = json!(view.throat());
+            }
             put(view.name, value);
         }
         if *free_factor {
@@ -117,7 +135,7 @@ impl Facts<'_> {
         let mut text = format!(
             "{}, seen from {}{unit} at {} degrees from the axis: {}\n\n",
             system,
-            rounded(camera.distance, 4),
+            rounded(self.distance, 4),
             rounded(camera.inclination.to_degrees(), 4),
             out.display()
         );
@@ -130,6 +148,10 @@ impl Facts<'_> {
         let impact = |name: &str| format!("{name}, impact parameter{}", bracket(&unit));
         let squared = if unit.is_empty() { String::new() } else { format!("{unit}^2") };
         let mut rows = vec![row("share of the picture in the shadow [%]", &|v| Some(100.0 * v.shadow.share()), 4)];
+        if self.is_two_sided() {
+            rows.push(row("share that shows the second region [%]", &|v| Some(100.0 * v.shadow.crossed()), 4));
+            rows.push(row("angular radius of the throat's image [deg]", &|view| view.throat(), 7));
+        }
         if views.iter().any(|view| view.outline.is_some()) {
             for (k, name) in ["left edge", "right edge", "lower edge", "upper edge"].into_iter().enumerate() {
                 rows.push(row(&impact(name), &|view| view.extents()[k], 7));

@@ -338,7 +338,11 @@ fn grids(
         };
         // A model that is nowhere finite on the grid has no picture; the tables report this.
         figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
-            figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
+            figure.caption += match &*system.system.time_unit {
+                "s" => " SI units.",
+                "m" => " Geometric units.",
+                _ => "",
+            };
             figure
         }));
     }

@@ -119,10 +119,15 @@ pub fn evaluation_figures<S: Scalar>(
 /// Exact and learned motion with their names.
 type Pair<'a, S> = [(&'static str, &'a Trajectory<S>); 2];
 
+/// A quantity with its unit, if it has one.
+pub(crate) fn with_unit(quantity: &str, unit: &str) -> String {
+    if ["", "1"].contains(&unit) { quantity.to_string() } else { format!("{quantity} [{unit}]") }
+}
+
 /// Label of the evolution parameter.
 fn time_label<S>(system: &SystemInstance<S>) -> String {
     let parameter = if system.system.time_like.is_some() { "proper time" } else { "t" };
-    format!("{parameter} [{}]", system.system.time_unit)
+    with_unit(parameter, &system.system.time_unit)
 }
 
 /// Lines over the evolution parameter.

@@ -9,7 +9,7 @@ mod page;
 mod plot;
 mod table;
 
-pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};
+pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units, with_unit};
 pub use experiment::groups;
 pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
 pub use grids::{Fit, GridComparison, grid_figures};

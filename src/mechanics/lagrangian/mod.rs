@@ -66,6 +66,8 @@ pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynam
 #[cfg(feature = "cli")]
 pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
 pub use expression::ExpressionLagrangian;
+#[cfg(feature = "cli")]
+pub(crate) use expression::quantity;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
 #[cfg(feature = "rollout")]

@@ -4,6 +4,7 @@ use super::error::FormulaError;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
 use crate::lagrangian::{EquationPart, Equations, Lagrangian};
 use crate::linalg::{self, dot};
+use crate::names::latex_name;
 use crate::random::RngStream;
 use crate::scalar::Real;
 use crate::tape::TapeError;
@@ -531,24 +532,6 @@ fn harmonics(count: usize, degree: i32) -> Vec<Vec<i32>> {
     all
 }
 
-/// A name in LaTeX: Greek letters by their commands, digits at the end as an index.
-fn latex_name(name: &str) -> String {
-    const GREEK: [&str; 14] = [
-        "alpha", "beta", "gamma", "delta", "epsilon", "theta", "kappa", "lambda", "mu", "rho", "sigma", "phi", "psi",
-        "omega",
-    ];
-    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    let index = &name[stem.len()..];
-    let (stem, index) =
-        (stem.trim_end_matches('_'), if index.is_empty() { String::new() } else { format!("_{{{index}}}") });
-    let stem = match stem {
-        greek if GREEK.contains(&greek) => format!("\\{greek}"),
-        letter if letter.chars().count() == 1 => letter.to_string(),
-        word => format!("\\mathrm{{{}}}", word.replace('_', "\\_")),
-    };
-    stem + &index
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -578,13 +561,6 @@ mod tests {
         let square = quotient.over_kept[find("sin(q1)^2")].as_ref().unwrap();
         let place = kept.iter().position(|&k| k == find("cos(2*q1)")).unwrap();
         assert!((square[place] + 0.5).abs() < 1e-9 && quotient.removed > 4, "{square:?}");
-    }
-
-    #[test]
-    fn names_are_written_as_letters() {
-        assert_eq!(latex_name("theta12"), "\\theta_{12}");
-        assert_eq!(latex_name("x"), "x");
-        assert_eq!(latex_name("arm_angle"), "\\mathrm{arm\\_angle}");
     }
 
     #[test]

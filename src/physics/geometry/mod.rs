@@ -30,11 +30,15 @@
 //! ```
 
 mod orbits;
+#[cfg(feature = "cli")]
+mod point_report;
 mod surfaces;
 mod tensors;
 
 #[doc(hidden)]
 pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn, TurningPoint};
+#[cfg(feature = "cli")]
+pub(crate) use point_report::{PointReport, Value, depends_on_velocity, point_reports};
 #[doc(hidden)]
 pub use surfaces::{Change, characters, grid};
 pub use surfaces::{Character, Surface, surfaces};

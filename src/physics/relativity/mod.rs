@@ -31,6 +31,7 @@ mod rays;
 mod readings;
 mod shadow;
 mod sky;
+mod two_sided;
 
 pub use camera::{Camera, Observer};
 #[doc(hidden)]
@@ -53,6 +54,7 @@ pub use shadow::Difference;
 pub use shadow::{Edge, Outline, Shadow, outline, shadow};
 #[doc(hidden)]
 pub use sky::{Image, Sky, difference_image};
+pub use two_sided::TwoSided;
 
 use crate::geometry::GeometryError;
 use crate::lagrangian::MechanicsError;
@@ -93,6 +95,15 @@ pub enum RelativityError {
     /// A metric that is another one at another time.
     #[error("the metric depends on its time coordinate, expected a stationary metric")]
     DependsOnTime,
+    /// A radial coordinate that does not lead from one region far away to another.
+    #[error(
+        "expected a radial coordinate that goes to minus and to plus infinity, where spheres have the area of flat space, with a regular metric \
+         between; it is none at {radius}"
+    )]
+    OneSided {
+        /// Value of the radial coordinate at which the metric is another one.
+        radius: f64,
+    },
     /// A number that makes no picture.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {

@@ -5,6 +5,7 @@
 use super::camera::Camera;
 use super::coordinates::Chart;
 use super::orbits::{along, dot, norm, times};
+use super::two_sided::beyond;
 use super::{RelativityError, expect};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::storage::in_order;
@@ -16,8 +17,21 @@ pub enum RayOutcome {
     Captured,
     /// It came from far away: the place on the sky, a unit vector of space.
     Escaped([f64; 3]),
+    /// It came from far away in the second region of a metric with [two sides](super::TwoSided): the place on the sky there.
+    Crossed([f64; 3]),
     /// Neither, within the steps allowed, or it reached a point where the metric is invalid.
     Unfinished,
+}
+
+impl RayOutcome {
+    /// The place on the sky that a ray comes from, with the number of the sky: 0, or 1 for that of the second region.
+    pub(super) fn sky(self) -> Option<(usize, [f64; 3])> {
+        match self {
+            Self::Escaped(place) => Some((0, place)),
+            Self::Crossed(place) => Some((1, place)),
+            Self::Captured | Self::Unfinished => None,
+        }
+    }
 }
 
 /// A ray that has ended.
@@ -40,6 +54,7 @@ pub const TOLERANCES: (f64, f64) = (1e-12, 0.01);
 /// |---|---|---|---|
 /// | `tolerance` | 1e-6 | relative error of place and tangent in a step | 1e-12 to 0.01 |
 /// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
+/// | `second` | 0 | distance from the origin within which a ray that approaches it has escaped to the second region; 0: there is none | at least 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
 /// | `growth` | 1e5 | growth of the Euclidean length of `k` at which a ray is captured | above 1 |
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
@@ -55,6 +70,8 @@ pub struct Tracing {
     pub tolerance: f64,
     /// Distance of the sky.
     pub far: f64,
+    /// Distance of the second sky from the origin.
+    pub second: f64,
     /// Distance of capture.
     pub capture: f64,
     /// Growth of `|k|` at capture.
@@ -68,7 +85,8 @@ pub struct Tracing {
 impl Tracing {
     /// The defaults for a camera.
     pub fn of(camera: &Camera) -> Self {
-        Self { tolerance: 1e-6, far: 2.0 * camera.distance, capture: 0.0, growth: 1e5, most_steps: 2000, threads: 1 }
+        let far = 2.0 * camera.distance;
+        Self { tolerance: 1e-6, far, second: 0.0, capture: 0.0, growth: 1e5, most_steps: 2000, threads: 1 }
     }
 
     /// Refuses numbers that trace nothing: finer steps drown in rounding, coarser ones follow no geodesic.
@@ -77,6 +95,7 @@ impl Tracing {
         let (least, most) = TOLERANCES;
         expect((least..=most).contains(&self.tolerance), "tolerance", "1e-12 to 0.01", self.tolerance)?;
         expect(finite_above(self.far, 0.0), "far distance", "a finite number above 0", self.far)?;
+        expect(self.second >= 0.0, "distance of the second sky", "at least 0", self.second)?;
         expect(self.capture >= 0.0, "distance of capture", "at least 0", self.capture)?;
         expect(self.growth > 1.0, "growth at capture", "above 1", self.growth)
     }
@@ -284,6 +303,9 @@ impl Batch<'_> {
         }
         if distance >= self.tracing.far && dot(place, tangent) > 0.0 {
             return Some(RayOutcome::Escaped(times(speed.recip(), tangent)));
+        }
+        if distance <= self.tracing.second && dot(place, tangent) < 0.0 {
+            return Some(RayOutcome::Crossed(beyond(place, tangent)));
         }
         let stuck =
             ray.step * speed < LEAST * distance || !ray.step.is_finite() || ray.a.iter().any(|a| !a.is_finite());

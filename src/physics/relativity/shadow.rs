@@ -21,7 +21,7 @@ pub struct Shadow {
 /// Differences of two pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Share of the pixels that one picture has in the shadow, or unfinished, and the other on the sky.
+    /// Share of the pixels that one picture has in the shadow, or unfinished, and the other on the sky, or on another sky.
     pub shadow: f64,
     /// Median of the angles between the places on the sky, in rad; `NaN` where there is no sky.
     pub median: f64,
@@ -51,6 +51,9 @@ pub fn shadow(
     Ok(Shadow { width, height, rays: trace_each(model, &chart, width * height, &start, tracing, progress)? })
 }
 
+/// A place on one of the two skies, if there is one.
+type Place = Option<(usize, [f64; 3])>;
+
 /// Angle between unit vectors, in rad, right near 0 too.
 pub(super) fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     let difference: [f64; 3] = std::array::from_fn(|i| a[i] - b[i]);
@@ -62,6 +65,11 @@ impl Shadow {
     /// Share of the pixels that belong to the shadow.
     pub(crate) fn share(&self) -> f64 {
         self.count(|fate| fate == RayOutcome::Captured) as f64 / self.rays.len() as f64
+    }
+
+    /// Share of the pixels that show the second region; 0 if there is none.
+    pub(crate) fn crossed(&self) -> f64 {
+        self.count(|fate| matches!(fate, RayOutcome::Crossed(_))) as f64 / self.rays.len() as f64
     }
 
     /// Number of rays that were followed to an end.
@@ -83,9 +91,9 @@ impl Shadow {
         self.rays.iter().map(|ray| ray.steps).sum()
     }
 
-    /// Largest drift of `g(k, k)` over the sum of the sizes of its terms, of the rays that escaped.
+    /// Largest drift of `g(k, k)` over the sum of the sizes of its terms, of the rays that come from a sky.
     pub(crate) fn drift(&self) -> f64 {
-        let escaped = self.rays.iter().filter(|ray| matches!(ray.fate, RayOutcome::Escaped(_)));
+        let escaped = self.rays.iter().filter(|ray| ray.fate.sky().is_some());
         escaped.map(|ray| ray.drift).fold(0.0, f64::max)
     }
 
@@ -97,9 +105,9 @@ impl Shadow {
         let (mut apart, mut angles) = (0, Vec::new());
         for pair in self.pairs(other)? {
             match pair {
-                (RayOutcome::Escaped(a), RayOutcome::Escaped(b)) => angles.push(angle(a, b)),
-                (RayOutcome::Escaped(_), _) | (_, RayOutcome::Escaped(_)) => apart += 1,
-                _ => {}
+                (Some((one, a)), Some((other, b))) if one == other => angles.push(angle(a, b)),
+                (None, None) => {}
+                _ => apart += 1,
             }
         }
         angles.sort_by(f64::total_cmp);
@@ -110,16 +118,13 @@ impl Shadow {
         Ok(Difference { shadow: f64::from(apart) / self.rays.len() as f64, median: at(0.5), most: at(0.99) })
     }
 
-    /// The ends of the rays of each pixel.
-    pub(super) fn pairs(
-        &self,
-        other: &Self,
-    ) -> Result<impl Iterator<Item = (RayOutcome, RayOutcome)>, RelativityError> {
+    /// The places on the sky of each pixel, with the number of the sky.
+    pub(super) fn pairs(&self, other: &Self) -> Result<impl Iterator<Item = (Place, Place)>, RelativityError> {
         let (first, second) = ((self.width, self.height), (other.width, other.height));
         if first != second {
             return Err(RelativityError::Sizes { first, second });
         }
-        Ok(self.rays.iter().zip(&other.rays).map(|(a, b)| (a.fate, b.fate)))
+        Ok(self.rays.iter().zip(&other.rays).map(|(a, b)| (a.fate.sky(), b.fate.sky())))
     }
 }
 
@@ -142,6 +147,11 @@ pub struct Outline {
 }
 
 impl Outline {
+    /// Mean of the angles of the edge, in rad: the angular radius of a circle around the centre.
+    pub(crate) fn radius(&self) -> f64 {
+        self.edges.iter().map(|edge| edge.angle).sum::<f64>() / self.edges.len() as f64
+    }
+
     fn quarter(&self, quarters: usize) -> Edge {
         self.edges[quarters * self.edges.len() / 4]
     }
@@ -169,7 +179,7 @@ const HALVINGS: usize = 30;
 /// Tolerance of a step here over that of a picture.
 const FINER: f64 = 0.01;
 
-/// Finds the edge of the shadow in directions around the centre of the picture, to `pi/2^30` of an angle and the error of rays that are a
+/// Finds the edge of the shadow, or of what shows the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the error of rays that are a
 /// hundred times as exact as those of a picture; `None` if the ray of the centre is not captured.
 ///
 /// Along every direction the shadow is taken to end once. `directions` is rounded up to a multiple of four.

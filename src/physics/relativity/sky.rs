@@ -52,6 +52,12 @@ pub struct Sky {
 
 /// Colours of the quadrants: upper left, upper right, lower left, lower right.
 const QUADRANTS: [[u8; 3]; 4] = [[76, 175, 80], [229, 72, 77], [66, 118, 220], [245, 196, 66]];
+/// Colours of the quadrants of the second sky, and of the lines over them.
+const SECOND: [[u8; 3]; 4] = [[92, 70, 176], [170, 62, 150], [30, 132, 150], [150, 110, 70]];
+const SECOND_LINES: [u8; 3] = [244, 236, 208];
+/// Distance of two lines in sides of a square, and half of the width of a line over it.
+const LINES: f64 = 2.0;
+const LINE: f64 = 0.06;
 /// Brightness of every other square.
 const DARK: f64 = 0.55;
 /// Colour of rays that were left unfinished.
@@ -74,17 +80,37 @@ impl Sky {
         Self { longitude, square: 10f64.to_radians(), disc: (forward, 3f64.to_radians()) }
     }
 
+    /// Angles of a direction, a unit vector, to the left of the point that the camera looks at and above the equator, and the number of
+    /// the quadrant around that point.
+    fn angles(&self, [x, y, z]: [f64; 3]) -> (f64, f64, usize) {
+        let (sin, cos) = self.longitude.sin_cos();
+        let left = (cos * y - sin * x).atan2(cos * x + sin * y);
+        let above = z.clamp(-1.0, 1.0).asin();
+        (left, above, usize::from(left < 0.0) + 2 * usize::from(above < 0.0))
+    }
+
+    /// Colour of a direction in the second region: a grid of bright lines on quadrants of other colours, a white disc around
+    /// the point that the ray of the centre shows.
+    fn second_colour(&self, direction: [f64; 3]) -> [u8; 3] {
+        let mirrored = direction.map(|x| -x);
+        if angle(mirrored, self.disc.0) < self.disc.1 {
+            return [255; 3];
+        }
+        let (left, above, quadrant) = self.angles(mirrored);
+        let side = LINES * self.square;
+        let from_line = |x: f64| (x / side - (x / side).round()).abs();
+        // Meridians are as wide as circles of latitude.
+        let is_line = from_line(above) < LINE || from_line(left) * above.cos() < LINE;
+        if is_line { SECOND_LINES } else { SECOND[quadrant] }
+    }
+
     /// Colour of a direction, a unit vector.
     pub(crate) fn colour(&self, direction: [f64; 3]) -> [u8; 3] {
         if angle(direction, self.disc.0) < self.disc.1 {
             return [255; 3];
         }
-        let (sin, cos) = self.longitude.sin_cos();
-        // Parts toward the point that the camera looks at and to its left.
-        let [x, y, z] = direction;
-        let left = (cos * y - sin * x).atan2(cos * x + sin * y);
-        let above = z.clamp(-1.0, 1.0).asin();
-        let quadrant = QUADRANTS[usize::from(left < 0.0) + 2 * usize::from(above < 0.0)];
+        let (left, above, quadrant) = self.angles(direction);
+        let quadrant = QUADRANTS[quadrant];
         let odd = ((left / self.square).floor() + (above / self.square).floor()).rem_euclid(2.0) == 1.0;
         if odd { between([0; 3], quadrant, DARK) } else { quadrant }
     }
@@ -94,6 +120,7 @@ impl Sky {
         let colour = |fate: RayOutcome| match fate {
             RayOutcome::Captured => [0; 3],
             RayOutcome::Escaped(direction) => self.colour(direction),
+            RayOutcome::Crossed(direction) => self.second_colour(direction),
             RayOutcome::Unfinished => UNFINISHED,
         };
         let pixels = shadow.rays.iter().map(|ray| colour(ray.fate)).collect();
@@ -108,13 +135,13 @@ impl Sky {
 /// [`RelativityError::Sizes`].
 pub fn difference_image(first: &Shadow, second: &Shadow) -> Result<Image, RelativityError> {
     let (low, high) = (ANGLES.0.to_radians().ln(), ANGLES.1.to_radians().ln());
-    let colour = |pair: (RayOutcome, RayOutcome)| match pair {
-        (RayOutcome::Escaped(a), RayOutcome::Escaped(b)) => {
+    let colour = |pair| match pair {
+        (Some((one, a)), Some((other, b))) if one == other => {
             let part = (angle(a, b).max(f64::MIN_POSITIVE).ln() - low) / (high - low);
             between(DIFFERENCES[0], DIFFERENCES[1], part.clamp(0.0, 1.0))
         }
-        (RayOutcome::Escaped(_), _) | (_, RayOutcome::Escaped(_)) => DIFFERENCES[2],
-        _ => [0; 3],
+        (None, None) => [0; 3],
+        _ => DIFFERENCES[2],
     };
     let pixels = first.pairs(second)?.map(colour).collect();
     Ok(Image { width: first.width, height: first.height, pixels })

@@ -267,3 +267,77 @@ fn tolerances_have_ends() {
         assert!(matches!(of(wrong), Err(RelativityError::Invalid { what: "tolerance", .. })), "{wrong}");
     }
 }
+
+/// A wormhole of a throat of radius `b`, with a lapse at it: `-N dt^2 + dl^2 + A (dtheta^2 + sin^2 theta dphi^2)`, `A = b^2 + l^2`,
+/// `N = 1 - lapse/(A + 1)`. Without a lapse it is that of Ellis.
+pub(super) struct Wormhole(pub f64, pub f64);
+
+impl Lagrangian for Wormhole {
+    fn coordinates(&self) -> usize {
+        4
+    }
+    fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+        let area = q[1].sqr() + R::of(self.0 * self.0);
+        let lapse = R::one() - R::of(self.1) / (area + R::one());
+        let sphere = v[2].sqr() + (q[2].sin() * v[3]).sqr();
+        (v[1].sqr() + area * sphere - lapse * v[0].sqr()) * R::half()
+    }
+}
+
+/// A camera at rest at `l` sees the throat within `sin(angle) = b/sqrt(b^2 + l^2)`, by light of the impact parameter `b`.
+#[test]
+fn a_wormhole_shows_its_other_side() {
+    let (throat, far) = (1.5, 4e3);
+    for (radius, inclination) in [(6.0, 1.2), (0.5, FRAC_PI_2), (30.0, 0.0)] {
+        let model = TwoSided::new(Mechanics::new(Wormhole(throat, 0.0), vec![]), 0, [1, 2, 3], radius, far).unwrap();
+        let camera = Camera { field_of_view: 2.0, ..small(model.distance(radius), inclination) };
+        let [far, second] = [far, -far].map(|l| model.distance(l));
+        let tracing = Tracing { far, second, tolerance: 1e-7, ..Tracing::of(&camera) };
+        let found = outline(&model, &camera, &tracing, 12).unwrap().unwrap();
+        let exact = (throat / throat.hypot(radius)).asin();
+        for edge in &found.edges {
+            assert!((edge.angle - exact).abs() < 1e-6, "{radius}: {} for {exact}", edge.angle);
+            assert!((norm(edge.celestial) - throat).abs() < 1e-5, "{radius}: {:?}", edge.celestial);
+        }
+        assert!((found.radius() - exact).abs() < 1e-6);
+        let seen = shadow(&model, &camera, &tracing, &|_| ()).unwrap();
+        assert_eq!((seen.share(), seen.unfinished()), (0.0, 0));
+        for (pixel, ray) in seen.rays.iter().enumerate() {
+            let direction = camera.direction((pixel % 30) as f64 + 0.5, (pixel / 30) as f64 + 0.5);
+            let within = norm([direction[0], direction[1]]).atan2(direction[2]) < exact;
+            assert_eq!(matches!(ray.fate, RayOutcome::Crossed(_)), within, "{radius} {pixel}: {ray:?}");
+        }
+        assert!(seen.crossed() > 0.0 && seen.drift() < 1e-4);
+    }
+}
+
+/// Light straight through the throat comes from the place behind it, other light turns about the throat by the integral over its way.
+#[test]
+fn places_in_the_second_region_have_their_angles() {
+    let model = TwoSided::new(Mechanics::new(Wormhole(1.0, 0.0), vec![]), 0, [1, 2, 3], 5.0, 1e6).unwrap();
+    let camera = Camera { azimuth: 0.7, ..small(model.distance(5.0), 1.1) };
+    let [far, second] = [1e6, -1e6].map(|l| model.distance(l));
+    let tracing = Tracing { far, second, tolerance: 1e-10, ..Tracing::of(&camera) };
+    let tetrad = Tetrad::new(&model, &camera).unwrap();
+    let sine = 0.4 / 26f64.sqrt();
+    let start = |direction| (tetrad.event, tetrad.ray(direction));
+    let starts = [start([0.0, 0.0, 1.0]), start([sine, 0.0, (1.0 - sine * sine).sqrt()])];
+    let rays = trace(&model, &camera.chart, &starts, &tracing, &|_| ()).unwrap();
+    let [right, _, forward] = camera.axes();
+    let RayOutcome::Crossed(straight) = rays[0].fate else { panic!("{rays:?}") };
+    (0..3).for_each(|i| assert!((straight[i] + forward[i]).abs() < 1e-6, "{straight:?}"));
+    // The impact parameter 0.4: the angle that the ray turns about the throat, by the midpoint rule in l = tan(u).
+    let RayOutcome::Crossed(bent) = rays[1].fate else { panic!("{rays:?}") };
+    let (low, high, steps) = (-FRAC_PI_2, 5f64.atan(), 100_000);
+    let width = (high - low) / f64::from(steps);
+    let turned: f64 = (0..steps)
+        .map(|k| {
+            let cosine = (low + (f64::from(k) + 0.5) * width).cos();
+            width * 0.4 / (1.0 - (0.4 * cosine).powi(2)).sqrt()
+        })
+        .sum();
+    for i in 0..3 {
+        let exact = turned.sin() * right[i] - turned.cos() * forward[i];
+        assert!((bent[i] - exact).abs() < 1e-5, "{bent:?} {turned}");
+    }
+}

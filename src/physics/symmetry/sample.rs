@@ -59,6 +59,15 @@ pub enum Invariant {
 }
 
 impl Invariant {
+    /// What the motions of a model conserve, by its terms at states `(states, n)`.
+    ///
+    /// # Errors
+    /// [`SymmetryError::Shape`] for slices of unfit lengths, [`SymmetryError::States`] if fewer than half of the states have finite
+    /// terms.
+    pub fn of(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Result<Self, SymmetryError> {
+        Ok(Sample::new(model, q, v)?.invariant())
+    }
+
     /// Name of the number `p.v - L`.
     pub fn charge(self) -> &'static str {
         match self {

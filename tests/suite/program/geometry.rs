@@ -68,10 +68,63 @@ fn precisions_parameters_and_tables() {
     let wide = run(&["--precision", "dd"]).stdout;
     assert!(wide.contains("9.966711079379184437901741625915"), "{wide}");
     let table = run(&["--format", "table"]).stdout;
-    assert!(table.starts_with("row 2\n") && table.contains("phi,phi"), "{table}");
+    assert!(table.starts_with("row 2: theta = 0.1, phi = 0\n") && table.contains("phi,phi"), "{table}");
     assert!(table.lines().all(|line| line.len() <= 120) && !table.contains(" theta,phi "), "{table}");
     assert_eq!(run(&["--json"]).stdout, run(&[]).stdout);
     assert_eq!(run(&["--velocity", "-1,2"]).stdout, run(&[]).stdout);
+}
+
+#[test]
+fn a_point_is_given_by_the_names_of_its_coordinates() {
+    let at = |point: &str, more: &[&str]| {
+        lnn(&[&["geometry", "--system", "schwarzschild-geodesic", "--at", point], more].concat())
+    };
+    let point = "phi=0,r = 3,theta=pi/2,t=-1";
+    let table = at(point, &[]);
+    table.succeeded();
+    let rows: Vec<Vec<&str>> = table.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
+    for (component, value) in [("t,t", "-0.3333333"), ("r,t,t", "0.03703704"), ("t,r,t,r", "-0.07407407")] {
+        assert!(rows.iter().any(|row| row.ends_with(&[component, value])), "{component} {}", table.stdout);
+    }
+    assert!(!table.stdout.contains("theta,phi,phi "), "below rounding: {}", table.stdout);
+    // Every digit is in the JSON, the same as that of a file.
+    let folder = Folder::new();
+    let points = folder.file("p.csv", format!("t,r,theta,phi\n-1,3,{:e},0\n", std::f64::consts::FRAC_PI_2));
+    let file = lnn(&["geometry", "--system", "schwarzschild-geodesic", "--points", &points]);
+    assert_eq!(at(point, &["--json"]).stdout, file.stdout);
+    let latex = at(point, &["--format", "latex"]).stdout;
+    assert!(latex.contains("\\begin{align*}\n") && latex.contains("  R_{trtr} &= -0.07407407 \\\\\n"), "{latex}");
+    assert!(latex.contains("\\Gamma^{r}{}_{tt}") && latex.contains("R_{\\theta\\phi\\theta\\phi}"), "{latex}");
+    at("r=3,t=1", &[]).refused(2, &["--at", "missing theta, phi"]);
+    at("r=3,t=1,theta=1,fi=0", &[]).refused(2, &["--at", "\"fi\"", "phi"]);
+    at("r=3,t=1,theta=1,phi=0,r=4", &[]).refused(2, &["--at", "r", "twice"]);
+    at("r=3,t=1,theta=1,phi=1/0", &[]).refused(2, &["--at", "phi", "finite"]);
+    at(point, &["--points", &points]).refused(2, &["--at", "--points"]);
+    let degenerate = at("t=0,r=3,theta=0,phi=0", &[]);
+    assert_eq!(degenerate.code, Some(1));
+    assert!(degenerate.stderr.contains("--at") && degenerate.stderr.contains("degenerate"), "{}", degenerate.stderr);
+}
+
+/// The wormhole has `R = -2 b^2/(b^2 + l^2)^2` and `K = 12 b^4/(b^2 + l^2)^4`, the universe of matter `R = 4/(3 t^2)` and
+/// `K = 80/(27 t^4)`.
+#[test]
+fn space_times_in_files_have_their_curvature() {
+    let of = |file: &str, param: &str, at: &str| {
+        let system = format!("{}/examples/systems/{file}", env!("CARGO_MANIFEST_DIR"));
+        lnn(&["geometry", "--system", &system, "--param", param, "--at", at, "--json"]).objects().remove(0)
+    };
+    for (b, l) in [(1.5f64, -2.0f64), (0.5, 0.25)] {
+        let found = of("wormhole.toml", &format!("b={b}"), &format!("t=0,l={l},theta=1,phi=0"));
+        let area = b * b + l * l;
+        assert!(close(&found["ricci_scalar"], -2.0 * b * b / area.powi(2)), "{found}");
+        assert!(close(&found["kretschmann"], 12.0 * b.powi(4) / area.powi(4)), "{found}");
+    }
+    let t: f64 = 2.5;
+    let found = of("expanding_universe.toml", "t0=7", "t=2.5,x=1,y=0,z=-3");
+    assert!(close(&found["ricci_scalar"], 4.0 / (3.0 * t * t)), "{found}");
+    assert!(close(&found["kretschmann"], 80.0 / (27.0 * t.powi(4))), "{found}");
+    // Matter at rest has the density 8 pi rho = 3 H^2 and no pressure.
+    assert!(close(&found["einstein"][0][0], 4.0 / (3.0 * t * t)) && close(&found["einstein"][1][1], 0.0), "{found}");
 }
 
 #[test]

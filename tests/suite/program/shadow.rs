@@ -100,6 +100,28 @@ fn learned_and_exact_stand_side_by_side() {
     lnn(&overwritten).refused(2, &["--out", ".png"]);
 }
 
+/// The throat of radius `b` is seen from `l` within `sin(angle) = b/sqrt(b^2 + l^2)`.
+#[test]
+fn a_wormhole_has_a_second_sky() {
+    let folder = Folder::new();
+    let system = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/wormhole.toml");
+    let out = text(&folder.path("sky.png"));
+    let seen = ["--distance", "4", "--param", "b=2", "--width", "24", "--edges", "4", "--json"];
+    let found = lnn(&[&["shadow", "--system", system, "--out", &out], &seen[..]].concat()).objects().remove(0);
+    assert_eq!((size(&folder, "sky.png"), found["distance"].as_f64()), ((24, 24), Some(4.0)));
+    let number = |key: &str| found["exact"][key].as_f64().unwrap();
+    let exact = (2.0 / 20f64.sqrt()).asin();
+    assert!((number("throat_radius") - exact.to_degrees()).abs() < 1e-4, "{found}");
+    assert!((number("right") - 2.0).abs() < 1e-5 && (number("left") + 2.0).abs() < 1e-5, "{found}");
+    // A disc of that angle in a picture of 70 degrees, of 24 x 24 pixels.
+    let share = std::f64::consts::PI * (exact.tan() / 35f64.to_radians().tan() * 12.0).powi(2) / (24.0 * 24.0);
+    assert!((number("second_share") - share).abs() < 0.05 && number("share") == 0.0, "{found} {share}");
+    // A metric with one sky says nothing of another.
+    let one = text(&folder.path("one.png"));
+    let hole = lnn(&["shadow", "--system", WRITTEN, "--out", &one, "--width", "8", "--edges", "0", "--json"]).objects();
+    assert!(hole[0]["exact"].get("second_share").is_none(), "{hole:?}");
+}
+
 #[test]
 fn cameras_that_cannot_be_are_refused() {
     let folder = Folder::new();
@@ -114,7 +136,7 @@ fn cameras_that_cannot_be_are_refused() {
     refused(hole, &["--space", "x,y"], &["--space", "expected three names, found 2"]);
     refused(hole, &["--space", "x,y,zz"], &["--space", "unknown coordinate \"zz\""]);
     refused(hole, &["--time", "x"], &["--time, --space", "four different coordinates"]);
-    refused("schwarzschild-geodesic", &[], &["--space", "unknown coordinate \"x\""]);
+    refused("schwarzschild-geodesic", &[], &["--space", "radial coordinate"]);
     refused("ads3-geodesic", &["--space", "x,x,z"], &[]);
     refused(hole, &["--edges", "3"], &["--edges", "multiple of four"]);
     lnn(&["shadow", "--out", &out]).refused(2, &["--system"]);

@@ -36,9 +36,9 @@ pub struct Description {
     /// Name in titles; the name if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub title: Option<String>,
-    /// Unit of the evolution parameter.
-    #[cfg_attr(feature = "serde", serde(default = "second"))]
-    pub time_unit: String,
+    /// Unit of the evolution parameter; if left out `s`, and none for a system with a time among its coordinates.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub time_unit: Option<String>,
     /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub lagrangian: Option<String>,
@@ -210,7 +210,7 @@ impl Description {
         Self {
             name: name.to_string(),
             title: Some(title.to_string()),
-            time_unit: time_unit.to_string(),
+            time_unit: Some(time_unit.to_string()),
             lagrangian: Some(lagrangian),
             dissipation: None,
             coordinates: coordinates.map(coordinate).collect(),
@@ -309,10 +309,6 @@ impl Described {
     pub fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
         self.shell.as_ref().map(|shell| shell.evaluate(parameters, q, v))
     }
-}
-
-fn second() -> String {
-    "s".to_string()
 }
 
 fn one() -> String {

@@ -2,9 +2,8 @@
 
 use super::ParameterDescription;
 use super::quantity::{Decimal, Quantity};
-use crate::lagrangian::expression::{Compiler, Expression};
+use crate::lagrangian::expression::quantity;
 use crate::lagrangian::system::Range;
-use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use core::fmt;
 use serde::Deserialize;
@@ -38,18 +37,7 @@ impl Visitor<'_> for Written {
 impl<'de> Deserialize<'de> for Quantity {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = deserializer.deserialize_any(Written("a number or a formula of numbers such as \"2*pi\""))?;
-        let evaluated = || {
-            let expression: Expression = text.parse()?;
-            let mut compiler = Compiler::default();
-            let value = compiler.add(&expression, &BTreeMap::new(), true)?;
-            Ok(compiler.formula(value).evaluate::<f64>(&[], &[], &[]))
-        };
-        match text.parse() {
-            Ok(number) => Ok(Self(number)),
-            Err(_) => {
-                evaluated().map(Self).map_err(|error: crate::lagrangian::ExpressionError| D::Error::custom(error))
-            }
-        }
+        quantity(&text).map(Self).map_err(D::Error::custom)
     }
 }
 

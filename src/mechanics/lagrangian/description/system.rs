@@ -95,7 +95,11 @@ impl Description {
             size: Size::Fixed(n),
             coordinates: PerSize::Given(self.coordinates.iter().map(coordinate).collect()),
             parameters: Cow::Owned(self.checked_parameters()?),
-            time_unit: Cow::Owned(self.time_unit.clone()),
+            time_unit: match (&self.time_unit, time_like) {
+                (Some(unit), _) => Cow::Owned(unit.clone()),
+                (None, Some(_)) => Cow::Borrowed("1"),
+                (None, None) => Cow::Borrowed("s"),
+            },
             time_like,
             constraint: shell.map(|_| SHELL),
             training: PerSize::Given(training),
@@ -131,7 +135,10 @@ impl Description {
         let units = self.coordinates.iter().enumerate().map(|(i, c)| (format!("coordinates[{i}].unit"), &c.unit));
         let parameters = self.parameters.iter().map(|(name, p)| (format!("parameters.{name}.unit"), &p.unit));
         let texts = self.title.iter().map(|title| ("title".to_string(), title));
-        let texts = texts.chain([("time_unit".to_string(), &self.time_unit)]).chain(units).chain(parameters);
+        let texts = texts
+            .chain(self.time_unit.iter().map(|unit| ("time_unit".to_string(), unit)))
+            .chain(units)
+            .chain(parameters);
         for (key, text) in texts {
             if text.is_empty() || text.chars().count() > 100 || text.chars().any(char::is_control) {
                 return Err(DescriptionError::new(key, "expected 1 to 100 characters on one line"));

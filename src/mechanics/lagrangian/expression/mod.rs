@@ -21,6 +21,8 @@ pub(super) use parse::is_name;
 use crate::lagrangian::Lagrangian;
 use crate::ops::{Binary, Unary};
 use crate::scalar::Real;
+#[cfg(feature = "serde")]
+use crate::scalar::Scalar;
 use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
@@ -177,6 +179,21 @@ fn name_of(function: Function) -> Option<&'static str> {
 /// `true` if a name means something in every formula.
 pub(super) fn is_reserved(name: &str) -> bool {
     name == PI || function(name).is_some()
+}
+
+/// The value of a decimal number or of a formula of numbers, such as `2*pi`, in the precision of `S`.
+///
+/// # Errors
+/// A mistake in the formula, with its column.
+#[cfg(feature = "serde")]
+pub(crate) fn quantity<S: Scalar>(text: &str) -> Result<S, ExpressionError> {
+    if let Some(number) = S::parse(text.trim()) {
+        return Ok(number);
+    }
+    let expression: Expression = text.parse()?;
+    let mut compiler = Compiler::default();
+    let value = compiler.add(&expression, &BTreeMap::new(), true)?;
+    Ok(compiler.formula(value).evaluate::<S>(&[], &[], &[]))
 }
 
 /// `L(q, v; parameters)` by a formula such as `m*l^2*theta_dot^2/2 + m*g*l*cos(theta)`.
