@@ -179,7 +179,7 @@ fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
     if let Some(noise) = args.noise.as_ref().filter(|noise| noise.len() != n) {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
-    let units = args.recording.meaning().coordinate_units();
+    let units = reading.coordinate_units();
     formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
         .map_err(|error| in_file(error, &reading))
 }

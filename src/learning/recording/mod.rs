@@ -17,6 +17,7 @@
 
 mod clock;
 mod columns;
+mod heading;
 mod held;
 mod hermite;
 mod hold_out;
