@@ -87,7 +87,7 @@ pub enum Format {
 fn motion_or_model(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.value_name("DATA|MODEL").help(
-            "Files of recorded motion: CSV, NPY or NPZ, one of them - for standard input; or one model, a file or the directory of a run",
+            "Files of recorded motion: CSV, XLSX, NPY or NPZ, one of them - for standard input; or one model, a file or the directory of a run",
         ),
         "coords" => argument.required(false),
         _ => argument,

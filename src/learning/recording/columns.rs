@@ -99,7 +99,8 @@ impl Columns {
         if let Some((_, problem)) = taken_column(&coordinates) {
             wrong.push(format!("coordinate: {problem} in the header"));
         }
-        for name in self.periodic.iter().filter(|name| !self.coords.iter().any(|coordinate| is_same(coordinate, name))) {
+        for name in self.periodic.iter().filter(|name| !self.coords.iter().any(|coordinate| is_same(coordinate, name)))
+        {
             wrong.push(format!("periodic: {}", unknown("coordinate", name, coordinates.iter().copied())));
         }
         match (self.rate, &self.time) {
@@ -112,7 +113,9 @@ impl Columns {
             _ => {}
         }
         if let (true, Some(column)) = (self.wide, &self.trajectory) {
-            wrong.push(format!("expected trajectories either side by side (wide) or told by the column {column}, found both"));
+            wrong.push(format!(
+                "expected trajectories either side by side (wide) or told by the column {column}, found both"
+            ));
         }
         self.check_units(&mut wrong);
         for (k, name) in self.names.iter().flat_map(|names| names.iter().enumerate()) {
@@ -129,7 +132,9 @@ impl Columns {
         let usual: &[&str] = if self.time.is_none() && self.rate.is_none() { &["t", "time"] } else { &[] };
         let known = || self.used().map(|(_, name)| name.as_str()).chain(usual.iter().copied());
         for (k, (name, unit)) in self.units.iter().enumerate() {
-            if !known().any(|column| is_same(column, name)) && !usual.iter().any(|usual| usual.eq_ignore_ascii_case(name)) {
+            if !known().any(|column| is_same(column, name))
+                && !usual.iter().any(|usual| usual.eq_ignore_ascii_case(name))
+            {
                 wrong.push(format!("units: {}", unknown("column", name, known().collect::<Vec<_>>())));
             } else if self.units[..k].iter().any(|(earlier, _)| earlier == name) {
                 wrong.push(format!("units: duplicate column {name}"));

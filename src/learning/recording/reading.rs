@@ -1,10 +1,10 @@
 //! The files and rows that recorded samples come from, and what was left out.
 
 use crate::recording::read::FileFacts;
-use crate::recording::units::si;
-use crate::recording::{Columns, Recording};
 use crate::recording::smooth::{Chosen, Smoothing, noise};
 use crate::recording::statistics::deviation;
+use crate::recording::units::si;
+use crate::recording::{Columns, Recording};
 use serde::{Deserialize, Serialize};
 
 /// Line of the file of every sample, run-length: from sample `.0` on, sample `k` is on line `k - .0 + .1`.

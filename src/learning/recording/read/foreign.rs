@@ -8,8 +8,10 @@ pub const LOOKED_AT: u64 = 520;
 /// How to make a file that is read, of workbooks and of frames.
 const SAVE_AS: &str = "save the sheet as .xlsx, or as CSV: File, Save As, CSV UTF-8";
 const FRAME: &str = "in Python write pandas.DataFrame(..).to_csv('motion.csv', index=False), or give the frame to the Python package lnn";
-const PANDAS: &str = "in Python give pandas.read_parquet('FILE') to lnn.fit as it is, or write .to_csv('motion.csv', index=False)";
-const ARROW: &str = "in Python give pandas.read_feather('FILE') to lnn.fit as it is, or write .to_csv('motion.csv', index=False)";
+const PANDAS: &str =
+    "in Python give pandas.read_parquet('FILE') to lnn.fit as it is, or write .to_csv('motion.csv', index=False)";
+const ARROW: &str =
+    "in Python give pandas.read_feather('FILE') to lnn.fit as it is, or write .to_csv('motion.csv', index=False)";
 const MATLAB: &str = "in MATLAB write writetable(table(t, q1, q2), 'motion.csv'); in Python scipy.io.loadmat('FILE') and \
                       numpy.savez('motion.npz', t=t, q1=q1, q2=q2)";
 const HDF5: &str = "in MATLAB write writetable(table(t, q1, q2), 'motion.csv'); in Python open it with h5py and write \

@@ -149,3 +149,5 @@ fn parse(mut file: File, size: u64, columns: &Columns) -> Result<(FileFacts, Vec
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod variety_tests;

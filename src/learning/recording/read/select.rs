@@ -86,7 +86,8 @@ impl Selection {
         called.trajectory = self.trajectory.as_ref().map(|used| used.name.clone());
         let angles = called.coords.iter().zip(columns.periodic()).filter(|(_, periodic)| *periodic);
         called.periodic = angles.map(|(name, _)| name.clone()).collect();
-        let renamed: Vec<_> = columns.used().zip(called.used()).map(|((_, old), (_, new))| (old, new.clone())).collect();
+        let renamed: Vec<_> =
+            columns.used().zip(called.used()).map(|((_, old), (_, new))| (old, new.clone())).collect();
         for (column, _) in &mut called.units {
             if let Some((_, new)) = renamed.iter().find(|(old, _)| is_same(old, column)) {
                 column.clone_from(new);
@@ -133,7 +134,8 @@ impl File<'_> {
                 values.push(used);
             }
         }
-        let trajectory = columns.trajectory.as_deref().and_then(|name| faults.good(self.find("trajectory", name, name)));
+        let trajectory =
+            columns.trajectory.as_deref().and_then(|name| faults.good(self.find("trajectory", name, name)));
         faults.end()?;
         let selection = Selection { width: self.width, values, timed, trajectory, number };
         self.check(&selection)?;
@@ -174,8 +176,7 @@ impl File<'_> {
         if let Some(unit) = self.unit(asked, &used) {
             used.factor = factor(unit).unwrap_or(1.0);
         } else if let Some(unit) = heading.and_then(|heading| heading.unit.clone()) {
-            let unknown =
-                |problem| Problem::Unit { row: self.row, column: used.name.clone(), problem };
+            let unknown = |problem| Problem::Unit { row: self.row, column: used.name.clone(), problem };
             used.factor = factor(&unit).map_err(unknown)?;
             used.unit = Some(unit);
         }
@@ -205,16 +206,18 @@ impl File<'_> {
             (Some(place), None, _) => Ok(place),
             (None, _, Ok(number)) if (1..=width).contains(&number) => Ok(number - 1),
             (None, _, Ok(_)) => missing(format!("column {name}, expected a number from 1 to {width}")),
-            (None, _, Err(_)) => match named.iter().position(|heading| plain(name).is_some_and(|it| it == heading.name)) {
-                Some(place) => Ok(place),
-                None if self.headings.is_some() => {
-                    missing(unknown("column", name, named.iter().map(|heading| heading.name.as_str())))
-                }
-                None => missing(format!(
-                    "column {name:?} in a file without names, expected a number from 1 to {width} or the names of all \
+            (None, _, Err(_)) => {
+                match named.iter().position(|heading| plain(name).is_some_and(|it| it == heading.name)) {
+                    Some(place) => Ok(place),
+                    None if self.headings.is_some() => {
+                        missing(unknown("column", name, named.iter().map(|heading| heading.name.as_str())))
+                    }
+                    None => missing(format!(
+                        "column {name:?} in a file without names, expected a number from 1 to {width} or the names of all \
                      columns"
-                )),
-            },
+                    )),
+                }
+            }
         }
     }
 
@@ -229,9 +232,10 @@ impl File<'_> {
             };
             headings().map(|heading| heading.name.as_str()).find(|name| is_usual(name) && !taken(name))
         };
-        number.and_then(called).or_else(|| called("")).ok_or_else(|| Problem::NoTime {
-            names: headings().map(|heading| heading.name.clone()).collect(),
-        })
+        number
+            .and_then(called)
+            .or_else(|| called(""))
+            .ok_or_else(|| Problem::NoTime { names: headings().map(|heading| heading.name.clone()).collect() })
     }
 
     /// Numbers of the trajectories side by side, in the order of their first columns.

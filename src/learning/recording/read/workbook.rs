@@ -12,6 +12,8 @@ pub const MARK: &str = "xl/workbook.xml";
 /// Most rows and columns of a sheet, which are Excel's own.
 const ROWS: usize = 1 << 20;
 const COLUMNS: usize = 1 << 14;
+/// Most bytes of the text that is made of it.
+const BYTES: usize = 1 << 28;
 
 /// The cells of the first sheet, separated by tabs, every row on the line of its number.
 pub fn text(mut archive: ZipArchive<Shared>) -> Result<String, Problem> {
@@ -88,6 +90,8 @@ struct Cells {
     /// Fields of the first row that has any.
     width: usize,
     fields: Vec<String>,
+    /// Bytes of the fields so far.
+    size: usize,
     /// Position and type of the cell.
     column: usize,
     kind: String,
@@ -138,6 +142,10 @@ impl Cells {
             };
             value = format!("\"{}\"", value.chars().map(plain).collect::<String>());
         }
+        self.size += value.len();
+        if self.size + self.lines.len() > BYTES {
+            return Err(Problem::Array("a workbook of more than 256 MB of text: save the sheet as CSV".to_string()));
+        }
         self.fields.resize(self.column, String::new());
         self.fields.push(value);
         Ok(())
@@ -154,7 +162,7 @@ impl Cells {
         }
         self.lines += &self.fields.join("\t");
         self.lines.push('\n');
-        self.fields.clear();
+        (self.fields, self.size) = (Vec::new(), 0);
     }
 }
 

@@ -42,8 +42,11 @@ pub fn next(input: &mut impl BufRead) -> Result<Option<Tag>, Problem> {
     let mut part = |mark: u8| -> Result<Option<String>, Problem> {
         let mut bytes = Vec::new();
         input.by_ref().take(LONGEST).read_until(mark, &mut bytes)?;
-        if bytes.pop().is_some_and(|last| last != mark) {
-            return if bytes.len() as u64 + 1 == LONGEST { Err(damaged()) } else { Ok(None) };
+        let long = bytes.len() as u64 == LONGEST;
+        match bytes.pop() {
+            Some(last) if last == mark => {}
+            _ if long => return Err(damaged()),
+            _ => return Ok(None),
         }
         String::from_utf8(bytes).map(Some).map_err(|_| damaged())
     };
@@ -51,7 +54,7 @@ pub fn next(input: &mut impl BufRead) -> Result<Option<Tag>, Problem> {
     loop {
         let Some(text) = part(b'<')? else { return Ok(None) };
         tag.text += &unescaped(&text);
-        let Some(inside) = part(b'>')? else { return Ok(None) };
+        let inside = part(b'>')?.ok_or_else(damaged)?;
         if inside.starts_with(['!', '?']) {
             continue;
         }
