@@ -1,11 +1,11 @@
-//! Any bytes as a file of recorded motion, CSV, NPY or NPZ: refused with an error of one line, or trajectories of finite
+//! Any bytes as a file of recorded motion, CSV, XLSX, NPY or NPZ: refused with an error of one line, or trajectories of finite
 //! numbers at increasing times.
 
 use lnn::recording::Columns;
 use lnn::recording::read::read_recording;
 use std::path::PathBuf;
 
-/// Reads the bytes as columns with names, by number, and with everything that can be asked for.
+/// Reads the bytes as columns with names, by number, with everything that can be asked for, and as trajectories side by side.
 pub fn run(bytes: &[u8]) {
     let path = std::env::temp_dir().join(format!("lnn-recording-{}", std::process::id()));
     std::fs::write(&path, bytes).expect("room for a small file");
@@ -20,7 +20,8 @@ pub fn run(bytes: &[u8]) {
         units: vec![("x".to_string(), "deg".to_string())],
         ..Columns::default()
     };
-    for columns in [named, numbered, full] {
+    let wide = Columns { wide: true, ..named.clone() };
+    for columns in [named, numbered, full, wide] {
         read(&path, &columns);
     }
 }

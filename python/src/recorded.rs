@@ -73,6 +73,7 @@ impl Source {
                 "forces" => columns.force = serde_json::from_value(given).map_err(bad)?,
                 "time" => columns.time = serde_json::from_value(given).map_err(bad)?,
                 "trajectory" => columns.trajectory = serde_json::from_value(given).map_err(bad)?,
+                "wide" => columns.wide = serde_json::from_value(given).map_err(bad)?,
                 "rate" => columns.rate = serde_json::from_value(given).map_err(bad)?,
                 "units" => {
                     let units: BTreeMap<String, String> = serde_json::from_value(given).map_err(bad)?;

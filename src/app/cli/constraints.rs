@@ -55,7 +55,7 @@ fn optional(argument: clap::Arg) -> clap::Arg {
 }
 
 /// Ends of names of files of recorded motion.
-const DATA: [&str; 3] = ["csv", "npy", "npz"];
+const DATA: [&str; 5] = ["csv", "gz", "npy", "npz", "xlsx"];
 
 /// The table of a file.
 #[derive(Serialize, Deserialize)]

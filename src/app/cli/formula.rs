@@ -90,7 +90,7 @@ pub enum Format {
 fn motion_or_model(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.value_name("DATA|MODEL").help(
-            "Files of recorded motion: CSV, NPY or NPZ, one of them - for standard input; or one model, a file or the directory of a run",
+            "Files of recorded motion: CSV, XLSX, NPY or NPZ, one of them - for standard input; or one model, a file or the directory of a run",
         ),
         _ => argument,
     }
@@ -175,12 +175,12 @@ fn is_model(path: &Path) -> bool {
 }
 
 fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
-    let (reading, columns) = args.recording.read()?;
+    let (reading, _) = args.recording.read()?;
     let n = reading.recording.coordinates.len();
     if let Some(noise) = args.noise.as_ref().filter(|noise| noise.len() != n) {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
-    let units = columns.coordinate_units();
+    let units = reading.coordinate_units();
     formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
         .map_err(|error| in_file(error, &reading))
 }

@@ -9,7 +9,8 @@ use std::path::PathBuf;
 /// Recorded motion.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordingArgs {
-    /// Files of recorded motion: CSV, NPY or NPZ; - is standard input. Each holds a trajectory, or several distinguished by a column.
+    /// Files of recorded motion: CSV (also packed by gzip), XLSX, NPY or NPZ; - is standard input. Each holds a trajectory, or several
+    /// distinguished by a column or side by side.
     #[arg(required = true, value_name = "DATA")]
     pub data: Vec<PathBuf>,
     /// Columns of the coordinates, by name or by number from 1 [default: guessed from names and numbers, with the meaning of the other
@@ -34,10 +35,13 @@ pub struct RecordingArgs {
     /// Column whose value distinguishes the trajectories of a file.
     #[arg(long, value_name = "COLUMN")]
     pub trajectory: Option<String>,
+    /// Trajectories are side by side: those of s,theta in the columns s1,theta1,s2,theta2.
+    #[arg(long, conflicts_with = "trajectory")]
+    pub wide: bool,
     /// Coordinates that are angles, in rad or with a unit; they are unwrapped.
     #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
     pub periodic: Vec<String>,
-    /// Units of columns that are not SI, or factors to SI, such as theta=deg,t=ms,x=0.01.
+    /// Units of columns that are not SI, or factors to SI, such as theta=deg,t=ms,x=0.01 [default: those in brackets in the header].
     #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit)]
     pub units: Vec<(String, String)>,
     /// Names of all columns of files without a header.
@@ -70,6 +74,7 @@ impl RecordingArgs {
             periodic: self.periodic.clone(),
             units: self.units.clone(),
             names: (!self.columns.is_empty()).then(|| self.columns.clone()),
+            wide: self.wide,
             ..Columns::default()
         }
     }
@@ -129,6 +134,9 @@ impl RecordingArgs {
                 line += &format!(" --{option} {}", quoted(&values.join(",")));
             }
         }
+        if columns.wide {
+            line += " --wide";
+        }
         line
     }
 
@@ -167,7 +175,11 @@ pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, Cli
 fn refused(error: &DataError, columns: &Columns) -> CliError {
     match error {
         DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", help(columns, problem))),
-        _ => CliError::usage(format_args!("{}{error}", option(&error.to_string()))),
+        DataError::Columns(wrong) => {
+            let wrong: Vec<_> = wrong.0.iter().map(|problem| format!("{}{problem}", option(problem))).collect();
+            CliError::usage(wrong.join("; "))
+        }
+        _ => CliError::usage(error),
     }
 }
 
@@ -184,6 +196,8 @@ fn help(columns: &Columns, problem: &Problem) -> &'static str {
         Problem::Missing { what: "force", .. } => ": --force names it",
         Problem::Missing { what: "error", .. } => ": --error names it",
         Problem::Width { .. } | Problem::Header { .. } => ": see --columns",
+        Problem::Unit { .. } => ": --units COLUMN=UNIT",
+        Problem::Several { first, .. } => first.first().map_or("", |problem| help(columns, problem)),
         Problem::Order { .. } if columns.trajectory.is_none() => ": --trajectory COLUMN",
         _ => "",
     }

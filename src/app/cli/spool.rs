@@ -65,6 +65,7 @@ pub fn read_spooled(
             reading.recording.tracks.iter_mut().for_each(|track| track.name = named(&track.name));
             reading.cuts.iter_mut().for_each(|cut| cut.file = named(&cut.file));
             reading.dropped.iter_mut().for_each(|part| part.file = named(&part.file));
+            reading.formats.iter_mut().for_each(|facts| facts.file = named(&facts.file));
             Ok(reading)
         }
         Err(DataError::File { file, problem }) => Err(DataError::File { file: named(&file), problem }),

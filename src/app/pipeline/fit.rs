@@ -356,7 +356,7 @@ fn formula(
     let options = FormulaOptions {
         friction: network.architecture().has_friction(),
         noise: config.noise.clone(),
-        units: config.recording.meaning().coordinate_units(),
+        units: prepared.reading.coordinate_units(),
         seed: config.training.seed,
         threads,
         cancellation: if was_interrupted { Cancellation::default() } else { watch.cancellation() },

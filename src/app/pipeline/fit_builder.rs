@@ -53,7 +53,7 @@ enum Source {
 }
 
 impl Fit {
-    /// A fit of a file: CSV, NPY or NPZ.
+    /// A fit of a file: CSV, XLSX, NPY or NPZ.
     pub fn new(file: impl Into<PathBuf>) -> Self {
         Self::of(Source::Files(vec![file.into()]))
     }
@@ -178,6 +178,8 @@ impl Fit {
             Source::Files(files) => (read_recording(&files, &columns)?, files),
             Source::Memory(loaded) => (*loaded, Vec::new()),
         };
+        // Columns of files are called what their headers call them.
+        let columns = if files.is_empty() { columns } else { loaded.columns.clone() };
         let prepared = PreparedFit::new(&loaded, &options)?;
         let mut config = prepared.suggest(&FitConfig::default().training.system, precision)?;
         config.recording = FitColumns {

@@ -80,7 +80,7 @@ table! {
     /// The files of recorded motion and what their columns mean. A fit in memory needs none of it but names of its forces, if they
     /// are to have any.
     pub struct FitColumns {
-        /// Files of recorded motion: CSV, NPY or NPZ.
+        /// Files of recorded motion: CSV, XLSX, NPY or NPZ.
         #[key("paths", example = "[\"data.csv\"]")]
         pub files: Vec<String> = Vec::new(),
         /// Columns of the coordinates, by name or by number from 1.
@@ -110,6 +110,10 @@ table! {
         #[key("a column", example = "\"run\"")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub trajectory: Option<String> = None,
+        /// Whether trajectories are side by side, those of `s` in the columns `s1`, `s2`.
+        #[key("true, false", example = "true")]
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        pub wide: bool = false,
         /// Coordinates that are angles.
         #[key("coordinates", example = "[\"q1\"]")]
         #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -194,8 +198,9 @@ pub(crate) fn unit(text: &str) -> Option<(String, String)> {
 impl FitColumns {
     /// The meaning of the columns.
     pub(crate) fn meaning(&self) -> Columns {
-        let Self { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, columns, .. } =
-            self.clone();
+        let Self {
+            coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, units, columns, ..
+        } = self.clone();
         let units = units.iter().filter_map(|text| unit(text)).collect();
         let names = (!columns.is_empty()).then_some(columns);
         Columns {
@@ -206,6 +211,7 @@ impl FitColumns {
             time,
             rate,
             trajectory,
+            wide,
             periodic,
             units,
             names,
@@ -216,8 +222,9 @@ impl FitColumns {
 
 impl From<&Columns> for FitColumns {
     fn from(columns: &Columns) -> Self {
-        let Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, names, .. } =
-            columns.clone();
+        let Columns {
+            coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, units, names, ..
+        } = columns.clone();
         Self {
             files: Vec::new(),
             coords,
@@ -227,6 +234,7 @@ impl From<&Columns> for FitColumns {
             time,
             rate,
             trajectory,
+            wide,
             periodic,
             units: units.iter().map(|(column, unit)| format!("{column}={unit}")).collect(),
             columns: names.unwrap_or_default(),

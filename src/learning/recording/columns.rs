@@ -2,10 +2,11 @@
 
 use crate::names::pluralize;
 use crate::names::{taken_column, unknown};
-use crate::recording::units::{factor, si};
+use crate::recording::heading::is_same;
+use crate::recording::units::factor;
 use thiserror::Error;
 
-/// Which columns hold what. A column is its name in the header, or its number from 1.
+/// Which columns hold what. A column is its name in the header, with or without the unit in brackets behind it, or its number from 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Coordinates, at least one.
@@ -26,10 +27,13 @@ pub struct Columns {
     pub trajectory: Option<String>,
     /// Coordinates that are angles, in rad after conversion.
     pub periodic: Vec<String>,
-    /// Column and its unit, such as `deg` or `mm`, or its factor to SI.
+    /// Column and its unit, such as `deg` or `mm`, or its factor to SI; a unit that is given here counts more than one in the header.
     pub units: Vec<(String, String)>,
     /// Names of all columns of files without a header, by position.
     pub names: Option<Vec<String>>,
+    /// Whether trajectories are side by side, those of coordinates `s` and `theta` in `s1`, `theta1`, `s2`, `theta2`. They share a column
+    /// of time unless there are `t1`, `t2`; of shorter ones the last fields are empty.
+    pub wide: bool,
     /// Whether trajectories stay whole, for those who follow them by equations of motion: no gap cuts one, none is too short, and rows at the
     /// same time are repeated measurements of one state.
     pub whole: bool,
@@ -37,16 +41,10 @@ pub struct Columns {
 
 /// Why a description of columns makes no sense, whatever the data.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct ColumnsError(pub String);
+#[error("{}", .0.join("; "))]
+pub struct ColumnsError(pub Vec<String>);
 
 impl Columns {
-    /// SI units of the coordinates as far as they are given, empty texts otherwise.
-    pub(crate) fn coordinate_units(&self) -> Vec<String> {
-        let unit = |name: &String| self.units.iter().find(|(column, _)| column == name).and_then(|(_, unit)| si(unit));
-        self.coords.iter().map(|name| unit(name).unwrap_or_default()).collect()
-    }
-
     /// Every column named, with its meaning.
     pub(crate) fn used(&self) -> impl Iterator<Item = (&'static str, &String)> {
         [
@@ -62,14 +60,9 @@ impl Columns {
         .flat_map(|(what, names)| names.iter().map(move |name| (what, name)))
     }
 
-    /// Factor of a column to SI.
-    pub(crate) fn factor(&self, name: &str) -> f64 {
-        self.units.iter().find(|(column, _)| column == name).and_then(|(_, unit)| factor(unit).ok()).unwrap_or(1.0)
-    }
-
     /// Which coordinates are angles.
     pub(crate) fn periodic(&self) -> Vec<bool> {
-        self.coords.iter().map(|name| self.periodic.contains(name)).collect()
+        self.coords.iter().map(|name| self.periodic.iter().any(|angle| is_same(angle, name))).collect()
     }
 
     /// Checks what can be checked without the data.
@@ -77,11 +70,11 @@ impl Columns {
     /// # Errors
     /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations, forces or errors than of coordinates, a
     /// column used twice, an angle that is not a coordinate, an unknown unit, a unit of a column that is not used, time and
-    /// rate both given, a rate that is not positive.
+    /// rate both given, a rate that is not positive, a column of trajectories that are side by side; all of it at once.
     pub(crate) fn validate(&self) -> Result<(), ColumnsError> {
-        let wrong = |text: String| Err(ColumnsError(text));
+        let mut wrong = Vec::new();
         if self.coords.is_empty() {
-            return wrong("expected the columns of the coordinates".to_string());
+            wrong.push("expected the columns of the coordinates".to_string());
         }
         for (what, names) in [
             ("velocity", &self.velocity),
@@ -90,55 +83,65 @@ impl Columns {
             ("error", &self.error),
         ] {
             if !names.is_empty() && names.len() != self.coords.len() {
-                let (n, found) = (self.coords.len(), names.len());
-                return wrong(format!(
-                    "{what}: expected {}, one per coordinate, found {found}",
-                    pluralize(n, "column", "columns")
-                ));
+                let (columns, found) = (pluralize(self.coords.len(), "column", "columns"), names.len());
+                wrong.push(format!("{what}: expected {columns}, one per coordinate, found {found}"));
             }
         }
         let used: Vec<(&str, &String)> = self.used().collect();
         for (k, (what, name)) in used.iter().enumerate() {
             if name.trim().is_empty() {
-                return wrong(format!("{what}: expected the name or number of a column, found nothing"));
-            }
-            if let Some((other, _)) = used[..k].iter().find(|(_, earlier)| earlier == name) {
-                return wrong(format!("column {name} is used twice, as {other} and as {what}"));
+                wrong.push(format!("{what}: expected the name or number of a column, found nothing"));
+            } else if let Some((other, _)) = used[..k].iter().find(|(_, earlier)| earlier == name) {
+                wrong.push(format!("column {name} is used twice, as {other} and as {what}"));
             }
         }
         let coordinates: Vec<&str> = self.coords.iter().map(String::as_str).collect();
         if let Some((_, problem)) = taken_column(&coordinates) {
-            return wrong(format!("coordinate: {problem} in the header"));
+            wrong.push(format!("coordinate: {problem} in the header"));
         }
-        if let Some(name) = self.periodic.iter().find(|name| !self.coords.contains(name)) {
-            return wrong(format!("periodic: {}", unknown("coordinate", name, self.coords.iter().map(String::as_str))));
+        for name in self.periodic.iter().filter(|name| !self.coords.iter().any(|coordinate| is_same(coordinate, name)))
+        {
+            wrong.push(format!("periodic: {}", unknown("coordinate", name, coordinates.iter().copied())));
         }
         match (self.rate, &self.time) {
             (Some(_), Some(time)) => {
-                return wrong(format!("expected either a column of time ({time}) or a rate, found both"));
+                wrong.push(format!("expected either a column of time ({time}) or a rate, found both"));
             }
             (Some(rate), None) if !(rate.is_finite() && rate > 0.0) => {
-                return wrong(format!("rate: expected a finite number of samples per second above 0, found {rate}"));
+                wrong.push(format!("rate: expected a finite number of samples per second above 0, found {rate}"));
             }
             _ => {}
         }
+        if let (true, Some(column)) = (self.wide, &self.trajectory) {
+            wrong.push(format!(
+                "expected trajectories either side by side (wide) or told by the column {column}, found both"
+            ));
+        }
+        self.check_units(&mut wrong);
+        for (k, name) in self.names.iter().flat_map(|names| names.iter().enumerate()) {
+            if self.names.iter().any(|names| names[..k].contains(name)) {
+                wrong.push(format!("columns: duplicate name {name}, at position {} again", k + 1));
+            }
+        }
+        if wrong.is_empty() { Ok(()) } else { Err(ColumnsError(wrong)) }
+    }
+
+    /// Notes what is wrong with the units.
+    fn check_units(&self, wrong: &mut Vec<String>) {
         // The default column of time is known only with the data.
-        let known = || used.iter().map(|(_, name)| name.as_str()).chain(["t", "time"]);
+        let usual: &[&str] = if self.time.is_none() && self.rate.is_none() { &["t", "time"] } else { &[] };
+        let known = || self.used().map(|(_, name)| name.as_str()).chain(usual.iter().copied());
         for (k, (name, unit)) in self.units.iter().enumerate() {
-            if !known().any(|column| column == name) {
-                return wrong(format!("units: {}", unknown("column", name, known().collect::<Vec<_>>())));
+            if !known().any(|column| is_same(column, name))
+                && !usual.iter().any(|usual| usual.eq_ignore_ascii_case(name))
+            {
+                wrong.push(format!("units: {}", unknown("column", name, known().collect::<Vec<_>>())));
+            } else if self.units[..k].iter().any(|(earlier, _)| earlier == name) {
+                wrong.push(format!("units: duplicate column {name}"));
+            } else if let Err(problem) = factor(unit) {
+                wrong.push(format!("units: {name}: {problem}"));
             }
-            if self.units[..k].iter().any(|(earlier, _)| earlier == name) {
-                return wrong(format!("units: duplicate column {name}"));
-            }
-            factor(unit).map_err(|problem| ColumnsError(format!("units: {name}: {problem}")))?;
         }
-        if let Some(names) = &self.names
-            && let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name))
-        {
-            return wrong(format!("columns: duplicate name {name}, at position {} again", k + 1));
-        }
-        Ok(())
     }
 }
 
@@ -152,6 +155,8 @@ mod tests {
 
     #[test]
     fn contradictions_are_named() {
+        let several = Columns { force: list(&["f"]), rate: Some(-1.0), ..Columns::default() };
+        assert_eq!(several.validate().unwrap_err().0.len(), 3);
         let good = Columns { coords: list(&["x", "theta"]), periodic: list(&["theta"]), ..Columns::default() };
         assert_eq!(good.validate(), Ok(()));
         assert_eq!(good.periodic(), [false, true]);

@@ -18,6 +18,7 @@
 mod clock;
 mod columns;
 mod guess;
+mod heading;
 mod held;
 mod hermite;
 mod hold_out;

@@ -1,8 +1,10 @@
 //! The files and rows that recorded samples come from, and what was left out.
 
-use crate::recording::Recording;
+use crate::recording::read::FileFacts;
 use crate::recording::smooth::{Chosen, Smoothing, noise};
 use crate::recording::statistics::deviation;
+use crate::recording::units::si;
+use crate::recording::{Columns, Recording};
 use serde::{Deserialize, Serialize};
 
 /// Line of the file of every sample, run-length: from sample `.0` on, sample `k` is on line `k - .0 + .1`.
@@ -98,6 +100,22 @@ pub struct LoadedRecording {
     pub errors: Vec<Vec<f64>>,
     /// Number of the take of every trajectory: those that gaps cut out of one have the same.
     pub takes: Vec<usize>,
+    /// Meaning of the columns, which have the names of the first file's header without units; without files it is empty.
+    pub columns: Columns,
+    /// What was recognised in every file.
+    pub formats: Vec<FileFacts>,
+}
+
+impl LoadedRecording {
+    /// SI units of the coordinates as far as the description or the first file's header gives them, empty texts otherwise.
+    pub(crate) fn coordinate_units(&self) -> Vec<String> {
+        let header = self.formats.first().map(|facts| &facts.units);
+        let unit = |name: &String| {
+            let given = self.columns.units.iter().find(|(column, _)| column == name).map(|(_, unit)| unit);
+            given.or_else(|| header?.get(name)).and_then(|unit| si(unit)).unwrap_or_default()
+        };
+        self.columns.coords.iter().map(unit).collect()
+    }
 }
 
 impl From<Recording> for LoadedRecording {
@@ -107,7 +125,21 @@ impl From<Recording> for LoadedRecording {
         let takes = (0..recording.tracks.len()).collect();
         let (cuts, dropped, errors) = (Vec::new(), Vec::new(), Vec::new());
         let bridged = Bridged::default();
-        Self { recording, rows, files: 0, time: None, duplicates: 0, cuts, dropped, bridged, errors, takes }
+        let (columns, formats) = (Columns::default(), Vec::new());
+        Self {
+            recording,
+            rows,
+            files: 0,
+            time: None,
+            duplicates: 0,
+            cuts,
+            dropped,
+            bridged,
+            errors,
+            takes,
+            columns,
+            formats,
+        }
     }
 }
 

@@ -202,6 +202,36 @@ fn bad_files_are_refused() {
     check(&[folder.0.path().to_str().unwrap()], &["--coords", "x"]).refused(1, &["found a directory"]);
 }
 
+#[test]
+fn what_is_recognised_in_a_file_is_told() {
+    let folder = Folder::new();
+    let german = csv("Zeit [s],Weg x [cm],Winkel (°)", &swing(200, 1)).replace(',', ";").replace('.', ",");
+    let file = folder.file("german.csv", german);
+    let columns = ["--coords", "Weg x [cm],Winkel", "--time", "Zeit", "--periodic", "Winkel"];
+    let found = survey(&[&file], &columns);
+    assert_eq!((&found["coordinates"][0]["name"], &found["time"]), (&"Weg_x".into(), &"Zeit".into()));
+    near(&found["coordinates"][0]["noise"], 1e-5, 0.3);
+    let facts = &found["formats"][0];
+    assert_eq!((&facts["decimal_comma"], &facts["separator"]), (&true.into(), &"semicolon".into()));
+    assert_eq!((&facts["units"]["Weg_x"], &facts["units"]["Winkel"]), (&"cm".into(), &"°".into()));
+    // The configuration of a fit names the columns so too, and a unit that is given counts more.
+    let config = lnn(&[&["fit", &file, "--print-config"], columns.as_slice()].concat());
+    assert_eq!(config.code, Some(0), "{}", config.stderr);
+    assert!(config.stdout.contains("coords = [\"Weg_x\", \"Winkel\"]"), "{}", config.stdout);
+    let found = survey(&[&file], &[columns.as_slice(), &["--units", "Weg_x=m"]].concat());
+    near(&found["coordinates"][0]["noise"], 1e-3, 0.3);
+}
+
+#[test]
+fn trajectories_side_by_side_are_checked() {
+    let folder = Folder::new();
+    let file = folder.file("wide.csv", csv("t,x1,x2", &swing(200, 1)));
+    let found = survey(&[&file], &["--coords", "x", "--wide"]);
+    assert_eq!((&found["samples"], found["tracks"].as_array().map(Vec::len)), (&400.into(), Some(2)));
+    check(&[&file], &["--coords", "x", "--wide", "--trajectory", "t"]).refused(2, &["--wide"]);
+    check(&[&file], &["--coords", "y", "--wide"]).refused(1, &["wide.csv", "y1, y2"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_refused_at_once() {

@@ -28,8 +28,8 @@ const ADAPTERS: [(&str, &[&str]); 14] = [
     ("safetensors", &["support/storage/container/"]),
     ("crc32fast", &["support/storage/container/"]),
     ("postcard", &["support/storage/container/"]),
-    ("zip", &["learning/recording/read/npz.rs"]),
-    ("flate2", &["app/report/plot/png.rs"]),
+    ("zip", &["learning/recording/read/"]),
+    ("flate2", &["app/report/plot/png.rs", "learning/recording/read/gzip.rs"]),
     ("clap", &["app/cli/"]),
     ("signal_hook", &["app/cli/interrupt.rs"]),
 ];

@@ -8,7 +8,7 @@ mod roles;
 mod time;
 
 use crate::recording::read::RawTable;
-use crate::recording::{Columns, DataError};
+use crate::recording::{Columns, ColumnsError, DataError};
 use serde::Serialize;
 use std::path::Path;
 
@@ -40,6 +40,11 @@ pub struct Guess {
 /// # Errors
 /// [`DataError`] for a file that cannot be read as a table, or in which no column can be a coordinate or the time.
 pub fn guess<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, DataError> {
+    if given.wide {
+        return Err(
+            ColumnsError(vec!["coords: expected the columns of the coordinates beside wide".to_string()]).into()
+        );
+    }
     let Some(file) = files.first().map(AsRef::as_ref) else { return Err(DataError::NoFiles) };
     roles::guess(file, &RawTable::read(file, given.names.as_deref())?, given)
 }

@@ -100,7 +100,7 @@ impl Roles<'_> {
         let told = self.of(&Role::Time).first().copied();
         self.time = match told {
             Some(column) => {
-                let restarts = table.numbers[column].as_deref().and_then(time::restarts).unwrap_or_default();
+                let restarts = table.numbers[column].as_deref().ok().and_then(time::restarts).unwrap_or_default();
                 Some(Time { column, unit: None, restarts, because: "as given".to_string() })
             }
             None if given.rate.is_some() => None,
@@ -114,9 +114,9 @@ impl Roles<'_> {
     /// Sets aside what is no measurement: text, constants, counters, copies.
     fn set_aside(&mut self) {
         for k in self.open() {
-            let Some(values) = &self.table.numbers[k] else { continue };
+            let Ok(values) = &self.table.numbers[k] else { continue };
             let name = &self.table.names[k];
-            let copied = (0..k).find(|&j| self.table.numbers[j].as_ref().is_some_and(|other| copies(values, other)));
+            let copied = (0..k).find(|&j| self.table.numbers[j].as_ref().is_ok_and(|other| copies(values, other)));
             if values.windows(2).all(|pair| pair[0] == pair[1]) {
                 self.set(k, Role::Unused, "it has one value");
             } else if (is_index(name) || self.time.is_some()) && counts(values) {
@@ -144,15 +144,15 @@ impl Roles<'_> {
             self.set(k, Role::Trajectory, because);
         }
         for k in self.open() {
-            if self.table.numbers[k].is_none() {
-                self.set(k, Role::Unused, "not every row has a number there");
+            if let Err(problem) = &self.table.numbers[k] {
+                self.set(k, Role::Unused, problem.clone());
             }
         }
     }
 
     /// `true` for text, and for whole numbers of few values.
     fn labels(&self, k: usize) -> bool {
-        let Some(values) = &self.table.numbers[k] else { return true };
+        let Ok(values) = &self.table.numbers[k] else { return true };
         let mut distinct: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
         distinct.sort_unstable();
         distinct.dedup();
@@ -162,7 +162,7 @@ impl Roles<'_> {
     /// `true` if the rows of every trajectory that a column distinguishes are in the order of time.
     fn in_order(&self, k: usize, file: &Path) -> bool {
         let Some(time) = &self.time else { return true };
-        let other = self.open().into_iter().find(|&j| j != k && self.table.numbers[j].is_some());
+        let other = self.open().into_iter().find(|&j| j != k && self.table.numbers[j].is_ok());
         let Some(other) = other else { return false };
         let columns = Columns {
             coords: vec![self.table.names[other].clone()],
@@ -225,8 +225,8 @@ impl Roles<'_> {
 
     /// Correlation of column `k` with the derivative of column `j`, and their ratio by least squares.
     fn derivative(&self, j: usize, k: usize, order: usize) -> Option<(f64, f64)> {
-        let (x, y) = (self.table.numbers[j].as_ref()?, self.table.numbers[k].as_ref()?);
-        let times = self.time.as_ref().and_then(|time| self.table.numbers[time.column].as_ref());
+        let (x, y) = (self.table.numbers[j].as_ref().ok()?, self.table.numbers[k].as_ref().ok()?);
+        let times = self.time.as_ref().and_then(|time| self.table.numbers[time.column].as_ref().ok());
         let scale = self
             .time
             .as_ref()
@@ -275,7 +275,7 @@ impl Roles<'_> {
         let forces = self.of(&Role::Force);
         if !forces.is_empty() && forces.len() != coordinates.len() && self.given.force.is_empty() {
             let because =
-                format!("expected a force for each of {} coordinates, found {}", coordinates.len(), forces.len());
+                format!("expected a force for each of the {} coordinates, found {}", coordinates.len(), forces.len());
             forces.into_iter().for_each(|k| self.set(k, Role::Unused, because.clone()));
         }
         for order in [1, 2] {
@@ -301,7 +301,7 @@ impl Roles<'_> {
         let units = &self.given.units;
         let known = |name: &String| units.iter().any(|(column, _)| column == name);
         let found =
-            |&k: &usize| Some((k, angle(&self.table.names[k], self.table.numbers[k].as_ref()?, self.restarts())?));
+            |&k: &usize| Some((k, angle(&self.table.names[k], self.table.numbers[k].as_ref().ok()?, self.restarts())?));
         let angles: Vec<(usize, Angle)> = coordinates.iter().filter_map(found).collect();
         let mut guessed: Vec<(String, String)> = Vec::new();
         for (k, Angle { degrees, .. }) in &angles {

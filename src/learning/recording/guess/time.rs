@@ -45,10 +45,10 @@ fn even(values: &[f64]) -> bool {
 }
 
 /// The time among columns: by its name, or as the only one that increases by like steps and does not count rows.
-pub fn find(names: &[String], numbers: &[Option<Vec<f64>>]) -> Option<Time> {
+pub fn find(names: &[String], numbers: &[Result<Vec<f64>, String>]) -> Option<Time> {
     let candidates = || {
         numbers.iter().enumerate().filter_map(|(k, values)| {
-            let values = values.as_deref()?;
+            let values = values.as_deref().ok()?;
             Some((k, values, restarts(values)?))
         })
     };

@@ -58,6 +58,11 @@ impl<'a> Builder<'a> {
         self.expected = if self.selection.trajectory.is_none() { rows } else { 0 };
     }
 
+    /// The columns as the file calls them.
+    pub fn called(&self) -> Columns {
+        self.selection.called(self.columns)
+    }
+
     /// Adds a row: the used columns in the order of the selection, as they stand in the file, and the value that tells
     /// trajectories apart if there is such a column.
     pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {

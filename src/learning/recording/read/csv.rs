@@ -2,23 +2,50 @@
 
 use super::Problem;
 use super::builder::Builder;
+use super::encoding::{Encoding, MARK, decode};
+use super::error::Faults;
+use super::number::Numbers;
 use super::select::Selection;
-use super::text::{Separator, comment, line_end, names_in, split, unquoted};
+use super::text::{Separator, comment, line_end, names_in, split, unquoted, with_point};
+use super::wide::Lane;
 use crate::recording::Columns;
 use std::io::{BufRead, Read};
 
 /// Longest line in bytes.
 const LONGEST: u64 = 1 << 20;
 
-/// Reads rows of numbers, with or without a header, into trajectories.
+/// Trajectories of a text while its lines come in, and what was recognised in it.
+pub struct Text<'a> {
+    /// One trajectory or several that a column distinguishes, or several side by side.
+    lanes: Vec<Lane<'a>>,
+    /// `true` if trajectories are side by side.
+    wide: bool,
+    /// Place of every column among the used ones of its trajectory.
+    slots: Vec<Option<usize>>,
+    /// Position of the column that distinguishes trajectories.
+    label_at: Option<usize>,
+    faults: Faults,
+    /// Mark of the decimals.
+    pub numbers: Numbers,
+    /// Encoding of what is not a number.
+    pub encoding: Encoding,
+    /// Separator of the fields.
+    pub separator: Separator,
+}
+
+/// Reads rows of numbers, with or without a header, into trajectories; `known` is the separator if it need not be recognised.
 ///
 /// The first line that is neither blank nor a comment, which begins with `#`, is a header if none of its fields is a number,
 /// and says how fields are separated: by commas, semicolons, tabs, bars or blanks. Without a header the last comment above
-/// names the columns if it has as many names. Spaces around fields, double quotes, a byte order mark, blank lines and the line
-/// ends of Windows and of old Macs are accepted.
-pub fn read<'a>(mut input: impl BufRead, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
-    let (mut line, mut row, mut values) = (Vec::new(), 0, Vec::new());
-    let mut begun: Option<(Builder<'a>, Vec<Option<usize>>, Separator)> = None;
+/// names the columns if it has as many names. Spaces around fields, double quotes, a byte order mark, blank lines, the line
+/// ends of Windows and of old Macs, decimal commas and Excel's line `sep=;` are accepted.
+pub fn read<'a>(
+    mut input: impl BufRead,
+    columns: &'a Columns,
+    known: Option<Separator>,
+) -> Result<(Text<'a>, Vec<Builder<'a>>), Problem> {
+    let (mut line, mut row) = (Vec::new(), 0);
+    let mut begun: Option<Text<'a>> = None;
     let mut remark = None;
     let end = line_end(input.fill_buf()?);
     loop {
@@ -30,122 +57,145 @@ pub fn read<'a>(mut input: impl BufRead, columns: &'a Columns) -> Result<Builder
         if line.len() as u64 == LONGEST {
             return Err(Problem::LongLine { row, limit: LONGEST });
         }
-        let mut text = line.as_slice();
+        let mut whole = line.as_slice();
         if row == 1 {
-            text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-            if text.starts_with(b"\xff\xfe") || text.starts_with(b"\xfe\xff") {
-                return Err(Problem::NotText(row));
-            }
+            whole = whole.strip_prefix(MARK).unwrap_or(whole);
         }
-        let text = text.trim_ascii();
+        let text = whole.trim_ascii();
         if text.is_empty() {
             continue;
         }
         if let Some(said) = comment(text) {
             if begun.is_none() {
-                remark = std::str::from_utf8(said).ok().map(|said| (row, said.to_string()));
+                remark = decode(said).map(|(said, _)| (row, said.to_string()));
             }
             continue;
         }
-        let (builder, slots, separator) = match &mut begun {
-            Some(known) => known,
+        match &mut begun {
+            Some(known) => known.take(whole, text, row)?,
+            None if text.strip_prefix(b"sep=").is_some_and(|mark| mark.len() <= 1) => {}
             None => {
-                let (selection, header, separator) = begin(text, row, columns, remark.take())?;
-                let mut slots = vec![None; selection.width];
-                for (slot, used) in selection.values.iter().enumerate() {
-                    slots[used.position] = Some(slot);
+                let (first, header) = Text::begin(whole, row, columns, remark.take(), known)?;
+                let first = begun.insert(first);
+                if !header {
+                    first.take(whole, text, row)?;
                 }
-                values.resize(selection.values.len(), 0.0);
-                let known = begun.insert((Builder::new(columns, selection), slots, separator));
-                if header {
-                    continue;
-                }
-                known
             }
+        }
+    }
+    let mut text = begun.ok_or(Problem::Empty)?;
+    std::mem::take(&mut text.faults).end()?;
+    let builders = std::mem::take(&mut text.lanes).into_iter().map(|lane| lane.builder).collect();
+    Ok((text, builders))
+}
+
+impl<'a> Text<'a> {
+    /// Finds the columns by the first line, or by the comment above it; says whether the line is a header.
+    fn begin(
+        line: &[u8],
+        row: u64,
+        columns: &'a Columns,
+        remark: Option<(u64, String)>,
+        known: Option<Separator>,
+    ) -> Result<(Self, bool), Problem> {
+        let (text, encoding) = decode(line).ok_or(Problem::NotText(row))?;
+        let separator = known.unwrap_or_else(|| Separator::of(&text));
+        // A column that has no name is the first of a table.
+        let text = if separator == Separator::Tab { text.trim_matches(' ').trim_end() } else { text.trim() };
+        let first = split(text, separator);
+        let width = first.len();
+        let header = first.iter().all(|field| field.parse::<f64>().is_err() && with_point(field).is_none());
+        let select = |names: Option<&[String]>, row| Selection::all(columns, names, width, row);
+        let selections = match (&columns.names, header) {
+            (Some(_), true) => return Err(Problem::Header { row, found: text.chars().take(80).collect() }),
+            (Some(names), false) if names.len() != width => {
+                return Err(Problem::Width { row, expected: names.len(), found: width });
+            }
+            (Some(names), false) => select(Some(names), row)?,
+            (None, true) => select(Some(&first.iter().map(ToString::to_string).collect::<Vec<_>>()), row)?,
+            (None, false) => match remark.and_then(|(row, said)| Some((row, names_in(&said, width)?))) {
+                Some((row, names)) => select(Some(&names), row)?,
+                None => select(None, row)?,
+            },
         };
-        take_row(text, row, *separator, builder, slots, &mut values)?;
+        let (mut slots, mut label_at) = (vec![None; width], None);
+        for selection in &selections {
+            for (slot, used) in selection.values.iter().enumerate() {
+                slots[used.position] = Some(slot);
+            }
+            label_at = selection.trajectory.as_ref().map(|used| used.position);
+        }
+        let lanes = selections.into_iter().map(|selection| Lane::new(Builder::new(columns, selection))).collect();
+        let (faults, numbers) = (Faults::default(), Numbers::default());
+        Ok((Self { lanes, wide: columns.wide, slots, label_at, faults, numbers, encoding, separator }, header))
     }
-    begun.map(|(builder, ..)| builder).ok_or(Problem::Empty)
-}
 
-/// Reads the numbers of one line.
-fn take_row(
-    text: &[u8],
-    row: u64,
-    separator: Separator,
-    builder: &mut Builder<'_>,
-    slots: &[Option<usize>],
-    values: &mut [f64],
-) -> Result<(), Problem> {
-    let label_at = builder.selection().trajectory.as_ref().map(|used| used.position);
-    let (mut found, mut label) = (0, None);
-    for field in separator.fields(text) {
-        if let Some(slot) = slots.get(found).copied().flatten() {
-            values[slot] = match number(field) {
-                Some(x) if x.is_finite() => x,
-                _ => {
-                    let expected = slots.len();
-                    let count = separator.fields(text).count();
-                    if count != expected {
-                        return Err(Problem::Ragged { row, expected, separated: separator.named(), found: count });
-                    }
-                    let shown = std::str::from_utf8(field).map_err(|_| Problem::NotText(row))?;
-                    let column = builder.selection().values[slot].name.clone();
-                    let found: String = unquoted(shown).chars().take(40).collect();
-                    return Err(if is_number_with_comma(&found) {
-                        Problem::DecimalComma { row, column, found }
-                    } else {
-                        Problem::Field { row, column, found }
-                    });
+    /// Reads the numbers of one line, `text` being it without the blanks around.
+    fn take<'b>(&mut self, line: &'b [u8], mut text: &'b [u8], row: u64) -> Result<(), Problem> {
+        if self.separator == Separator::Tab {
+            // Tabs at the ends stand beside fields that are empty.
+            let whole = line.trim_ascii_end().len();
+            let whole = &line[..whole + line[whole..].iter().take_while(|byte| matches!(byte, b'\t' | b' ')).count()];
+            if whole.len() != text.len() && self.separator.fields(text).count() != self.slots.len() {
+                text = whole;
+            }
+        }
+        if self.wide {
+            return self.take_wide(text, row);
+        }
+        let Some(lane) = self.lanes.first_mut() else { return Ok(()) };
+        let (mut found, mut good, mut label) = (0, true, None);
+        for field in self.separator.fields(text) {
+            if let Some(slot) = self.slots.get(found).copied().flatten() {
+                match self.numbers.parse(field, row) {
+                    Some(x) => lane.values[slot] = x,
+                    None => good = false,
                 }
-            };
-        } else if label_at == Some(found) {
-            label = Some(unquoted(std::str::from_utf8(field).map_err(|_| Problem::NotText(row))?));
+            } else if self.label_at == Some(found) {
+                label = Some(field);
+            }
+            found += 1;
         }
-        found += 1;
-    }
-    if found != slots.len() {
-        return Err(Problem::Ragged { row, expected: slots.len(), separated: separator.named(), found });
-    }
-    builder.push(row, values, label)
-}
-
-/// Finds the columns by the first line, or by the comment above it; says whether the line is a header, and what separates
-/// its fields.
-fn begin(
-    text: &[u8],
-    row: u64,
-    columns: &Columns,
-    remark: Option<(u64, String)>,
-) -> Result<(Selection, bool, Separator), Problem> {
-    let text = std::str::from_utf8(text).map_err(|_| Problem::NotText(row))?;
-    let separator = Separator::of(text);
-    let first = split(text, separator);
-    let width = first.len();
-    let header = first.iter().all(|field| field.parse::<f64>().is_err() && !is_number_with_comma(field));
-    let select = |names: Option<&[String]>, row| Selection::new(columns, names, width, row);
-    let selection = match (&columns.names, header) {
-        (Some(_), true) => return Err(Problem::Header { row, found: text.chars().take(80).collect() }),
-        (Some(names), false) if names.len() != width => {
-            return Err(Problem::Width { row, expected: names.len(), found: width });
+        if !good || found != self.slots.len() {
+            self.examine(text, row);
+            return Ok(());
         }
-        (Some(names), false) => select(Some(names), row)?,
-        (None, true) => select(Some(&first.iter().map(ToString::to_string).collect::<Vec<_>>()), row)?,
-        (None, false) => match remark.and_then(|(row, said)| Some((row, names_in(&said, width)?))) {
-            Some((row, names)) => select(Some(&names), row)?,
-            None => select(None, row)?,
-        },
-    };
-    Ok((selection, header, separator))
-}
+        // Beside a mistake the others are looked for, and nothing is kept.
+        if !self.faults.is_empty() {
+            return Ok(());
+        }
+        let Some(label) = label else { return lane.builder.push(row, &lane.values, None) };
+        let (label, encoding) = decode(label).ok_or(Problem::NotText(row))?;
+        if encoding != Encoding::Utf8 {
+            self.encoding = encoding;
+        }
+        lane.builder.push(row, &lane.values, Some(unquoted(&label)))
+    }
 
-/// `0,5`.
-fn is_number_with_comma(field: &str) -> bool {
-    field.contains(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
-}
+    /// Reads the numbers of trajectories side by side.
+    fn take_wide(&mut self, text: &[u8], row: u64) -> Result<(), Problem> {
+        let fields: Vec<&[u8]> = self.separator.fields(text).collect();
+        if fields.len() != self.slots.len() {
+            self.examine(text, row);
+            return Ok(());
+        }
+        self.lanes.iter_mut().try_for_each(|lane| lane.take(&fields, row, &mut self.numbers, &mut self.faults))
+    }
 
-/// A number, fast if nothing stands around it.
-fn number(field: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(field).ok()?;
-    text.parse().or_else(|_| unquoted(text).parse()).ok()
+    /// Notes every mistake of a line.
+    fn examine(&mut self, text: &[u8], row: u64) {
+        let (expected, found) = (self.slots.len(), self.separator.fields(text).count());
+        if found != expected {
+            return self.faults.add(Problem::Ragged { row, expected, separated: self.separator.named(), found });
+        }
+        for (field, slot) in self.separator.fields(text).zip(&self.slots) {
+            if let Some(slot) = slot
+                && self.numbers.parse(field, row).is_none()
+                && let Some(lane) = self.lanes.first()
+            {
+                let column = &lane.builder.selection().values[*slot].name;
+                self.faults.add(self.numbers.refusal(field, row, column));
+            }
+        }
+    }
 }

@@ -42,8 +42,24 @@ pub enum Problem {
     #[error("the coordinates are not named; the columns are {}", .0.join(", "))]
     Names(Vec<String>),
     /// Bytes that are not text.
-    #[error("row {0}: not UTF-8 text")]
+    #[error("row {0}: bytes that are not text")]
     NotText(u64),
+    /// A file of another format, and how to make one that is read.
+    #[error("{name}, which is not read: {cure}")]
+    Foreign {
+        /// The format.
+        name: &'static str,
+        /// How to make a file of the same numbers that is read.
+        cure: &'static str,
+    },
+    /// Several problems of one file.
+    #[error("{}", joined(first, *more))]
+    Several {
+        /// The first few.
+        first: Vec<Problem>,
+        /// Number of the others.
+        more: usize,
+    },
     /// A line that is too long to be a row of numbers.
     #[error("row {row}: a line of more than {limit} bytes")]
     LongLine {
@@ -119,15 +135,29 @@ pub enum Problem {
         /// Text found there.
         found: String,
     },
-    /// A decimal comma.
-    #[error("row {row}, column {column}: expected a decimal point, found the comma of {found:?}")]
-    DecimalComma {
+    /// Decimal commas in one row and decimal points in another.
+    #[error("row {row}, column {column}: expected a decimal {} as in row {since}, found {found:?}", if *comma { "comma" } else { "point" })]
+    Decimal {
         /// The row.
         row: u64,
         /// Name of the column.
         column: String,
         /// Text found there.
         found: String,
+        /// `true` if the decimals before have a comma.
+        comma: bool,
+        /// Row of the first of them.
+        since: u64,
+    },
+    /// A unit in a header that is not known.
+    #[error("row {row}, column {column}: {problem}; state its unit otherwise, the factor 1 for SI")]
+    Unit {
+        /// Row of the header.
+        row: u64,
+        /// Name of the column.
+        column: String,
+        /// The unit and what was expected.
+        problem: String,
     },
     /// Time stands still or goes back.
     #[error("row {row}, column {column}: expected a time later than {before} of row {before_row}, found {found}{hint}")]
@@ -182,6 +212,51 @@ pub enum Problem {
     /// The file could not be read to its end.
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
+}
+
+/// Problems of one file as they are found.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    first: Vec<Problem>,
+    more: usize,
+}
+
+impl Faults {
+    /// Problems that are told of one file.
+    const SHOWN: usize = 5;
+
+    /// Notes a problem.
+    pub(super) fn add(&mut self, problem: Problem) {
+        if self.first.len() < Self::SHOWN { self.first.push(problem) } else { self.more += 1 }
+    }
+
+    /// `true` if there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.first.is_empty()
+    }
+
+    /// Keeps what was found, and notes why nothing was.
+    pub(super) fn good<T>(&mut self, found: Result<T, Problem>) -> Option<T> {
+        found.map_err(|problem| self.add(problem)).ok()
+    }
+
+    /// The problems as one.
+    ///
+    /// # Errors
+    /// If there are any.
+    pub(super) fn end(mut self) -> Result<(), Problem> {
+        match self.first.len() {
+            0 => Ok(()),
+            1 => Err(self.first.remove(0)),
+            _ => Err(Problem::Several { first: self.first, more: self.more }),
+        }
+    }
+}
+
+/// Problems one after another.
+fn joined(first: &[Problem], more: usize) -> String {
+    let told = first.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    if more == 0 { told } else { format!("{told}; and {more} more") }
 }
 
 /// The first few names of columns, such as ` (there are s, x, y)`; nothing if there are none.

@@ -3,6 +3,7 @@
 use super::Problem;
 use super::builder::Builder;
 use super::element::Element;
+use super::error::Faults;
 use std::io::Read;
 
 /// Rows read at a time.
@@ -33,7 +34,7 @@ pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>
     builder.expect(rows);
     let mut buffers = vec![Vec::new(); sources.len()];
     let mut values = vec![0.0; all];
-    let mut done = 0;
+    let (mut done, mut faults) = (0, Faults::default());
     while done < rows {
         let now = ROWS.min(rows - done);
         for (source, buffer) in sources.iter_mut().zip(&mut buffers) {
@@ -48,17 +49,19 @@ pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>
                     values[place] = source.element.decode(&buffer[(k * source.width + column) * size..][..size]);
                 }
             }
-            if let Some(place) = values.iter().position(|x| !x.is_finite()) {
-                let selection = builder.selection();
-                let used = selection.values.get(place).or(selection.trajectory.as_ref());
-                let column = used.map(|used| used.name.clone()).unwrap_or_default();
-                return Err(Problem::Field { row, column, found: values[place].to_string() });
+            for (used, found) in builder.selection().used().zip(&values).filter(|(_, x)| !x.is_finite()) {
+                faults.add(Problem::Field { row, column: used.name.clone(), found: found.to_string() });
             }
-            let label = values.get(count).map(ToString::to_string);
+            // Beside a mistake the others are looked for, and nothing is kept.
+            if !faults.is_empty() {
+                continue;
+            }
+            let label = values.get(count).map(ToString::to_string).or_else(|| builder.selection().number.clone());
             builder.push(row, &values[..count], label.as_deref())?;
         }
         done += now;
     }
+    faults.end()?;
     for source in sources {
         source.end()?;
     }

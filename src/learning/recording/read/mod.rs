@@ -1,31 +1,44 @@
-//! Recorded motion from files: CSV, NPY, NPZ.
+//! Recorded motion from files: CSV, packed or not, Excel workbooks, NPY, NPZ.
 
+mod archive;
 mod builder;
 mod csv;
 mod element;
+mod encoding;
 mod error;
+mod facts;
 mod fill;
+mod foreign;
+mod gzip;
 mod npy;
 mod npz;
+mod number;
 mod pieces;
 mod select;
 mod shared;
 mod table;
 mod text;
+mod wide;
+mod workbook;
+mod xml;
 
+pub use encoding::Encoding;
 pub use error::{DataError, Problem};
+pub use facts::{FileFacts, FileKind};
 pub(crate) use pieces::LEAST;
 pub(crate) use table::RawTable;
+pub use text::Separator;
 #[cfg(feature = "cli")]
-pub(crate) use text::{Separator, comment, line_end, names_in, split};
+pub(crate) use text::{comment, line_end, names_in, split};
 
 use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, Recording};
 use crate::storage::open_regular;
 use builder::Builder;
 use shared::Shared;
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 /// Largest file in bytes.
@@ -33,15 +46,19 @@ const MAX_BYTES: u64 = 1 << 36;
 
 /// Reads recorded trajectories.
 ///
-/// Every file holds one trajectory, or several distinguished by a column; long gaps in time cut them further. The format is recognised
-/// by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order),
-/// anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks, with or without a header and with
-/// comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Numbers are converted to SI; angles are
+/// Every file holds one trajectory, or several distinguished by a column or side by side; long gaps in time cut them further. The
+/// format is recognised by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and
+/// byte order), the first sheet of an Excel workbook (`.xlsx`), anything else is text of numbers, separated by commas, semicolons,
+/// tabs, bars or blanks, with or without a header and with comments behind a `#`; lines end with LF, CR LF, or CR in all of the file.
+/// Text may be packed by gzip, and be in UTF-8, UTF-16 or Windows-1252; its decimals have a point or a comma. What was recognised is
+/// kept in [`LoadedRecording::formats`].
+///
+/// Numbers are converted to SI, by the units of the description or else by those in brackets behind the names of a header; angles are
 /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps
 /// trajectories whole across all gaps.
 ///
 /// # Errors
-/// [`DataError`], naming the file and, where there is one, row and column.
+/// [`DataError`], naming the file and, where there is one, row and column; several mistakes in the rows of a file at once.
 pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<LoadedRecording, DataError> {
     columns.validate()?;
     if paths.is_empty() {
@@ -55,39 +72,84 @@ pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<
         let added = if again { Err(Problem::Again) } else { add_file(path, columns, &mut reading) };
         added.map_err(|problem| DataError::File { file: path.display().to_string(), problem })?;
     }
+    // Names of headers are known only now.
+    reading.columns.validate()?;
+    reading.recording.coordinates.clone_from(&reading.columns.coords);
     Ok(reading)
 }
 
 /// Adds the trajectories of one file.
 fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Result<(), Problem> {
     let (file, size) = open_regular(path, MAX_BYTES)?;
-    let builder = parse(file, size, columns)?;
-    reading.time = builder.selection().time().map(ToString::to_string);
-    reading.duplicates += builder.duplicates;
-    if builder.tracks.is_empty() {
-        return Err(Problem::NoRows);
-    }
+    let (facts, builders) = parse(file, size, columns)?;
     let name = path.display().to_string();
-    let mut most = 0;
-    for track in builder.tracks {
-        most = most.max(pieces::add(&name, track, columns.whole, reading));
+    let mut most = None;
+    let mut units = BTreeMap::new();
+    for builder in builders {
+        let selection = builder.selection();
+        reading.time = selection.time().map(ToString::to_string);
+        reading.duplicates += builder.duplicates;
+        for used in selection.used() {
+            let name = selection.number.as_ref().and_then(|number| used.name.strip_suffix(number.as_str()));
+            units.extend(used.unit.clone().map(|unit| (name.unwrap_or(&used.name).to_string(), unit)));
+        }
+        if reading.formats.is_empty() {
+            reading.columns = builder.called();
+        }
+        for track in builder.tracks {
+            most = most.max(Some(pieces::add(&name, track, columns.whole, reading)));
+        }
     }
+    reading.formats.push(FileFacts { file: name, units, ..facts });
+    let most = most.ok_or(Problem::NoRows)?;
     if most < LEAST && !columns.whole { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
 }
 
 /// Tells the format and reads the rows.
-fn parse(mut file: File, size: u64, columns: &Columns) -> Result<Builder<'_>, Problem> {
+fn parse(mut file: File, size: u64, columns: &Columns) -> Result<(FileFacts, Vec<Builder<'_>>), Problem> {
     let mut start = Vec::new();
-    (&mut file).take(npy::MAGIC.len() as u64).read_to_end(&mut start)?;
+    (&mut file).take(foreign::LOOKED_AT).read_to_end(&mut start)?;
     file.rewind()?;
+    let of = |kind| FileFacts { kind, ..FileFacts::default() };
     if start.starts_with(npy::MAGIC) {
-        npy::read(Shared::new(file, size), size, columns)
-    } else if npz::MAGIC.iter().any(|magic| start.starts_with(magic)) {
-        npz::read(Shared::new(file, size), columns)
-    } else {
-        csv::read(BufReader::with_capacity(1 << 20, file.take(size)), columns)
+        return Ok((of(FileKind::Npy), npy::read(Shared::new(file, size), size, columns)?));
     }
+    if archive::MAGIC.iter().any(|magic| start.starts_with(magic)) {
+        let archive = archive::open(Shared::new(file, size))?;
+        let names = archive::names(&archive)?;
+        if names.iter().any(|name| name == workbook::MARK) {
+            let table = workbook::text(archive)?;
+            return Ok((of(FileKind::Xlsx), csv::read(table.as_bytes(), columns, Some(Separator::Tab))?.1));
+        }
+        return match foreign::archive(names.iter().map(String::as_str)) {
+            Some(problem) => Err(problem),
+            None => Ok((of(FileKind::Npz), npz::read(archive, columns)?)),
+        };
+    }
+    let gzip = start.starts_with(gzip::MAGIC);
+    let packed = BufReader::with_capacity(1 << 20, file.take(size));
+    let mut input: Box<dyn BufRead> = Box::new(packed);
+    if gzip {
+        let mut unpacked = BufReader::with_capacity(1 << 20, gzip::Gzip::new(input, size));
+        start = unpacked.fill_buf()?.iter().take(foreign::LOOKED_AT as usize).copied().collect();
+        input = Box::new(unpacked);
+        let packed = [npy::MAGIC, gzip::MAGIC].into_iter().chain(archive::MAGIC);
+        if packed.into_iter().any(|magic| start.starts_with(magic)) {
+            return Err(Problem::Foreign { name: "an archive or array packed by gzip", cure: "unpack it first" });
+        }
+    }
+    foreign::refuse(&start)?;
+    let wide = encoding::is_utf16(&start);
+    if wide {
+        input = Box::new(BufReader::with_capacity(1 << 20, encoding::Utf16::new(input)));
+    }
+    let (text, builders) = csv::read(input, columns, None)?;
+    let encoding = Some(if wide { Encoding::Utf16 } else { text.encoding });
+    let (separator, decimal_comma) = (Some(text.separator), text.numbers.have_commas());
+    Ok((FileFacts { gzip, encoding, separator, decimal_comma, ..FileFacts::default() }, builders))
 }
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod variety_tests;

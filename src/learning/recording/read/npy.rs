@@ -112,7 +112,7 @@ impl Header {
 }
 
 /// Reads a table of numbers in a file of its own.
-pub fn read(file: Shared, available: u64, columns: &Columns) -> Result<Builder<'_>, Problem> {
+pub fn read(file: Shared, available: u64, columns: &Columns) -> Result<Vec<Builder<'_>>, Problem> {
     let header = Header::read(&mut BufReader::new(file.clone()), available)?;
     table(&header, columns, |offset| Ok(Box::new(BufReader::with_capacity(1 << 16, file.at(offset)))))
 }
@@ -123,7 +123,7 @@ pub fn table<'a, 'f>(
     header: &Header,
     columns: &'a Columns,
     mut open: impl FnMut(u64) -> Result<Box<dyn Read + 'f>, Problem>,
-) -> Result<Builder<'a>, Problem> {
+) -> Result<Vec<Builder<'a>>, Problem> {
     let &Header { rows, columns: width, element, fortran, start, .. } = header;
     let names = columns.names.as_deref();
     if let Some(names) = names
@@ -131,18 +131,20 @@ pub fn table<'a, 'f>(
     {
         return Err(Problem::Width { row: 1, expected: names.len(), found: width });
     }
-    let selection = Selection::new(columns, names, width, 1)?;
-    let wanted: Vec<(usize, usize)> =
-        selection.used().enumerate().map(|(place, used)| (used.position, place)).collect();
     let source = |input, width, wanted| Source { input, element, width, wanted, whole: !fortran, name: String::new() };
-    let mut sources = Vec::new();
-    if fortran {
-        for (column, place) in wanted {
-            let before = (rows * column * element.size()) as u64;
-            sources.push(source(open(start + before)?, 1, vec![(0, place)]));
+    let mut one = |selection: Selection| {
+        let wanted: Vec<(usize, usize)> =
+            selection.used().enumerate().map(|(place, used)| (used.position, place)).collect();
+        let mut sources = Vec::new();
+        if fortran {
+            for (column, place) in wanted {
+                let before = (rows * column * element.size()) as u64;
+                sources.push(source(open(start + before)?, 1, vec![(0, place)]));
+            }
+        } else {
+            sources.push(source(open(start)?, width, wanted));
         }
-    } else {
-        sources.push(source(open(start)?, width, wanted));
-    }
-    fill(Builder::new(columns, selection), rows, &mut sources)
+        fill(Builder::new(columns, selection), rows, &mut sources)
+    };
+    Selection::all(columns, names, width, 1)?.into_iter().map(&mut one).collect()
 }

@@ -1,6 +1,7 @@
 //! Archives of arrays of NumPy's format NPZ.
 
 use super::Problem;
+use super::archive::{self, bounded, broken};
 use super::builder::Builder;
 use super::fill::{Source, fill};
 use super::npy::{self, Header};
@@ -9,31 +10,15 @@ use super::shared::Shared;
 use crate::recording::Columns;
 use std::io::{BufReader, Read};
 use zip::ZipArchive;
-use zip::result::ZipError;
 
-/// First bytes of such a file, and of one without a single array.
-pub const MAGIC: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
 /// Most arrays of an archive.
 const MOST: usize = 10_000;
-/// Most bytes that the used arrays may have for every byte that they take in the file, and bytes that they may have however
-/// few they take. Measured numbers shrink to a tenth at most; what shrinks to a hundredth holds hardly a number.
-const EXPANSION: u64 = 100;
-const ANYWAY: u64 = 1 << 26;
-
-fn broken(error: ZipError) -> Problem {
-    match error {
-        ZipError::Io(error) => Problem::Io(error),
-        ZipError::UnsupportedArchive(what) => Problem::Array(format!("an unsupported archive: {what}")),
-        _ => Problem::Array("an incomplete or damaged archive of arrays".to_string()),
-    }
-}
 
 /// Reads vectors of equal length, each a column by its name, or a single table.
 ///
 /// Shapes and sizes are compared with each other and with the file before a number is unpacked, and the columns are
 /// unpacked together, row by row: nothing is held but the trajectories.
-pub fn read(file: Shared, columns: &Columns) -> Result<Builder<'_>, Problem> {
-    let mut archive = ZipArchive::new(file).map_err(broken)?;
+pub fn read(mut archive: ZipArchive<Shared>, columns: &Columns) -> Result<Vec<Builder<'_>>, Problem> {
     if archive.is_empty() {
         return Err(Problem::Array("the archive holds no arrays".to_string()));
     }
@@ -47,14 +32,23 @@ pub fn read(file: Shared, columns: &Columns) -> Result<Builder<'_>, Problem> {
             return table(&archive, &header, columns);
         }
     }
-    let names: Vec<String> = archive
-        .file_names()
-        .map(|name| name.map(|name| name.strip_suffix(".npy").unwrap_or(&name).to_string()).map_err(broken))
-        .collect::<Result<_, _>>()?;
-    let selection = Selection::new(columns, Some(&names), names.len(), 1)?;
+    let mut names = archive::names(&archive)?;
+    for name in &mut names {
+        name.truncate(name.strip_suffix(".npy").unwrap_or(name).len());
+    }
+    let selections = Selection::all(columns, Some(&names), names.len(), 1)?;
+    selections.into_iter().map(|selection| vectors(&mut archive, columns, selection)).collect()
+}
+
+/// Vectors of equal length.
+fn vectors<'a>(
+    archive: &mut ZipArchive<Shared>,
+    columns: &'a Columns,
+    selection: Selection,
+) -> Result<Builder<'a>, Problem> {
     let used: Vec<Used> = selection.used().cloned().collect();
-    bounded(&mut archive, used.iter().map(|used| used.position))?;
-    let mut archives = vec![archive; used.len()];
+    bounded(archive, used.iter().map(|used| used.position))?;
+    let mut archives = vec![archive.clone(); used.len()];
     let (mut sources, mut rows) = (Vec::with_capacity(used.len()), 0);
     for (place, (archive, Used { name, position, .. })) in archives.iter_mut().zip(&used).enumerate() {
         let in_array = |problem: Problem| match problem {
@@ -78,8 +72,9 @@ pub fn read(file: Shared, columns: &Columns) -> Result<Builder<'_>, Problem> {
 }
 
 /// A single table: one reader for its rows, or one for each of its used columns if those follow each other.
-fn table<'a>(archive: &ZipArchive<Shared>, header: &Header, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
-    let readers = if header.fortran { header.columns } else { 1 };
+fn table<'a>(archive: &ZipArchive<Shared>, header: &Header, columns: &'a Columns) -> Result<Vec<Builder<'a>>, Problem> {
+    // Trajectories side by side share a column of time.
+    let readers = if header.fortran || columns.wide { 2 * header.columns } else { 1 };
     let mut archives = vec![archive.clone(); readers];
     let mut free = archives.iter_mut();
     npy::table(header, columns, |offset| {
@@ -97,21 +92,4 @@ fn open(archive: &mut ZipArchive<Shared>, index: usize) -> Result<(Header, Box<d
     let mut input = BufReader::with_capacity(1 << 16, entry);
     let header = Header::read(&mut input, size)?;
     Ok((header, Box::new(input)))
-}
-
-/// Refuses arrays that are far larger than their part of the file.
-fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = usize>) -> Result<(), Problem> {
-    let (mut size, mut compressed) = (0u64, 0u64);
-    for index in used {
-        let entry = archive.by_index_raw(index).map_err(broken)?;
-        size = size.saturating_add(entry.size());
-        compressed = compressed.saturating_add(entry.compressed_size());
-    }
-    if size > ANYWAY.max(compressed.saturating_mul(EXPANSION)) {
-        return Err(Problem::Array(format!(
-            "the archive promises {size} bytes of numbers from {compressed}, more than {EXPANSION} times as many: save it \
-             without compression"
-        )));
-    }
-    Ok(())
 }

@@ -1,6 +1,5 @@
 //! All columns of a file, before anybody says what they are.
 
-use super::builder::Builder;
 use super::{MAX_BYTES, Problem, parse};
 use crate::recording::{Columns, DataError};
 use crate::storage::open_regular;
@@ -14,8 +13,9 @@ const MOST: usize = 256;
 pub struct RawTable {
     /// Names; numbers from 1 where the file has none, or has one twice.
     pub names: Vec<String>,
-    /// Numbers of each column as they stand in the file, `(rows)`; none of a column that does not hold a number in every row.
-    pub numbers: Vec<Option<Vec<f64>>>,
+    /// Numbers of each column in SI as far as the header states units, `(rows)`; the problem of a column that does not hold a number in
+    /// every row.
+    pub numbers: Vec<Result<Vec<f64>, String>>,
 }
 
 impl RawTable {
@@ -44,14 +44,11 @@ impl RawTable {
         let twice = names.iter().enumerate().any(|(k, name)| names[..k].contains(name));
         let names = if twice { (1..=names.len()).map(|k| k.to_string()).collect() } else { names };
         let numbers = match rows(path, &asked(&names)) {
-            Ok(rows) => columns(&rows, names.len()).into_iter().map(Some).collect(),
+            Ok(rows) => columns(&rows, names.len()).into_iter().map(Ok).collect(),
             Err(problem) if names.len() > MOST => return Err(problem),
             Err(_) => names
                 .iter()
-                .map(|name| {
-                    let rows = rows(path, &asked(std::slice::from_ref(name))).ok()?;
-                    columns(&rows, 1).pop()
-                })
+                .map(|name| rows(path, &asked(std::slice::from_ref(name))).map_err(|problem| problem.to_string()))
                 .collect(),
         };
         Ok(Self { names, numbers })
@@ -61,8 +58,8 @@ impl RawTable {
 /// The rows of a file, `(rows, columns)`.
 fn rows(path: &Path, columns: &Columns) -> Result<Vec<f64>, Problem> {
     let (file, size) = open_regular(path, MAX_BYTES)?;
-    let Builder { tracks, .. } = parse(file, size, columns)?;
-    Ok(tracks.into_iter().flat_map(|track| track.track.q).collect())
+    let tracks = parse(file, size, columns)?.1.into_iter().flat_map(|builder| builder.tracks);
+    Ok(tracks.flat_map(|track| track.track.q).collect())
 }
 
 /// Rows as columns.

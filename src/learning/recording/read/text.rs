@@ -1,11 +1,18 @@
 //! Lines of text cut into fields.
 
+use serde::Serialize;
+
 /// Separator of the fields of a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Separator {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Separator {
+    /// `,`.
     Comma,
+    /// `;`.
     Semicolon,
+    /// A tab.
     Tab,
+    /// `|`.
     Bar,
     /// Any number of spaces and tabs.
     Blanks,
@@ -13,14 +20,19 @@ pub(crate) enum Separator {
 
 impl Separator {
     /// The separator of a line: the first of `;`, `,`, tab and `|` that stands outside of double quotes, or blanks
-    /// between words. A semicolon comes before a comma, which may then be a decimal one.
+    /// between words. A comma is none if other separators stand between what commas separate, or if blanks stand between numbers
+    /// with decimal commas.
     pub(crate) fn of(line: &str) -> Self {
         let outside: String =
             line.split('"').enumerate().map(|(k, part)| if k % 2 == 0 { part } else { "q" }).collect();
-        let known = [(';', Self::Semicolon), (',', Self::Comma), ('\t', Self::Tab), ('|', Self::Bar)];
-        match known.iter().find(|(c, _)| outside.trim().contains(*c)) {
+        let (line, known) = (outside.trim(), [(';', Self::Semicolon), ('\t', Self::Tab), ('|', Self::Bar)]);
+        let inside = |c: char| line.split(',').any(|part| part.trim().contains(c));
+        let decimal = |word: &str| is_decimal_comma(word) || word.parse::<f64>().is_ok();
+        let words = || line.split_whitespace();
+        match known.iter().find(|(c, _)| inside(*c)) {
             Some((_, found)) => *found,
-            None if outside.split_whitespace().nth(1).is_some() => Self::Blanks,
+            None if line.contains(',') && !(words().nth(1).is_some() && words().all(decimal)) => Self::Comma,
+            None if words().nth(1).is_some() => Self::Blanks,
             None => Self::Comma,
         }
     }
@@ -50,6 +62,27 @@ impl Separator {
     pub(crate) fn fields(self, line: &[u8]) -> Fields<'_> {
         Fields { rest: Some(if self == Self::Blanks { line.trim_ascii() } else { line }), separator: self }
     }
+}
+
+/// `0,5`: a number with a comma between two digits.
+fn is_decimal_comma(word: &str) -> bool {
+    let digit = |letter: Option<char>| letter.is_some_and(|letter| letter.is_ascii_digit());
+    let parts = word.split_once(',');
+    parts.is_some_and(|(whole, part)| digit(whole.chars().last()) && digit(part.chars().next()))
+        && with_point(word).is_some()
+}
+
+/// The number of a text with a decimal comma and no point.
+pub(crate) fn with_point(text: &str) -> Option<f64> {
+    let mut plain = [0; 64];
+    let plain = plain.get_mut(..text.len())?;
+    plain.copy_from_slice(text.as_bytes());
+    let mut marks = plain.iter_mut().filter(|byte| matches!(**byte, b',' | b'.'));
+    match (marks.next(), marks.next()) {
+        (Some(mark), None) if *mark == b',' => *mark = b'.',
+        _ => return None,
+    }
+    std::str::from_utf8(plain).ok()?.parse().ok()
 }
 
 /// The byte that ends the lines of a text that begins so: LF (with a CR before it or not), or CR alone where there is no LF.
@@ -127,6 +160,13 @@ mod tests {
             ("1   2 3", Separator::Blanks),
             ("\"a;b\" c d", Separator::Blanks),
             ("alone", Separator::Comma),
+            ("0,1\t0,2", Separator::Tab),
+            ("t [s]\tcart, x", Separator::Tab),
+            ("t,\tx,\ty", Separator::Comma),
+            ("0,1|0,2", Separator::Bar),
+            ("0,1 0 -0,2e-3", Separator::Blanks),
+            ("1, 2, 3", Separator::Comma),
+            ("0,1", Separator::Comma),
         ] {
             assert_eq!(Separator::of(line), expected, "{line}");
         }

@@ -12,6 +12,7 @@ pub(crate) use motionless::stillness;
 pub(crate) use suspicious::{Kind, Warning, find as find_suspicious};
 
 use crate::recording::clock::Clock;
+use crate::recording::read::FileFacts;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use crate::recording::{Bridged, Cut, Dropped, HeldOut, LoadedRecording, Recording, Targets};
 use serde::Serialize;
@@ -65,6 +66,8 @@ pub(crate) struct TrajectorySurvey {
 pub struct Survey {
     /// Files read.
     pub files: usize,
+    /// What was recognised in every file.
+    pub formats: Vec<FileFacts>,
     /// Column of time; none if times follow from the rate.
     pub time: Option<String>,
     /// Samples of all trajectories.
@@ -154,6 +157,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     let held_out = HeldOut::choose(recording, &reading.takes, share, apart, seed).ok();
     let mut survey = Survey {
         files: reading.files,
+        formats: reading.formats.clone(),
         time: reading.time.clone(),
         samples: recording.samples(),
         step: alone.step,

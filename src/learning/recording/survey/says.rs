@@ -4,6 +4,7 @@ use super::suspicious::{Kind, Warning};
 use super::{CoordinateSurvey, FEW_SAMPLES, Survey, TrajectorySurvey};
 use crate::findings::Findings;
 use crate::names::{percent, percentage, pluralize, rounded};
+use crate::recording::read::{Encoding, FileFacts, FileKind, Separator};
 use crate::recording::{LARGE_ERROR, Targets};
 
 /// Largest jitter that counts as rounding of the times.
@@ -116,6 +117,7 @@ impl Survey {
             pluralize(self.samples, "sample", "samples"),
         ];
         findings.line(format!("{files}, {tracks}, {samples}, {} s; {times}", short(seconds)));
+        findings.lines(self.formats.iter().filter_map(FileFacts::sentence).take(ROWS));
         let headers = ["trajectory", "rows", "samples", "from [s]", "to [s]", "rate [Hz]", "jitter of a step [%]"];
         findings.gap().table(&headers, self.tracks.iter().take(ROWS).map(TrajectorySurvey::row));
         findings.lines(more(self.tracks.len(), ("trajectory", "trajectories")));
@@ -144,6 +146,26 @@ impl Survey {
             format!("left out: {samples} between gaps, rows {}-{} of {}", part.first, part.last, part.file)
         }));
         findings.lines(more(self.dropped.len(), ("stretch between gaps", "stretches between gaps")));
+    }
+}
+
+impl FileFacts {
+    /// What was recognised in a file, beyond a text in UTF-8 that is separated by commas.
+    fn sentence(&self) -> Option<String> {
+        let mut facts: Vec<String> = Vec::new();
+        facts.extend((self.kind == FileKind::Xlsx).then(|| "the first sheet of a workbook".to_string()));
+        facts.extend(self.gzip.then(|| "packed by gzip".to_string()));
+        facts.extend(match self.encoding {
+            Some(Encoding::Utf16) => Some("text in UTF-16".to_string()),
+            Some(Encoding::Windows1252) => Some("text in Windows-1252".to_string()),
+            Some(Encoding::Utf8) | None => None,
+        });
+        let separated = self.separator.map(Separator::named).filter(|text| !text.is_empty());
+        facts.extend(separated.map(|text| format!("fields{text}")));
+        facts.extend(self.decimal_comma.then(|| "decimal commas".to_string()));
+        let units: Vec<String> = self.units.iter().map(|(name, unit)| format!("{name} in {unit}")).collect();
+        facts.extend((!units.is_empty()).then(|| format!("units by its header: {}", units.join(", "))));
+        (!facts.is_empty()).then(|| format!("{}: {}", self.file, facts.join("; ")))
     }
 }
 

@@ -1,0 +1,54 @@
+//! ZIP archives, and how much packed bytes may become.
+
+use super::Problem;
+use super::shared::Shared;
+use zip::ZipArchive;
+use zip::result::ZipError;
+
+/// First bytes of an archive, and of one without a single entry.
+pub const MAGIC: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
+/// Most bytes that the used arrays may have for every byte that they take in the file, and bytes that they may have however
+/// few they take. Measured numbers shrink to a tenth at most; what shrinks to a hundredth holds hardly a number.
+const EXPANSION: u64 = 100;
+const ANYWAY: u64 = 1 << 26;
+
+/// Most bytes that so many packed ones may become.
+pub fn most_unpacked(packed: u64) -> u64 {
+    ANYWAY.max(packed.saturating_mul(EXPANSION))
+}
+
+/// An archive that cannot be read.
+pub fn broken(error: ZipError) -> Problem {
+    match error {
+        ZipError::Io(error) => Problem::Io(error),
+        ZipError::UnsupportedArchive(what) => Problem::Array(format!("an unsupported archive: {what}")),
+        _ => Problem::Array("an incomplete or damaged archive".to_string()),
+    }
+}
+
+/// Opens an archive.
+pub fn open(file: Shared) -> Result<ZipArchive<Shared>, Problem> {
+    ZipArchive::new(file).map_err(broken)
+}
+
+/// Names of the entries.
+pub fn names(archive: &ZipArchive<Shared>) -> Result<Vec<String>, Problem> {
+    archive.file_names().map(|name| name.map(|name| name.to_string()).map_err(broken)).collect()
+}
+
+/// Refuses entries that are far larger than their part of the file.
+pub fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = usize>) -> Result<(), Problem> {
+    let (mut size, mut compressed) = (0u64, 0u64);
+    for index in used {
+        let entry = archive.by_index_raw(index).map_err(broken)?;
+        size = size.saturating_add(entry.size());
+        compressed = compressed.saturating_add(entry.compressed_size());
+    }
+    if size > most_unpacked(compressed) {
+        return Err(Problem::Array(format!(
+            "the archive promises {size} bytes from {compressed}, more than {EXPANSION} times as many: save it \
+             without compression"
+        )));
+    }
+    Ok(())
+}

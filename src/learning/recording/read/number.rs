@@ -1,0 +1,61 @@
+//! Numbers of a text, whose decimals have a point or a comma, in all of a file the same.
+
+use super::Problem;
+use super::encoding::decode;
+use super::text::{unquoted, with_point};
+
+/// Mark of the decimals of a file as far as it is known.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Numbers {
+    /// Row of the first decimal point.
+    point: Option<u64>,
+    /// Row of the first decimal comma.
+    comma: Option<u64>,
+}
+
+impl Numbers {
+    /// `true` if decimals have a comma.
+    pub fn have_commas(&self) -> bool {
+        self.comma.is_some()
+    }
+
+    /// A finite number with the mark of the file, fast if nothing stands around it; the first mark decides.
+    pub fn parse(&mut self, field: &[u8], row: u64) -> Option<f64> {
+        let text = std::str::from_utf8(field).ok()?;
+        let number = match self.comma {
+            None => text.parse().or_else(|_| unquoted(text).parse()).ok(),
+            Some(_) => None,
+        };
+        match number {
+            Some(_) if self.point.is_none() && field.contains(&b'.') => self.point = Some(row),
+            None if self.point.is_none() => return self.parse_comma(unquoted(text), row),
+            _ => {}
+        }
+        number.filter(|x: &f64| x.is_finite())
+    }
+
+    /// A number without a decimal point.
+    fn parse_comma(&mut self, text: &str, row: u64) -> Option<f64> {
+        let number = with_point(text);
+        if number.is_some() {
+            self.comma.get_or_insert(row);
+        }
+        number.or_else(|| if text.contains('.') { None } else { text.parse().ok() }).filter(|x| x.is_finite())
+    }
+
+    /// Why a field is no number.
+    pub fn refusal(&self, field: &[u8], row: u64, column: &str) -> Problem {
+        let Some((text, _)) = decode(field) else { return Problem::NotText(row) };
+        let (text, column) = (unquoted(&text), column.to_string());
+        let found = text.chars().take(40).collect();
+        match (self.point, self.comma) {
+            (Some(since), _) if with_point(text).is_some() => {
+                Problem::Decimal { row, column, found, comma: false, since }
+            }
+            (_, Some(since)) if text.parse::<f64>().is_ok_and(f64::is_finite) => {
+                Problem::Decimal { row, column, found, comma: true, since }
+            }
+            _ => Problem::Field { row, column, found },
+        }
+    }
+}

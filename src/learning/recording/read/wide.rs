@@ -1,0 +1,59 @@
+//! Trajectories side by side in the rows of a text.
+
+use super::Problem;
+use super::builder::Builder;
+use super::error::Faults;
+use super::number::Numbers;
+
+/// One of the trajectories, or all if they are not side by side.
+pub struct Lane<'a> {
+    /// What it has become.
+    pub builder: Builder<'a>,
+    /// Used numbers of the row that is read.
+    pub values: Vec<f64>,
+    /// First row behind its beginning in which it has no numbers.
+    empty: Option<u64>,
+}
+
+impl<'a> Lane<'a> {
+    /// No rows yet.
+    pub fn new(builder: Builder<'a>) -> Self {
+        let values = vec![0.0; builder.selection().values.len()];
+        Self { builder, values, empty: None }
+    }
+
+    /// Reads its numbers among the fields of a row; a row in which all its fields but the time are empty is none of its own.
+    pub fn take(
+        &mut self,
+        fields: &[&[u8]],
+        row: u64,
+        numbers: &mut Numbers,
+        faults: &mut Faults,
+    ) -> Result<(), Problem> {
+        let selection = self.builder.selection();
+        let own = &selection.values[usize::from(selection.timed)..];
+        if own.iter().all(|used| matches!(fields[used.position].trim_ascii(), b"" | b"\"\"")) {
+            if !self.builder.tracks.is_empty() {
+                self.empty.get_or_insert(row);
+            }
+            return Ok(());
+        }
+        if let (Some(row), false) = (self.empty, selection.timed) {
+            // Without times nothing says how long such a gap is.
+            let column = own.first().map(|used| used.name.clone()).unwrap_or_default();
+            return Err(Problem::Field { row, column, found: String::new() });
+        }
+        for (value, used) in self.values.iter_mut().zip(&selection.values) {
+            let field = fields[used.position];
+            match numbers.parse(field, row) {
+                Some(x) => *value = x,
+                None => faults.add(numbers.refusal(field, row, &used.name)),
+            }
+        }
+        if !faults.is_empty() {
+            return Ok(());
+        }
+        let number = selection.number.clone();
+        self.builder.push(row, &self.values, number.as_deref())
+    }
+}
