@@ -293,7 +293,7 @@ fn a_wormhole_shows_its_other_side() {
         let camera = Camera { field_of_view: 2.0, ..small(model.distance(radius), inclination) };
         let [far, second] = [far, -far].map(|l| model.distance(l));
         let tracing = Tracing { far, second, tolerance: 1e-7, ..Tracing::of(&camera) };
-        let found = outline(&model, &camera, &tracing, 12).unwrap().unwrap();
+        let found = outline(&model, &camera, &tracing, 4).unwrap().unwrap();
         let exact = (throat / throat.hypot(radius)).asin();
         for edge in &found.edges {
             assert!((edge.angle - exact).abs() < 1e-6, "{radius}: {} for {exact}", edge.angle);
