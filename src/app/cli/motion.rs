@@ -335,7 +335,8 @@ impl Facts<'_> {
             ),
             _ => String::new(),
         };
-        let kept = self.conserved.as_ref().map_or(String::new(), Kept::text);
+        // The charges begin with it.
+        let kept = self.conserved.as_ref().filter(|_| self.charges.is_none()).map_or(String::new(), Kept::text);
         let charges = self.charges.map_or(String::new(), Charges::text);
         format!(
             "{} to {} = {}{unit}, {}, {}{iterations}, in {}\n{balance}{kept}{charges}",

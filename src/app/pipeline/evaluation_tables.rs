@@ -9,7 +9,7 @@ use crate::network::file::Header;
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::report_files::{parameter_table, write_page, write_report_and_figures};
 use crate::pipeline::{Output, PipelineError, headline};
-use crate::report::{Figure, Report};
+use crate::report::{Figure, Report, with_unit};
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -97,10 +97,10 @@ impl Evaluation {
         let matrix = [m.mean, m.median, m.p99, m.max].map(percentage);
         let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
-        let until = format!("until [{}]", self.time_unit);
-        let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
+        let until = with_unit("until", &self.time_unit);
+        let lyapunov = with_unit("Lyapunov time", &self.time_unit);
         let conserved = self.conserved.map(|_| "conserved, max [%]");
-        let valid = format!("valid [{}]", self.time_unit);
+        let valid = with_unit("valid", &self.time_unit);
         let errors: Vec<String> = self
             .units
             .iter()

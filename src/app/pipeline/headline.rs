@@ -43,6 +43,11 @@ impl Headline {
     }
 }
 
+/// A unit behind a number, also where there is none.
+fn spoken(unit: &str) -> &str {
+    if unit == "1" { "units" } else { unit }
+}
+
 /// Name and unit of `name [unit]`.
 pub(crate) fn named(text: &str) -> (&str, &str) {
     text.split_once(" [").map_or((text, ""), |(name, unit)| (name, unit.trim_end_matches(']')))
@@ -80,7 +85,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
         None if mass.is_finite() => format!("it gives the mass matrix to {} up to {free}", percent(mass)),
         None => "its mass matrix cannot be compared".to_string(),
     };
-    let predicts = found.valid_time.as_ref().map(|valid| predicted(valid, found.tested, &found.time_unit));
+    let predicts = found.valid_time.as_ref().map(|valid| predicted(valid, found.tested, spoken(&found.time_unit)));
     let wrong = match found.wrong_signature {
         share if share > MOST_WRONG => {
             format!(" At {} of the states its mass matrix has the wrong signature.", percent(share))
@@ -94,7 +99,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mut rows: Vec<[String; 2]> = Vec::new();
     let mut add = |what: &str, value: String| rows.push([what.to_string(), value]);
     if let Some(valid) = &found.valid_time {
-        add(&valid_name(valid, ["start", "starts"]), valid_time(valid, &found.time_unit));
+        add(&valid_name(valid, ["start", "starts"]), valid_time(valid, spoken(&found.time_unit)));
     }
     let errors = found.coordinates.iter().zip(&found.accelerations).map(|(coordinate, error)| {
         let (name, unit) = named(coordinate);

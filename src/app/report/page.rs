@@ -89,7 +89,7 @@ pub fn page(
         "units": units,
         "periodic": architecture.periodic,
         "time_like": time_like,
-        "time_unit": time_unit,
+        "time_unit": if time_unit == "1" { "" } else { time_unit },
         "span": t_end.min(SECONDS * rate),
         "rate": rate,
         "start": { "q": start.0, "v": start.1 },

@@ -343,7 +343,9 @@ impl System {
     pub(crate) fn units(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.unit.to_string());
-        positions.chain(coordinates.iter().map(|c| format!("{}/{}", c.unit, self.time_unit))).collect()
+        let rate =
+            |unit: &str| if self.time_unit == "1" { unit.to_string() } else { format!("{unit}/{}", self.time_unit) };
+        positions.chain(coordinates.iter().map(|c| rate(&c.unit))).collect()
     }
 }
 

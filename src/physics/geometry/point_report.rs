@@ -173,7 +173,10 @@ impl<'a, S: Scalar> PointReport<'a, S> {
             match &quantity.value {
                 Value::Missing => {}
                 Value::Number(x) => row(String::new(), rounded(self.number(quantity, *x), DIGITS)),
-                Value::Signature(signs) => row(String::new(), "-".repeat(signs.negative) + &"+".repeat(signs.positive)),
+                Value::Signature(signs) => {
+                    let signs = [("-", signs.negative), ("0", signs.zero), ("+", signs.positive)];
+                    row(String::new(), signs.map(|(sign, count)| sign.repeat(count)).concat());
+                }
                 Value::Tensor(..) => {
                     let components = self.components(quantity);
                     if components.is_empty() {

@@ -178,7 +178,7 @@ function play(data) {
     drawCurves(sheet($("energy")), curves);
     if (picture) drawCurves(sheet($("first")), [[data.columns[n > 1 && data.time_like === 0 ? 1 : 0], (point) => point.y[n > 1 && data.time_like === 0 ? 1 : 0]]]);
     const ended = flights.map((flight, k) => (flight.ended ? `${kinds[k][0]}: ${flight.ended}.` : "")).join(" ");
-    $("time").textContent = `t = ${flights[0].t.toFixed(2)} ${data.time_unit} ${ended}`;
+    $("time").textContent = `${data.time_like === null ? "t" : "tau"} = ${flights[0].t.toFixed(2)} ${data.time_unit} ${ended}`;
     if (!running) read(reading || start.q, reading ? "under the cursor" : "at the start");
     sliders.forEach((slider) => slider.show());
     $("run").textContent = running ? "Pause" : "Play";
