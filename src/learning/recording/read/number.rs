@@ -20,18 +20,29 @@ impl Numbers {
     }
 
     /// A finite number with the mark of the file, fast if nothing stands around it; the first mark decides.
+    #[inline]
     pub fn parse(&mut self, field: &[u8], row: u64) -> Option<f64> {
         let text = std::str::from_utf8(field).ok()?;
-        let number = match self.comma {
-            None => text.parse().or_else(|_| unquoted(text).parse()).ok(),
-            Some(_) => None,
-        };
-        match number {
-            Some(_) if self.point.is_none() && field.contains(&b'.') => self.point = Some(row),
-            None if self.point.is_none() => return self.parse_comma(unquoted(text), row),
-            _ => {}
+        if self.point.is_some()
+            && let Ok(x) = text.parse::<f64>()
+            && x.is_finite()
+        {
+            return Some(x);
         }
-        number.filter(|x: &f64| x.is_finite())
+        self.parse_any(unquoted(text), row)
+    }
+
+    /// The same whatever is known.
+    fn parse_any(&mut self, text: &str, row: u64) -> Option<f64> {
+        if self.comma.is_none()
+            && let Ok(x) = text.parse::<f64>()
+        {
+            if text.contains('.') {
+                self.point.get_or_insert(row);
+            }
+            return Some(x).filter(|x| x.is_finite());
+        }
+        if self.point.is_none() { self.parse_comma(text, row) } else { None }
     }
 
     /// A number without a decimal point.
