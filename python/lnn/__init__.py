@@ -19,10 +19,12 @@ __version__ = "0.1.0"
 # Imported when it is asked for: `lnn.reader` needs none of it.
 _WHERE = {
     **dict.fromkeys(["Model", "System", "systems"], "_mechanics"),
-    **dict.fromkeys(["fit", "learn", "train"], "_learning"),
-    **dict.fromkeys(["find_constraints", "formula", "identify"], "_readings"),
+    **dict.fromkeys(["fit", "learn", "sweep", "train"], "_learning"),
+    **dict.fromkeys(["check", "find_constraints", "formula", "identify"], "_readings"),
+    **dict.fromkeys(["compare", "shadow"], "_views"),
+    **dict.fromkeys(["Checked", "Comparison", "Shadow", "Surface", "Swept", "View"], "_results"),
     **dict.fromkeys(["Bodies", "Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
-    **dict.fromkeys(["Identified", "IdentifiedConstant", "Learned", "Linearization", "Outlier", "OwnConstraints"], "_results"),
+    **dict.fromkeys(["Identified", "IdentifiedConstant", "InverseDynamics", "Learned", "Linearization", "Outlier", "OwnConstraints"], "_results"),
     **dict.fromkeys(["Residual", "SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
@@ -30,13 +32,14 @@ _WHERE = {
 __all__ = [name for name, where in _WHERE.items() if where != "_regressor" or find_spec("sklearn")]
 
 if TYPE_CHECKING:
-    from ._learning import fit, learn, train
+    from ._learning import fit, learn, sweep, train
     from ._mechanics import Model, System, systems
-    from ._readings import find_constraints, formula, identify
+    from ._readings import check, find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
-    from ._results import Bodies, Certificate, Combination, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
-    from ._results import Learned, Linearization, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory
-    from ._results import Undetermined
+    from ._results import Bodies, Certificate, Checked, Combination, Comparison, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant
+    from ._results import InverseDynamics, Learned, Linearization, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory
+    from ._results import Shadow, Surface, Swept, Undetermined, View
+    from ._views import compare, shadow
     from .reader import Terms
 
 

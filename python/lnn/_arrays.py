@@ -6,8 +6,8 @@ import json
 import math
 import operator
 import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, SupportsIndex, cast
 
 import numpy as np
 
@@ -17,16 +17,32 @@ if TYPE_CHECKING:
     class DLPack(Protocol):
         """An array of another library."""
 
-        def __dlpack__(self, **options: Any) -> Any: ...
+        def __dlpack__(self, *, stream: None = ...) -> object: ...
+
+    class Frame(Protocol):
+        """A DataFrame of pandas."""
+
+        @property
+        def columns(self) -> object: ...
+        @property
+        def loc(self) -> object: ...
 
     Numbers = ArrayLike | DLPack
+    Path = str | os.PathLike[str]
+    # Recorded motion, what there is beside it, and what columns of files mean.
+    Recorded = Numbers | Sequence[Numbers] | Frame | Path | Sequence[Path]
+    Beside = Numbers | Sequence[Numbers] | Sequence[str]
+    Meaning = Mapping[str, str | float | Sequence[str]]
+    Units = Mapping[str, str | float]
+    # Choices by their path in a configuration.
+    Choices = Mapping[str, object]
 
 DOUBLE = np.dtype(np.float64)
 # Largest whole number that configurations hold, seeds for one.
 MOST = 2**63 - 1
 
 
-def doubles(what: str, x: Any) -> np.ndarray:
+def doubles(what: str, x: object) -> np.ndarray:
     """Anything that is an array, or says by DLPack that it is, as doubles."""
     if type(x) is np.ndarray and x.dtype is DOUBLE:
         return x
@@ -38,7 +54,7 @@ def doubles(what: str, x: Any) -> np.ndarray:
         x = x.data
     if not isinstance(x, np.ndarray):
         if hasattr(x, "__dlpack__") and not hasattr(x, "__array__"):
-            x = np.from_dlpack(x)
+            x = np.from_dlpack(cast(Any, x))
         try:
             x = np.asarray(x)
         except ValueError as error:
@@ -74,7 +90,7 @@ def thread_count(given: int | None) -> int:
     return whole("threads", given, 1, 256)
 
 
-def whole(what: str, given: Any, least: int = 0, most: int = MOST) -> int:
+def whole(what: str, given: SupportsIndex, least: int = 0, most: int = MOST) -> int:
     """A whole number within bounds."""
     try:
         number = operator.index(given)
@@ -85,7 +101,7 @@ def whole(what: str, given: Any, least: int = 0, most: int = MOST) -> int:
     return number
 
 
-def real(what: str, given: Any, *, positive: bool = False) -> float:
+def real(what: str, given: SupportsFloat | str, *, positive: bool = False) -> float:
     """A finite number."""
     if isinstance(given, (str, bytes)):
         raise TypeError(f"{what}: expected a number, found {given!r}")
@@ -98,12 +114,12 @@ def real(what: str, given: Any, *, positive: bool = False) -> float:
     return number
 
 
-def doubles_list(what: str, given: Any, *, positive: bool = False) -> list[float]:
+def doubles_list(what: str, given: object, *, positive: bool = False) -> list[float]:
     """A list of finite numbers."""
     return [real(what, x, positive=positive) for x in doubles(what, given).ravel().tolist()]
 
 
-def names(what: str, given: Any) -> list[str]:
+def names(what: str, given: Sequence[str]) -> list[str]:
     """A list of names; a text alone is none."""
     if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
         raise TypeError(f"{what}: expected a list of names, found {given!r}")
@@ -116,12 +132,18 @@ def read_result(text: str) -> dict[str, Any]:
     return {**whole["result"], "_text": whole["text"], "_html": whole["html"]}
 
 
-def as_json(given: Mapping[str, Any]) -> str:
+def as_json(given: Choices) -> str:
     """Choices as JSON; one that JSON does not hold is named."""
     return json.dumps({str(key): _held(str(key), x) for key, x in given.items()})
 
 
-def _held(what: str, x: Any) -> Any:
+def as_text(what: str, given: object) -> str:
+    """A choice as it is written in tables."""
+    held = _held(what, given)
+    return held if isinstance(held, str) else json.dumps(held)
+
+
+def _held(what: str, x: object) -> object:
     """A value as JSON holds it."""
     if isinstance(x, np.ndarray):
         x = x.tolist()

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _lnn
-from ._arrays import as_json, doubles, names, states, thread_count, whole
+from ._arrays import as_json, as_text, doubles, names, states, thread_count, whole
 from ._mechanics import Model, System
 from ._progress import Progress, receiver
 from ._recorded import recorded
-from ._results import Constraints, Learned
+from ._results import Constraints, Learned, Swept
 
 if TYPE_CHECKING:
-    from ._arrays import Numbers
+    from ._arrays import Beside, Choices, Meaning, Numbers, Recorded, Units
 
 
 def _learned(found: _lnn._Learned) -> Learned:
@@ -47,7 +49,7 @@ def train(
     out: str | os.PathLike | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-    config: Mapping[str, Any] | None = None,
+    config: Choices | None = None,
 ) -> Learned:
     """Learns a system from sampled states, and judges the model on fresh ones; Ctrl-C ends it with the best model so far.
 
@@ -77,7 +79,7 @@ def train(
         Any other choice by its path in the configuration: ``{"optimizer.batch": 64, "phase.0.rate": 1e-3}``.
     """
     system = System(system) if isinstance(system, str) else system
-    changes: dict[str, Any] = {"seed": whole("seed", seed), **_known(known)}
+    changes: dict[str, object] = {"seed": whole("seed", seed), **_known(known)}
     if hidden is not None:
         changes["network.hidden"] = _widths(hidden)
     if precision is not None:
@@ -87,6 +89,57 @@ def train(
     complete = _lnn.configuration(system._subject, preset, structure, epochs, as_json(changes))
     plan = whole("starts", starts, 1), thread_count(threads)
     return _learned(_lnn.train(system._subject, complete, plan, _target(out, overwrite), receiver(progress)))
+
+
+def sweep(
+    system: System | str,
+    vary: Mapping[str, Sequence[object]],
+    *,
+    out: str | os.PathLike,
+    seeds: int = 1,
+    preset: str = "quick",
+    structure: str | None = None,
+    epochs: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = None,
+    config: Choices | None = None,
+) -> Swept:
+    """Trains a system with every combination of the values of some choices, and collects the runs in a table; finished runs are not run again.
+
+    Parameters
+    ----------
+    system : System or str
+        The system, or its name in the catalogue.
+    vary : dict of str to sequence
+        Choices by their paths in the configuration and the values that each takes: ``{"optimizer.batch": [32, 64]}``.
+    out : path
+        Directory of the runs, each in one of its own, with table and report; finished runs of other choices are refused unless `overwrite`
+        is set.
+    seeds : int
+        Seeds of every combination, from `seed` on.
+    threads : int, optional
+        Threads; as many runs are trained side by side.
+    preset, structure, epochs, progress, config
+        As of `train`.
+    """
+    system = System(system) if isinstance(system, str) else system
+    counts = [len(values) for values in vary.values()] + [whole("seeds", seeds, 1, 10_000)]
+    if not 1 <= math.prod(counts) <= 10_000:
+        raise ValueError(f"vary: expected 1 to 10000 runs, found {math.prod(counts)}")
+    epochs = None if epochs is None else whole("epochs", epochs, 1)
+    runs = []
+    for values in itertools.product(*vary.values()):
+        choice = dict(zip(vary, values))
+        changes = as_json({"seed": whole("seed", seed), **(config or {}), **choice})
+        complete = _lnn.configuration(system._subject, preset, structure, epochs, changes)
+        runs.append(([(str(key), as_text(str(key), value)) for key, value in choice.items()], complete))
+    if len({complete for _, complete in runs}) < len(runs):
+        raise ValueError("vary: expected values that differ")
+    target = os.fspath(out), bool(overwrite)
+    rows, text, finished = _lnn.sweep(runs, (counts[-1], thread_count(threads)), target, receiver(progress))
+    return Swept(json.loads(rows), finished, os.fspath(out), text)
 
 
 def _target(out: str | os.PathLike | None, overwrite: bool) -> tuple[str, bool] | None:
@@ -100,7 +153,7 @@ def _widths(hidden: Sequence[int]) -> list[int]:
     return [whole("hidden", width, 1) for width in hidden]
 
 
-def _known(known: System | None) -> dict[str, Any]:
+def _known(known: System | None) -> dict[str, object]:
     """Choices of a known part: it has a kinetic energy of its own, and the network begins with next to nothing beside it."""
     if known is None:
         return {}
@@ -114,12 +167,16 @@ def _description(known: System) -> dict:
     return known.description
 
 
-def _constraints(given: Any) -> str | dict[str, str]:
+def _constraints(given: str | os.PathLike | Mapping[str, str] | Constraints | None) -> str | dict[str, str]:
     """Constraints by name as the library takes them: ``"find"``, ``"none"``, or formulas."""
-    given = "none" if given is None else getattr(given, "formulas", given)
+    if given is None:
+        return "none"
+    if isinstance(given, Constraints):
+        given = given.formulas
     if isinstance(given, Mapping):
         return {str(name): str(formula) for name, formula in given.items()} or "none"
-    return given if given in ("find", "none") else _lnn.read_constraints(os.fspath(given))
+    path = os.fspath(given)
+    return path if path in ("find", "none") else _lnn.read_constraints(path)
 
 
 def learn(
@@ -138,7 +195,7 @@ def learn(
     seed: int = 0,
     threads: int | None = None,
     progress: Progress = None,
-    config: Mapping[str, Any] | None = None,
+    config: Choices | None = None,
 ) -> Learned:
     """Learns from states with their accelerations; Ctrl-C ends it with the best model so far.
 
@@ -184,8 +241,8 @@ def _choices(
     precision: str,
     seed: int,
     threads: int | None,
-    config: Mapping[str, Any] | None,
-) -> dict[str, Any]:
+    config: Choices | None,
+) -> dict[str, object]:
     return {
         "structure": structure,
         "hidden": None if hidden is None else _widths(hidden),
@@ -198,17 +255,18 @@ def _choices(
 
 
 def fit(
-    data: Any,
+    data: Recorded,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
     dt: float | None = None,
-    t: Any = None,
-    v: Any = None,
-    a: Any = None,
-    force: Any = None,
+    t: Beside | None = None,
+    v: Beside | None = None,
+    a: Beside | None = None,
+    force: Beside | None = None,
     trajectory: str | None = None,
-    columns: Mapping[str, Any] | None = None,
+    columns: Meaning | None = None,
+    units: Units | None = None,
     friction: bool = False,
     constraints: str | os.PathLike | Mapping[str, str] | Constraints | None = None,
     structure: str | None = None,
@@ -218,11 +276,12 @@ def fit(
     precision: str = "f32",
     seed: int = 0,
     members: int = 1,
+    formula: bool = False,
     threads: int | None = None,
     out: str | os.PathLike | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-    config: Mapping[str, Any] | None = None,
+    config: Choices | None = None,
 ) -> Learned:
     """Learns from recorded motion, and judges the model by motion that was held out; Ctrl-C ends it with the best model so far.
 
@@ -242,7 +301,10 @@ def fit(
     trajectory : str, optional
         Column whose value distinguishes the trajectories of a file or a DataFrame.
     columns : dict, optional
-        More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``, ``units``.
+        More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``.
+    units : dict of str to str or float, optional
+        Units of columns that are not SI, or factors to SI, such as ``{"theta": "deg", "t": "ms", "x": 0.01}``. Arrays have the columns ``t``,
+        the coordinates, and ``x_dot``, ``x_ddot`` and ``x_force`` of a coordinate ``x``.
     friction : bool
         Whether a friction is learned beside the Lagrangian.
     constraints : str, path or dict, optional
@@ -253,14 +315,18 @@ def fit(
     members : int
         Networks that are trained one after another on the same recording, by `seed` and those that follow it, 32 at most: what they say
         differently is what the recording leaves open, or the training. ``summary["members"]`` compares them.
+    formula : bool
+        Whether a formula of the Lagrangian is looked for in the motion that is learned from, with friction if there is one: minutes.
+        ``summary["formula"]`` has it.
     out : path, optional
         Directory for model, tables, pictures and report; one that holds a run is refused unless `overwrite` is set.
     config : dict, optional
         Any other choice by its path in the configuration of a fit: ``{"held_out": 0.3, "training.optimizer.batch": 64}``.
     """
-    more = {"dt": dt, "t": t, "v": v, "a": a, "force": force, "trajectory": trajectory, "columns": columns}
-    motion = recorded(data, coordinates, angles, **more)
+    motion = recorded(
+        data, coordinates, angles, dt=dt, t=t, v=v, a=a, force=force, trajectory=trajectory, columns=columns, units=units
+    )
     choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
-    choices |= {"friction": bool(friction), "members": whole("members", members, 1, 32), "constraints": _constraints(constraints)}
+    choices |= {"friction": bool(friction), "members": whole("members", members, 1, 32), "formula": bool(formula), "constraints": _constraints(constraints)}
     choices["known"] = None if known is None else _description(known)
     return _learned(_lnn.fit(motion, as_json(choices), _target(out, overwrite), receiver(progress)))

@@ -1,26 +1,37 @@
 from collections.abc import Callable, Sequence
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "Subject",
+    "check",
+    "compare_lagrangians",
     "configuration",
     "find_constraints",
     "fit",
     "formula",
     "identify",
+    "inverse_dynamics",
     "learn",
     "read_constraints",
+    "shadow",
+    "surfaces",
+    "sweep",
     "systems",
     "train",
+    "unit_factor",
 ]
 
 _Doubles = NDArray[np.float64]
 _Bounds = Sequence[tuple[str, float, float]]
+_Force = Callable[[float, _Doubles, _Doubles], _Doubles]
+_Driving = tuple[tuple[Sequence[float], Sequence[Sequence[float]], str | None] | None, _Force | None]
 _Receiver = Callable[[str, float, float, str], None] | None
-_Motion = tuple[Sequence[str], Sequence[tuple[Any, ...]], str]
+_Numbers = Sequence[float]
+_Track = tuple[str, _Numbers, _Numbers, _Numbers, _Numbers, _Numbers]
+_Motion = tuple[Sequence[str], Sequence[_Track], str]
 _Learned = tuple[list[Subject], str, str, str, str | None]
 
 @final
@@ -34,7 +45,15 @@ class Subject:
     def to_bytes(self) -> bytes: ...
     def facts(self) -> str: ...
     def terms(self, q: _Doubles, v: _Doubles, threads: int) -> tuple[list[_Doubles], list[tuple[int, str]]]: ...
-    def term(self, name: str, q: _Doubles, v: _Doubles, threads: int) -> _Doubles: ...
+    def term(
+        self,
+        name: str,
+        q: _Doubles,
+        v: _Doubles,
+        threads: int,
+        force: _Doubles | None = None,
+        friction: bool = True,
+    ) -> _Doubles: ...
     def rollout(
         self,
         q: _Doubles,
@@ -42,10 +61,13 @@ class Subject:
         times: tuple[float, float, float],
         method: str,
         accuracy: tuple[float, float, float | None],
-        bounded: bool,
+        acting: tuple[bool, bool],
+        forces: _Driving,
         threads: int,
     ) -> list[tuple[_Doubles, _Doubles, _Doubles, _Doubles, str | None, int]]: ...
-    def linearize(self, q: _Doubles, v: _Doubles, force: _Doubles | None) -> list[_Doubles]: ...
+    def linearize(
+        self, q: _Doubles, v: _Doubles, force: _Doubles | None, friction: bool
+    ) -> list[_Doubles]: ...
     def geometry(
         self, points: _Doubles, velocity: Sequence[float]
     ) -> tuple[dict[str, _Doubles], NDArray[np.int64], list[tuple[int, str]]]: ...
@@ -73,6 +95,12 @@ def configuration(
 def train(
     system: Subject, config: str, plan: tuple[int, int], out: tuple[str, bool] | None, progress: _Receiver
 ) -> _Learned: ...
+def sweep(
+    configurations: Sequence[tuple[Sequence[tuple[str, str]], str]],
+    plan: tuple[int, int],
+    out: tuple[str, bool],
+    progress: _Receiver,
+) -> tuple[str, str, int]: ...
 def learn(
     q: _Doubles,
     v: _Doubles,
@@ -85,4 +113,20 @@ def fit(motion: _Motion, choices: str, out: tuple[str, bool] | None, progress: _
 def find_constraints(motion: _Motion, degrees: tuple[int, int]) -> str: ...
 def formula(motion: _Motion, choices: str) -> str: ...
 def identify(motion: _Motion, system: Subject, choices: str) -> str: ...
+def inverse_dynamics(subject: Subject, q: _Doubles, v: _Doubles, a: _Doubles) -> list[_Doubles]: ...
+def check(motion: _Motion) -> str: ...
+def compare_lagrangians(
+    first: Subject, second: Subject, region: _Bounds, degrees: str | None, points: int | None, seed: int
+) -> str: ...
+def surfaces(
+    subject: Subject,
+    block: Sequence[int],
+    ends: tuple[Sequence[float], Sequence[float]],
+    velocity: Sequence[float],
+    steps: int,
+) -> list[tuple[Sequence[float], str]]: ...
+def shadow(
+    exact: Subject | None, learned: Subject | None, choices: str, progress: _Receiver
+) -> tuple[str, bytes, tuple[int, int]]: ...
+def unit_factor(column: str, unit: str) -> float: ...
 def read_constraints(path: str) -> dict[str, str]: ...

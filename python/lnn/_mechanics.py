@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from . import _lnn
-from ._arrays import as_json, bounds_of, doubles, doubles_list, read_result, real, states, thread_count, whole
-from ._results import Certificate, Formula, Geometry, Linearization, OwnConstraints, Symmetries, Trajectory
+from ._arrays import as_json, bounds_of, doubles, doubles_list, names, read_result, real, states, thread_count, whole
+from ._results import Certificate, Formula, Geometry, InverseDynamics, Linearization, OwnConstraints, Surface, Symmetries, Trajectory
 from .reader import files
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     import torch
 
     from ._arrays import Numbers
+    from ._progress import Progress
+
+    Drive = Numbers | tuple[Numbers, Numbers] | Callable[[float, np.ndarray, np.ndarray], Numbers]
 
 TENSORS = {"metric": 2, "inverse": 2, "christoffel": 3, "riemann": 4, "ricci": 2, "einstein": 2, "weyl": 4}
 
@@ -108,11 +111,64 @@ class Mechanics:
         """M = d2L/dv2, ``(..., n, n)``."""
         return self._term("mass_matrix", (self._n, self._n), q, v, threads)
 
-    def acceleration(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
-        """a, ``(..., n)``, friction included; NaN where it is not determined."""
-        return self._term("acceleration", (self._n,), q, v, threads)
+    def acceleration(
+        self, q: Numbers, v: Numbers, *, force: Numbers | None = None, friction: bool = True, threads: int = 1
+    ) -> np.ndarray:
+        """a, ``(..., n)``, NaN where it is not determined: ``M a = dL/dq - c - dD/dv + force``.
 
-    def linearize(self, q: Numbers, v: Numbers, *, force: Numbers | None = None) -> Linearization:
+        Parameters
+        ----------
+        q, v : array_like (..., n)
+            Coordinates and velocities in SI units and rad.
+        force : array_like (..., n), optional
+            Generalized forces from outside, such as torques of motors; none by default.
+        friction : bool
+            Whether its own friction acts, ``-dD/dv``.
+        """
+        q, v, shape = states(q, v, self._n)
+        threads = threads if threads == 1 else thread_count(threads)
+        given = None if force is None else self._forces(force, shape)
+        return self._subject.term("acceleration", q, v, threads, given, bool(friction)).reshape(*shape, self._n)
+
+    def _forces(self, force: Numbers, shape: tuple[int, ...]) -> np.ndarray:
+        """Forces on states, one for each or one for all of them, ``(b, n)``."""
+        given, n = doubles("force", force), self._n
+        try:
+            return np.ascontiguousarray(np.broadcast_to(given, (*shape, n)).reshape(-1, n))
+        except ValueError:
+            raise ValueError(f"force: expected an array (..., {n}) for states {shape}, found the shape {given.shape}") from None
+
+    def inverse_dynamics(self, q: Numbers, v: Numbers, a: Numbers) -> InverseDynamics:
+        """Forces that give states their accelerations: the torques that an arm's motors need, or a controller sends ahead.
+
+        Parameters
+        ----------
+        q, v, a : array_like (..., n)
+            Coordinates, velocities and accelerations in SI units and rad.
+
+        Returns
+        -------
+        InverseDynamics
+            ``external`` is the force from outside, ``M a + c - dL/dq + dD/dv``, and its parts are beside it:
+            ``acceleration(q, v, force=external)`` is `a` again.
+
+        Raises
+        ------
+        ValueError
+            If a force is not finite, or constraints do not allow an acceleration.
+        """
+        n = self._n
+        q, v, shape = states(q, v, n)
+        given = doubles("a", a)
+        if given.shape[-1:] != (n,) and not given.shape == shape == ():
+            raise ValueError(f"a: expected an array (..., {n}), found the shape {given.shape}")
+        accelerations = np.ascontiguousarray(np.broadcast_to(given, (*shape, n)).reshape(-1, n))
+        found = _lnn.inverse_dynamics(self._subject, q, v, accelerations)
+        every = len(q) or 1
+        parts = [numbers.reshape(*shape, len(numbers) // every) for numbers in found]
+        return InverseDynamics(*(part if part.shape[-1] or k == 4 else np.zeros((*shape, n)) for k, part in enumerate(parts)))
+
+    def linearize(self, q: Numbers, v: Numbers, *, force: Numbers | None = None, friction: bool = True) -> Linearization:
         """Accelerations and their derivatives, exact, friction and constraints included.
 
         Parameters
@@ -121,6 +177,8 @@ class Mechanics:
             Coordinates and velocities in SI units and rad.
         force : array_like (..., n), optional
             Generalized forces from outside, such as torques of motors; none by default.
+        friction : bool
+            Whether its own friction acts; derivatives without it are differences of the fourth order, good to about 1e-12.
 
         Returns
         -------
@@ -134,10 +192,8 @@ class Mechanics:
         """
         n = self._n
         q, v, shape = states(q, v, n)
-        forces = None
-        if force is not None:
-            forces = np.ascontiguousarray(np.broadcast_to(doubles("force", force), (*shape, n)).reshape(-1, n))
-        acceleration, *matrices = self._subject.linearize(q, v, forces)
+        forces = None if force is None else self._forces(force, shape)
+        acceleration, *matrices = self._subject.linearize(q, v, forces, bool(friction))
         by_q, by_v, by_force = (matrix.reshape(*shape, n, n) for matrix in matrices)
         return Linearization(acceleration.reshape(*shape, n), by_q, by_v, by_force)
 
@@ -158,6 +214,9 @@ class Mechanics:
         atol: float = 1e-8,
         step: float | None = None,
         bounded: bool = True,
+        force: Drive | None = None,
+        between: str | None = None,
+        friction: bool = True,
         threads: int | None = None,
     ) -> Trajectory:
         """Motion from one start, or from a batch of them.
@@ -173,12 +232,21 @@ class Mechanics:
             ``"variational"``, symplectic, with fixed steps of at most `step`.
         bounded : bool
             Whether a motion ends where it leaves the states that a model learned from.
+        force : array_like (..., n), pair of array_like, or callable, optional
+            Generalized forces from outside, such as torques of motors: constants, of every start or of all of them; times ``(m,)`` with
+            values ``(..., m, n)``, which cover the motion; or a function of t, q ``(n,)`` and v ``(n,)`` that returns them, ``(n,)``.
+        between : str, optional
+            Values of forces between their times: ``"held"``, ``"linear"``, the default, ``"cubic"`` or ``"band-limited"``.
+        friction : bool
+            Whether its own friction acts.
         """
         n = self._n
         starts, velocities, shape = states(q, v, n)
         times = real("t0", t0), real("t_end", t_end), real("dt", dt, positive=True)
         accuracy = real("rtol", rtol), real("atol", atol), None if step is None else real("step", step, positive=True)
-        found = self._subject.rollout(starts, velocities, times, method, accuracy, bounded, thread_count(threads))
+        acting = bool(bounded), bool(friction)
+        forces = self._driving(force, between, shape)
+        found = self._subject.rollout(starts, velocities, times, method, accuracy, acting, forces, thread_count(threads))
         # The longest motion has all times that any has.
         t = max((motion[0] for motion in found), key=len, default=np.empty(0))
         parts = [np.full((len(found), len(t), n), np.nan) for _ in range(2)] + [np.full((len(found), len(t)), np.nan)]
@@ -189,6 +257,36 @@ class Mechanics:
         along = [part.reshape(shape + part.shape[1:]) for part in parts]
         stop = found[0][4] if shape == () else np.array([motion[4] for motion in found], dtype=object).reshape(shape)
         return Trajectory(t, along[0], along[1], along[2], stop, self.columns)
+
+    def _driving(self, force: Drive | None, between: str | None, shape: tuple[int, ...]) -> _lnn._Driving:
+        """Forces that drive motions as the library takes them: samples, or a function."""
+        n, pair = self._n, None
+        if isinstance(force, tuple) and len(force) == 2:
+            times, values = (doubles("force", part) for part in force)
+            if times.ndim == 1 and (values.ndim > 1 or n == 1 < len(times)):
+                pair = times, values[:, None] if values.ndim == 1 else values
+        if between is not None and pair is None:
+            raise ValueError("between: expected forces at times, (times, values)")
+        if force is None:
+            return None, None
+        if callable(force):
+            function = force
+
+            def call(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+                found = doubles("force", function(t, q, v))
+                if found.size != n:
+                    raise ValueError(f"force: expected {n} numbers, found the shape {found.shape}")
+                return np.ascontiguousarray(found.reshape(n))
+
+            return None, call
+        if pair is None:
+            return ([0.0], [row.tolist() for row in self._forces(cast("Numbers", force), shape)], None), None
+        times, values = pair
+        if values.shape[-2:] != (len(times), n):
+            raise ValueError(f"force: expected values (..., {len(times)}, {n}) at {len(times)} times, found the shape {values.shape}")
+        if values.ndim > 2:
+            values = np.broadcast_to(values, (*shape, len(times), n))
+        return (times.tolist(), values.reshape(-1, len(times) * n).tolist(), between), None
 
     def geometry(self, q: Numbers, *, velocity: Numbers | None = None) -> Geometry:
         """Metric, connection and curvature at points.
@@ -207,6 +305,40 @@ class Mechanics:
         width = lambda name: (n,) * TENSORS.get(name, 0)
         fields: dict[str, Any] = {name: x.reshape(shape + width(name)) for name, x in numbers.items()}
         return Geometry(**fields, signature=signatures.reshape(*shape, 2), failures=tuple(failures))
+
+    def surfaces(
+        self,
+        block: Sequence[str],
+        start: Numbers,
+        end: Numbers,
+        *,
+        velocity: Numbers | None = None,
+        steps: int = 200,
+    ) -> tuple[Surface, ...]:
+        """Where the determinant of a block of the metric changes its sign on a line: ergosurfaces, horizons, changes of signature.
+
+        Parameters
+        ----------
+        block : sequence of str
+            Coordinates of the block: the time for an ergosurface, time and the angle of a symmetry axis for a horizon.
+        start, end : array_like (n,)
+            Ends of the line.
+        velocity : array_like (n,), optional
+            Where the mass matrix is taken, as of `geometry`.
+        steps : int
+            Pieces into which the line is cut.
+        """
+        places = []
+        for name in names("block", block):
+            if name not in self.coordinates:
+                raise ValueError(f"block: no coordinate {name!r} among {list(self.coordinates)}")
+            places.append(self.coordinates.index(name))
+        if len(set(places)) < len(places):
+            raise ValueError(f"block: expected different coordinates, found {list(block)}")
+        ends = doubles_list("start", start), doubles_list("end", end)
+        velocity = [0.0] * self._n if velocity is None else doubles_list("velocity", velocity)
+        found = _lnn.surfaces(self._subject, places, ends, velocity, whole("steps", steps, 1, 1_000_000))
+        return tuple(Surface(dict(zip(self.coordinates, point)), change) for point, change in found)
 
     def symmetries(
         self,
@@ -339,8 +471,8 @@ class System(Mechanics):
         *,
         lagrangian: str | None = None,
         coordinates: Sequence[str] | Mapping[str, Mapping] | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        parameters: Mapping[str, object] | None = None,
+        **more: object,
     ) -> None:
         if lagrangian is None and "metric" not in more:
             if name is None or coordinates is not None:
@@ -353,24 +485,24 @@ class System(Mechanics):
             raise TypeError("expected the names of the coordinates")
         if not isinstance(coordinates, Mapping):
             coordinates = {name: {} for name in coordinates}
-        description: dict[str, Any] = {"name": name or "own"}
+        description: dict[str, object] = {"name": name or "own"}
         if lagrangian is not None:
             description["lagrangian"] = lagrangian
-        description["coordinates"] = []
+        described: list[dict[str, object]] = []
         for coordinate, keys in coordinates.items():
             whole = {"name": coordinate, **keys}
             for key in ["velocity_bounds"] if whole.get("periodic") else ["bounds", "velocity_bounds"]:
                 whole.setdefault(key, [-1.0, 1.0])
             whole = {key: list(x) if isinstance(x, tuple) else x for key, x in whole.items() if x is not None}
-            description["coordinates"].append(whole)
-        self._describe(as_json({**description, "parameters": dict(parameters or {}), **more}), True, [])
+            described.append(whole)
+        self._describe(as_json({**description, "coordinates": described, "parameters": dict(parameters or {}), **more}), True, [])
 
     def _describe(self, text: str, is_json: bool, given: list) -> None:
         Mechanics.__init__(self, _lnn.Subject.described(text, is_json, given))
         self._made = ("described", text, is_json, given)
 
     @classmethod
-    def from_toml(cls, text: str, **parameters: Any) -> System:
+    def from_toml(cls, text: str, **parameters: object) -> System:
         """A system by the text of its file, or by the file's path."""
         if isinstance(text, os.PathLike) or ("\n" not in text and text.endswith(".toml")):
             text = files.read(text).decode()
@@ -378,7 +510,7 @@ class System(Mechanics):
         system._describe(text, False, _texts(parameters))
         return system
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return _system, self._made
 
     def __repr__(self) -> str:
@@ -395,7 +527,7 @@ class System(Mechanics):
         """What the system's file says; None for one of the catalogue."""
         return self._facts["description"]
 
-    def with_parameters(self, **parameters: Any) -> System:
+    def with_parameters(self, **parameters: object) -> System:
         """The same system with other values of some of its parameters."""
         kind, *text, given = self._made
         return _system(kind, *text, list({**dict(given), **dict(_texts(parameters))}.items()))
@@ -440,7 +572,7 @@ def _system(kind: str, *made: Any) -> System:
     return system
 
 
-def _texts(parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _texts(parameters: Mapping[str, object]) -> list[tuple[str, str]]:
     return [(name, x if isinstance(x, str) else repr(_plain(name, x))) for name, x in parameters.items()]
 
 
@@ -478,7 +610,7 @@ class Model(Mechanics):
         """Writes the file that the program and `load` read; one that is there already is kept unless `overwrite` is set."""
         files.write(path, self.to_bytes(), overwrite)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return Model.from_bytes, (self.to_bytes(),)
 
     def __repr__(self) -> str:
@@ -534,7 +666,7 @@ class Model(Mechanics):
         starts: int = 4,
         seed: int = 0,
         threads: int | None = None,
-        progress: Any = None,
+        progress: Progress = None,
     ) -> dict:
         """The model beside the exact system: errors of accelerations, mass matrix and motion, and what is read off both.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,20 +11,68 @@ from . import _lnn
 from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
 from ._recorded import errors_beside, recorded
 from ._mechanics import System
-from ._results import Bodies, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
+from ._results import Bodies, Checked, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
 
+if TYPE_CHECKING:
+    from ._arrays import Beside, Meaning, Recorded, Units
 
-def find_constraints(
-    data: Any,
+
+def check(
+    data: Recorded,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
     dt: float | None = None,
-    t: Any = None,
-    v: Any = None,
+    t: Beside | None = None,
+    v: Beside | None = None,
+    a: Beside | None = None,
+    force: Beside | None = None,
     trajectory: str | None = None,
-    columns: Mapping[str, Any] | None = None,
+    columns: Meaning | None = None,
+    units: Units | None = None,
+) -> Checked:
+    """A first look at recorded motion, before anything learns from it.
+
+    Parameters
+    ----------
+    data, coordinates, angles, dt, t, v, a, force, trajectory, columns, units
+        The motion, as in `fit`. Columns of files are guessed from names and numbers if `coordinates` are not given.
+    """
+    motion = recorded(
+        data, coordinates, angles, dt=dt, t=t, v=v, a=a, force=force, trajectory=trajectory, columns=columns, units=units, guess=True
+    )
+    found = read_result(_lnn.check(motion))
+    facts = found["facts"]
+    return Checked(
+        samples=facts["samples"],
+        trajectories=len(facts["tracks"]),
+        step=facts["step"],
+        coordinates={one["name"]: one for one in facts["coordinates"]},
+        warnings=tuple(facts["warnings"]),
+        suspicious=tuple(facts["suspicious"]),
+        obstacle=facts["obstacle"],
+        constraints=found["constraints"],
+        formula=facts["formula"],
+        next=facts["next"],
+        call=found["call"],
+        facts=facts,
+        _text=found["_text"],
+        _html=found["_html"],
+    )
+
+
+def find_constraints(
+    data: Recorded,
+    *,
+    coordinates: Sequence[str] | None = None,
+    angles: Sequence[str] = (),
+    dt: float | None = None,
+    t: Beside | None = None,
+    v: Beside | None = None,
+    trajectory: str | None = None,
+    columns: Meaning | None = None,
+    units: Units | None = None,
     degree: int = 2,
     velocity_degree: int = 1,
 ) -> Constraints:
@@ -32,15 +80,16 @@ def find_constraints(
 
     Parameters
     ----------
-    data, coordinates, angles, dt, t, v, trajectory, columns
+    data, coordinates, angles, dt, t, v, trajectory, columns, units
         The motion, as in `fit`.
     degree : int
         Largest total degree of the functions of the coordinates that are tried, 1 to 8; angles take part by sine and cosine.
     velocity_degree : int
         The same of the factors of velocities, 0 to 8.
     """
-    more = {"dt": dt, "t": t, "v": v, "trajectory": trajectory, "columns": columns}
-    motion = recorded(data, coordinates, angles, **more)
+    motion = recorded(
+        data, coordinates, angles, dt=dt, t=t, v=v, trajectory=trajectory, columns=columns, units=units
+    )
     degrees = whole("degree", degree, 1, 8), whole("velocity_degree", velocity_degree, 0, 8)
     found = read_result(_lnn.find_constraints(motion, degrees))
     of = lambda c: Constraint(**{**c, "range": {name: tuple(ends) for name, ends in c["range"].items()}})
@@ -49,16 +98,17 @@ def find_constraints(
 
 
 def formula(
-    data: Any,
+    data: Recorded,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
     dt: float | None = None,
-    t: Any = None,
-    v: Any = None,
-    force: Any = None,
+    t: Beside | None = None,
+    v: Beside | None = None,
+    force: Beside | None = None,
     trajectory: str | None = None,
-    columns: Mapping[str, Any] | None = None,
+    columns: Meaning | None = None,
+    units: Units | None = None,
     friction: bool = False,
     noise: Sequence[float] | None = None,
     basis: str | None = None,
@@ -75,7 +125,7 @@ def formula(
 
     Parameters
     ----------
-    data, coordinates, angles, dt, t, v, force, trajectory, columns
+    data, coordinates, angles, dt, t, v, force, trajectory, columns, units
         The motion, as in `fit`.
     friction : bool
         Whether a Rayleigh dissipation function is looked for beside L.
@@ -99,31 +149,33 @@ def formula(
     name : str
         Name of the system that the formula makes.
     """
-    more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
-    motion = recorded(data, coordinates, angles, **more)
+    motion = recorded(
+        data, coordinates, angles, dt=dt, t=t, v=v, force=force, trajectory=trajectory, columns=columns, units=units
+    )
     noise = None if noise is None else doubles_list("noise", noise, positive=True)
     choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between)
     return read_formula(_lnn.formula(motion, choices))
 
 
 def identify(
-    data: Any,
+    data: Recorded,
     system: System | str,
     *,
     constants: Sequence[str] = (),
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] | None = None,
     dt: float | None = None,
-    t: Any = None,
-    v: Any = None,
-    force: Any = None,
+    t: Beside | None = None,
+    v: Beside | None = None,
+    force: Beside | None = None,
     trajectory: str | None = None,
-    columns: Mapping[str, Any] | None = None,
+    columns: Meaning | None = None,
+    units: Units | None = None,
     offsets: Sequence[str] = (),
     gains: Sequence[str] = (),
     delays: Sequence[str] = (),
     noise: Sequence[float] | None = None,
-    error: Any = None,
+    error: Beside | None = None,
     targets: str | None = None,
     between: str | None = None,
     segment: float | None = None,
@@ -134,7 +186,7 @@ def identify(
 
     Parameters
     ----------
-    data, dt, t, v, force, trajectory, columns
+    data, dt, t, v, force, trajectory, columns, units
         The motion, as in `fit`.
     system : System or str
         The form, or its name in the catalogue; the search starts at the values of its parameters.
@@ -175,11 +227,12 @@ def identify(
         angles = [name for name, angle in zip(coordinates, turning) if angle]
     if noise is not None and error is not None:
         raise ValueError("error: expected either errors sample by sample or the noise of every coordinate, found both")
-    beside, errors = errors_beside(data, error, trajectory)
-    more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": {**(columns or {}), **beside}}
-    motion = recorded(data, coordinates, angles, **more)
+    beside, errors = errors_beside(data, error, trajectory, coordinates, units)
+    motion = recorded(
+        data, coordinates, angles, dt=dt, t=t, v=v, force=force, trajectory=trajectory, columns={**(columns or {}), **beside}, units=units
+    )
     named = {"constants": constants, "offsets": offsets, "gains": gains, "delays": delays}
-    choices: dict[str, Any] = {key: names(key, given) for key, given in named.items()}
+    choices: dict[str, object] = {key: names(key, given) for key, given in named.items()}
     choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
     choices["segment"] = None if segment is None else real("segment", segment, positive=True)
     choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors}
@@ -198,7 +251,7 @@ def identify(
     return Identified(**found, _form=system)
 
 
-def _undetermined(constants: Any, directions: Any, known: Any, **more: Any) -> Undetermined:
+def _undetermined(constants: list[str], directions: object, known: list[dict[str, Any]], **more: Any) -> Undetermined:
     combinations = {one["name"]: Combination(**one) for one in known}
     return Undetermined(tuple(constants), np.array(directions, float).reshape(-1, len(constants)), combinations, **more)
 
@@ -217,7 +270,7 @@ def formula_choices(
     between: str | None = None,
 ) -> str:
     """Choices of a search as the library takes them."""
-    given: dict[str, Any] = {"basis": basis, "functions": names("functions", functions), "gyroscopic": bool(gyroscopic)}
+    given: dict[str, object] = {"basis": basis, "functions": names("functions", functions), "gyroscopic": bool(gyroscopic)}
     given |= {"friction": bool(friction), "noise": noise, "scale": scale, "bootstraps": whole("bootstraps", bootstraps, 1, 10_000)}
     return as_json(given | {"seed": whole("seed", seed), "threads": thread_count(threads), "name": str(name), "between": between})
 

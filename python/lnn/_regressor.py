@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._learning import learn
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from sklearn.utils import Tags
 
 
 class LagrangianRegressor(RegressorMixin, BaseEstimator):
@@ -57,7 +61,7 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.threads = threads
 
-    def __sklearn_tags__(self) -> Any:
+    def __sklearn_tags__(self) -> Tags:
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         tags.target_tags.required = True
@@ -65,11 +69,11 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = True
         return tags
 
-    def fit(self, X: Any, y: Any) -> LagrangianRegressor:
+    def fit(self, X: ArrayLike, y: ArrayLike) -> LagrangianRegressor:
         """Learns from states and accelerations."""
-        X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True, multi_output=True, ensure_min_samples=3)
-        a = y[:, None] if y.ndim == 1 else y
-        q, v = self._states(X, a.shape[1])
+        rows, targets = validate_data(self, X, y, dtype=np.float64, y_numeric=True, multi_output=True, ensure_min_samples=3)
+        a = targets[:, None] if targets.ndim == 1 else targets
+        q, v = self._states(rows, a.shape[1])
         names = [f"q{i + 1}" for i in range(a.shape[1])]
         learned = learn(
             q,
@@ -83,14 +87,14 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
             seed=self.random_state,
             threads=self.threads,
         )
-        self.model_, self.history_, self._flat = learned.model, learned.history, y.ndim == 1
+        self.model_, self.history_, self._flat = learned.model, learned.history, targets.ndim == 1
         return self
 
-    def predict(self, X: Any) -> np.ndarray:
+    def predict(self, X: ArrayLike) -> np.ndarray:
         """Accelerations of states."""
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float64, reset=False)
-        a = self.model_.acceleration(*self._states(X, len(self.model_.coordinates)))
+        rows = validate_data(self, X, dtype=np.float64, reset=False)
+        a = self.model_.acceleration(*self._states(rows, len(self.model_.coordinates)))
         return a[:, 0] if self._flat else a
 
     def _states(self, X: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -59,6 +59,38 @@ class Linearization:
 
 
 @dataclass(frozen=True)
+class InverseDynamics:
+    """Generalized forces that make a known motion, ``(..., n)`` each: N for a length, N m for an angle.
+
+    ``generalized = friction + external + constraint``, and ``external + constraint = inertial + coriolis + gravity - friction``.
+
+    Attributes
+    ----------
+    generalized
+        All force beside that of L, ``M a + c - dL/dq``.
+    friction
+        Force of its own friction, ``-dD/dv``: negative where the velocity is positive.
+    external
+        Force from outside, such as the torques of motors; under constraints the smallest that makes the motion.
+    constraint
+        Force of the constraints under it.
+    multipliers : (..., m)
+        Multipliers of the constraints.
+    inertial, coriolis, gravity
+        ``M a``, what the velocities add to it, and what holds the state where it is, against gravity and springs.
+    """
+
+    generalized: np.ndarray
+    friction: np.ndarray
+    external: np.ndarray
+    constraint: np.ndarray
+    multipliers: np.ndarray
+    inertial: np.ndarray
+    coriolis: np.ndarray
+    gravity: np.ndarray
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Motion at ``t``, of one start or of a batch of them.
 
@@ -80,7 +112,7 @@ class Trajectory:
     q: np.ndarray
     v: np.ndarray
     energy: np.ndarray
-    stop: Any
+    stop: str | None | np.ndarray
     columns: tuple[str, ...]
 
     @property
@@ -666,6 +698,174 @@ class Identified(_Shown):
 
 
 @dataclass(frozen=True)
+class Comparison(_Shown):
+    """What two Lagrangians A and B have in common beyond factor and gauge: the best ``A = f(B) + dF/dt + constant``; distances are relative.
+
+    Attributes
+    ----------
+    factors : (k,)
+        Coefficients of f, from the first power of B: a factor, or for geodesics a polynomial.
+    group_factors : (g,)
+        Factors of groups of coordinates that do not act on each other, which B was first multiplied by; empty if there is one group.
+    on_shell : bool
+        Whether B is the same at all states, so that f is known at this one value.
+    gauge, gauge_formula, constant
+        Coefficients of F, F as a formula, and the constant.
+    lagrangian, motion, mass_matrix, energy : float
+        What is left of each; `motion` is that of the accelerations, NaN where there are none.
+    motionless_states : int
+        States at which one of the two has no accelerations.
+    first, second : str
+        Names of A and B.
+    points, seed : int
+        States that were looked at, and their seed.
+    """
+
+    factors: np.ndarray
+    group_factors: np.ndarray
+    on_shell: bool
+    gauge: np.ndarray
+    gauge_formula: str
+    constant: float
+    lagrangian: float
+    motion: float
+    motionless_states: int
+    mass_matrix: float
+    energy: float
+    first: str
+    second: str
+    points: int
+    seed: int
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A place on a line where the determinant of a block of a metric changes its sign.
+
+    Attributes
+    ----------
+    point : dict of str to float
+        By coordinate.
+    change : str
+        ``"zero"`` or ``"pole"``.
+    """
+
+    point: dict[str, float]
+    change: str
+
+
+@dataclass(frozen=True)
+class View:
+    """Figures of a picture through a metric; impact parameters are None where the ray of the centre is not captured.
+
+    Attributes
+    ----------
+    share : float
+        Share of the pixels in the shadow.
+    area, left, right, bottom, top : float or None
+        Area of the shadow in impact parameters, and those of its edge along the two axes of the picture.
+    unfinished, steps : int
+        Rays that neither were captured nor came from the sky, and steps of all rays.
+    drift : float or None
+        Largest ``g(k, k)`` at the end of a ray from the sky over the sizes of its terms.
+    seconds, rays_per_second : float
+    """
+
+    share: float
+    area: float | None
+    left: float | None
+    right: float | None
+    bottom: float | None
+    top: float | None
+    unfinished: int
+    drift: float | None
+    steps: int
+    seconds: float
+    rays_per_second: float
+
+
+@dataclass(frozen=True)
+class Shadow(_Shown):
+    """The shadow of a black hole.
+
+    Attributes
+    ----------
+    image : (rows, columns, 3)
+        The picture in red, green and blue, 0 to 255; of two metrics the exact one, the learned one, and their difference side by side.
+    views : dict of str to View
+        ``"exact"``, ``"learned"``, or both.
+    difference : dict or None
+        Of two metrics: shares of `pixels` of another colour and in the `shadow` of one alone, `median_angle` and `angle_99` in degrees.
+    free_factor : bool
+        Whether the impact parameters of a learned metric are known up to one factor.
+    unit : str or None
+        Of the coordinates.
+    """
+
+    image: np.ndarray = field(repr=False)
+    views: dict[str, View]
+    difference: dict[str, float] | None
+    free_factor: bool
+    unit: str | None
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
+
+    def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
+        """Draws the picture into `ax` or new axes of matplotlib, and returns these."""
+        ax = _axes(ax)
+        ax.imshow(self.image, **style)
+        ax.set_axis_off()
+        return ax
+
+
+@dataclass(frozen=True)
+class Checked(_Shown):
+    """A first look at recorded motion: what it is, whether a simple law explains it, and what to do next.
+
+    Attributes
+    ----------
+    samples, trajectories : int
+    step : float
+        Median time between samples in s.
+    coordinates : dict of str to dict
+        What there is to know of each: ``noise``, ``period``, ``samples_per_period``, ``velocity_error``, ``acceleration_error`` and more.
+    warnings : tuple of str
+        Facts to know before learning.
+    suspicious : tuple of dict
+        Places that do not look like smooth motion with noise: ``track``, ``row``, ``coordinate``, ``kind``; of very many the first.
+    obstacle : str or None
+        Why no fit can learn from the data.
+    constraints : dict of str to str
+        Formulas that vanish along the motion, by name; empty if there are none, or they were not looked for.
+    formula : str or None
+        A formula of the Lagrangian that explains the motion.
+    next : str
+        ``"mend"``, ``"record"``, ``"formula"``, ``"fit-constrained"`` or ``"fit"``.
+    call : str or None
+        The call that does it.
+    facts : dict
+        All of the survey, as ``lnn check --json`` prints it.
+    """
+
+    samples: int
+    trajectories: int
+    step: float
+    coordinates: dict[str, dict[str, object]]
+    warnings: tuple[str, ...]
+    suspicious: tuple[dict[str, object], ...]
+    obstacle: str | None
+    constraints: dict[str, str]
+    formula: str | None
+    next: str
+    call: str | None
+    facts: dict[str, object] = field(repr=False)
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
+
+
+@dataclass(frozen=True)
 class Certificate(_Shown):
     """Shares of a region in which the mass matrix is proven to have its signature, or not to.
 
@@ -729,6 +929,9 @@ class Learned:
     stop: str | None = None
     members: list[Model] = field(default_factory=list, repr=False)
 
+    def __str__(self) -> str:
+        return self.text
+
     def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws the losses over the epochs into `ax` or new axes of matplotlib, and returns these."""
         ax = _axes(ax)
@@ -737,3 +940,34 @@ class Learned:
         ax.set(xlabel="epoch", ylabel="loss")
         ax.legend()
         return ax
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What the runs of a sweep learned.
+
+    Attributes
+    ----------
+    rows : list of dict
+        One for each choice, with the columns of ``table.csv``.
+    finished : int
+        Runs that are finished.
+    out : str
+        Their directory, with tables and report.
+    text : str
+        The table for a terminal.
+    """
+
+    rows: list[dict[str, object]]
+    finished: int
+    out: str
+    text: str = field(repr=False)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A DataFrame of the rows."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows)

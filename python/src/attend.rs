@@ -165,6 +165,7 @@ impl Reporter {
             }
             Event::Epoch(epoch) => ("epoch", epoch.epoch as f64, epoch.validation_loss, String::new()),
             Event::Judged { done, total } => pair("judged", done, total),
+            Event::Runs { done, total } => pair("runs", done, total),
             Event::Note(text) => ("note", 0.0, 0.0, text.to_string()),
             _ => return,
         };

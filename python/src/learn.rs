@@ -8,7 +8,8 @@ use lnn::configuration::{Config, Known, Precision};
 use lnn::data::Dataset;
 use lnn::network::Structure;
 use lnn::pipeline::{
-    Fit, FitConfig, FitConstraints, FitOptions, InMemory, LockedDirectory, Output, PipelineError, RunOptions, Unjudged,
+    Fit, FitConfig, FitConstraints, FitOptions, InMemory, LockedDirectory, Output, PipelineError, RunOptions, Swept,
+    Unjudged,
 };
 use lnn::presets::{Preset, Trainer};
 use lnn::training::{Epoch, StopReason};
@@ -153,6 +154,23 @@ pub fn train(
     Ok((vec![Subject::learned(report.header, report.network)?], result, json, text, stop))
 }
 
+/// Trains several configurations, JSON with the choices that make each, into a directory: the table as JSON, a text, finished runs.
+#[pyfunction]
+pub fn sweep(
+    py: Python<'_>,
+    configurations: Vec<(Vec<(String, String)>, String)>,
+    plan: (usize, usize),
+    out: Target,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, String, usize)> {
+    let parsed = configurations.into_iter().map(|(choice, text)| Ok((choice, serde_json::from_str(&text)?)));
+    let parsed: Vec<(Vec<(String, String)>, Config)> =
+        parsed.collect::<Result<_, serde_json::Error>>().map_err(value)?;
+    let swept = attended(py, progress.as_ref(), |watch| lnn::pipeline::sweep(parsed, plan, (&out.0, out.1), &watch))?;
+    let Swept { rows, finished, text } = swept.map_err(pipeline)?;
+    Ok((serde_json::to_string(&rows).map_err(runtime)?, text, finished))
+}
+
 /// A model whose judgement was interrupted: there are no figures of it.
 fn unjudged(learned: Unjudged) -> PyResult<Learned> {
     let Unjudged { header, network, history: epochs, .. } = learned;
@@ -177,6 +195,8 @@ struct Choices {
     friction: bool,
     #[serde(default)]
     members: Option<usize>,
+    #[serde(default)]
+    formula: bool,
     #[serde(default)]
     known: Option<Known>,
     #[serde(default)]
@@ -327,6 +347,7 @@ fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, o
         if let Some(members) = choices.members {
             config.members = members;
         }
+        config.formula = choices.formula;
         match changed(config, &choices.changes) {
             Ok(new) => *config = new,
             Err(problem) => {

@@ -2,10 +2,13 @@
 //! defaults and documentation are those of the Python side.
 
 mod attend;
+mod compare;
 mod errors;
+mod forces;
 mod learn;
 mod readings;
 mod recorded;
+mod shadow;
 mod subject;
 
 use pyo3::prelude::*;
@@ -18,10 +21,17 @@ fn _lnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(learn::configuration, module)?)?;
     module.add_function(wrap_pyfunction!(learn::train, module)?)?;
     module.add_function(wrap_pyfunction!(learn::learn, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::sweep, module)?)?;
     module.add_function(wrap_pyfunction!(learn::fit, module)?)?;
     module.add_function(wrap_pyfunction!(readings::constraints_of_motion, module)?)?;
     module.add_function(wrap_pyfunction!(readings::formula, module)?)?;
     module.add_function(wrap_pyfunction!(readings::identify, module)?)?;
     module.add_function(wrap_pyfunction!(learn::read_constraints, module)?)?;
+    module.add_function(wrap_pyfunction!(forces::forces_of_motion, module)?)?;
+    module.add_function(wrap_pyfunction!(recorded::unit_factor, module)?)?;
+    module.add_function(wrap_pyfunction!(compare::compare_lagrangians, module)?)?;
+    module.add_function(wrap_pyfunction!(compare::surfaces_of_metric, module)?)?;
+    module.add_function(wrap_pyfunction!(shadow::shadow, module)?)?;
+    module.add_function(wrap_pyfunction!(readings::check, module)?)?;
     Ok(())
 }

@@ -1,18 +1,46 @@
-//! What is read off recorded motion: its constraints, and its Lagrangian as a formula.
+//! What is read off recorded motion: what it is, its constraints, its Lagrangian as a formula, the constants of a form that is known.
 
 use crate::attend::whole;
-use crate::errors::{runtime, value};
+use crate::errors::{pipeline, runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
 use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
 use lnn::findings::Findings;
 use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
 use lnn::identification::{Between, IdentifyOptions, identify as identified};
+use lnn::pipeline::{FirstLook, NextStep};
 use lnn::recording::smooth::SmoothOptions;
 use lnn::report::Report;
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde_json::json;
+
+/// What recorded motion is, whether a simple law explains it, and what to do next, as JSON.
+#[pyfunction]
+pub fn check(py: Python<'_>, motion: Motion) -> PyResult<String> {
+    let source = Source::of(motion)?;
+    whole(py, None, |watch| {
+        let (loaded, meaning, guessed) = source.look()?;
+        let look = FirstLook::new(&loaded, guessed, &watch.cancellation()).map_err(pipeline)?;
+        let mut findings = look.findings();
+        let verb = match look.next {
+            NextStep::Mend | NextStep::Record => None,
+            NextStep::Formula => Some("formula"),
+            NextStep::Fit | NextStep::FitConstrained => Some("fit"),
+        };
+        let more = match look.next {
+            NextStep::FitConstrained => ", constraints=\"find\"",
+            NextStep::Formula if look.has_friction() => ", friction=True",
+            _ => "",
+        };
+        let call = verb.map(|verb| format!("lnn.{verb}({meaning}{more})"));
+        if let Some(call) = &call {
+            findings.gap().line("next:").line(format!("  {call}"));
+        }
+        let constraints = look.constraints.as_ref().map(|found| found.formulas()).unwrap_or_default();
+        shown(&json!({ "facts": look, "call": call, "constraints": constraints }), &findings)
+    })?
+}
 
 /// The constraints of recorded motion, as JSON; `degrees` are those of functions of the coordinates and of factors of velocities.
 #[pyfunction(name = "find_constraints")]

@@ -2,8 +2,8 @@
 
 use crate::errors::{pipeline, value};
 use lnn::pipeline::PipelineError;
-use lnn::recording::read::read_recording;
-use lnn::recording::{Columns, LoadedRecording, RecordedTrajectory, Recording};
+use lnn::recording::read::{DataError, read_recording};
+use lnn::recording::{ColumnGuess, Columns, Guess, LoadedRecording, RecordedTrajectory, Recording, factor, guess};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -92,9 +92,79 @@ impl Source {
     pub fn read(self) -> PyResult<LoadedRecording> {
         match self {
             Self::Memory(recording) => Ok(recording.into()),
+            Self::Files(files, columns) => read_recording(&files, &columns).map_err(refused),
+        }
+    }
+
+    /// The same, after a guess of what the columns of files are if no coordinates are named; the arguments of a call that reads it again, and
+    /// what the columns were taken as.
+    ///
+    /// # Errors
+    /// As of [`read`](Self::read).
+    pub fn look(self) -> PyResult<(LoadedRecording, String, Vec<ColumnGuess>)> {
+        match self {
+            Self::Memory(recording) => {
+                let angles = recording.coordinates.iter().zip(&recording.periodic).filter(|(_, angle)| **angle);
+                let columns = Columns {
+                    coords: recording.coordinates.clone(),
+                    periodic: angles.map(|(name, _)| name.clone()).collect(),
+                    ..Columns::default()
+                };
+                Ok((recording.into(), arguments("data", &columns), Vec::new()))
+            }
             Self::Files(files, columns) => {
-                read_recording(&files, &columns).map_err(|error| pipeline(PipelineError::Data(error)))
+                let mut found = Guess { columns: *columns, table: Vec::new() };
+                if found.columns.coords.is_empty() {
+                    found = guess(&files, &found.columns).map_err(refused)?;
+                }
+                let loaded = read_recording(&files, &found.columns).map_err(refused)?;
+                let names: Vec<_> = files.iter().map(|file| quoted(&file.display().to_string())).collect();
+                let data = if let [one] = names.as_slice() { one.clone() } else { format!("[{}]", names.join(", ")) };
+                Ok((loaded, arguments(&data, &found.columns), found.table))
             }
         }
     }
+}
+
+fn refused(error: DataError) -> PyErr {
+    pipeline(PipelineError::Data(error))
+}
+
+/// A text as Python writes it.
+fn quoted(text: &str) -> String {
+    Value::from(text).to_string()
+}
+
+/// The arguments of a call that reads recorded motion with this meaning of its columns.
+fn arguments(data: &str, columns: &Columns) -> String {
+    let list = |names: &[String]| format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "));
+    let mut text = format!("{data}, coordinates={}", list(&columns.coords));
+    if !columns.periodic.is_empty() {
+        text += &format!(", angles={}", list(&columns.periodic));
+    }
+    if let Some(name) = &columns.trajectory {
+        text += &format!(", trajectory={}", quoted(name));
+    }
+    if !columns.units.is_empty() {
+        let pairs = columns.units.iter().map(|(column, unit)| format!("{}: {}", quoted(column), quoted(unit)));
+        text += &format!(", units={{{}}}", pairs.collect::<Vec<_>>().join(", "));
+    }
+    let many =
+        [("velocities", &columns.velocity), ("accelerations", &columns.acceleration), ("forces", &columns.force)];
+    let many = many.into_iter().filter(|(_, names)| !names.is_empty()).map(|(key, names)| (key, list(names)));
+    // The usual names need not be said.
+    let time = columns.time.iter().filter(|name| *name != "t" && *name != "time").map(|name| ("time", quoted(name)));
+    let rate = columns.rate.iter().map(|rate| ("rate", rate.to_string()));
+    let more: Vec<String> =
+        many.chain(time).chain(rate).map(|(key, value)| format!("{}: {value}", quoted(key))).collect();
+    if !more.is_empty() {
+        text += &format!(", columns={{{}}}", more.join(", "));
+    }
+    text
+}
+
+/// The factor that turns numbers in a unit into SI.
+#[pyfunction]
+pub fn unit_factor(column: &str, unit: &str) -> PyResult<f64> {
+    factor(unit).map_err(|problem| value(format_args!("units: {column}: {problem}")))
 }

@@ -2,6 +2,7 @@
 
 use crate::attend::{left, whole};
 use crate::errors::{pipeline, runtime, value};
+use crate::forces::{Forces, Samples};
 use crate::readings::{FormulaChoices, formula_shown, shown};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
 use lnn::constraints::{EXAMINED_STATES, examine};
@@ -9,14 +10,15 @@ use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::{Geometry, GeometryError, geometries};
 use lnn::lagrangian::system::{Bounds, Size};
 use lnn::lagrangian::{
-    Description, EulerLagrange, Interruptible, Linearization, Linearizer, Request, SystemInstance, Terms, configure,
-    configure_system, configure_values, constrained_systems, find,
+    Description, EulerLagrange, Frictionless, Interruptible, Linearization, Linearizer, Request, SystemInstance, Terms,
+    configure, configure_system, configure_values, constrained_systems, find,
 };
+use lnn::linalg::Workspace;
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
 use lnn::pipeline::{CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, trained_on};
 use lnn::report::page;
-use lnn::rollout::{Integrator, Options, Rollout, RolloutError, rollout_many};
+use lnn::rollout::{Integrator, Options, Rollout, RolloutError, Start, rollout_each};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -25,7 +27,8 @@ use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::sync::atomic::Ordering;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// States whose terms are computed at a time.
 const CHUNK: usize = 4096;
@@ -44,7 +47,8 @@ enum Kind {
 #[pyclass(frozen, module = "lnn._lnn")]
 pub struct Subject {
     kind: Kind,
-    columns: Vec<String>,
+    /// Coordinates, then velocities.
+    pub columns: Vec<String>,
 }
 
 /// All systems of the catalogue, as JSON.
@@ -84,7 +88,7 @@ impl Subject {
     }
 
     /// Refuses what knows free coordinates alone.
-    fn require_free(&self) -> PyResult<()> {
+    pub fn require_free(&self) -> PyResult<()> {
         match self.moving().manifold() {
             None => Ok(()),
             Some(_) => Err(value(CONSTRAINTS_UNSUPPORTED)),
@@ -95,11 +99,17 @@ impl Subject {
         self.columns.len() / 2
     }
 
-    fn moving(&self) -> &dyn EulerLagrange<f64> {
+    /// What moves.
+    pub fn moving(&self) -> &dyn EulerLagrange<f64> {
         match &self.kind {
             Kind::System(_, built) => built.as_ref(),
             Kind::Model(_, _, motion) => motion.as_ref(),
         }
+    }
+
+    /// What moves, with its own friction or without.
+    fn with_friction<T>(&self, friction: bool, work: impl FnOnce(&dyn EulerLagrange<f64>) -> T) -> T {
+        if friction { work(self.moving()) } else { work(&Frictionless(self.moving())) }
     }
 
     /// The system, or the one that the model learned.
@@ -139,7 +149,7 @@ impl Subject {
 
     /// The states of interest: those of a system on which errors are stated, the middle of those that a model learned from, all of one turn of an
     /// angle.
-    fn interest(&self) -> Region {
+    pub fn interest(&self) -> Region {
         let Region { position, velocity } = self.bounds();
         if matches!(self.kind, Kind::System(..)) {
             return Region { position, velocity };
@@ -151,11 +161,38 @@ impl Subject {
         }
     }
 
+    /// Unit of its coordinates and its time, if its system is known.
+    pub fn time_unit(&self) -> Option<String> {
+        self.system_instance().ok().map(|system| system.system.time_unit.to_string())
+    }
+
+    /// Whether its terms are exact: of a system, not of a model.
+    pub fn is_exact(&self) -> bool {
+        matches!(self.kind, Kind::System(..))
+    }
+
+    /// The kinds of values that its coordinates take in a region.
+    pub fn charts(&self, region: &Region) -> Vec<Chart> {
+        let known = self.periodic().into_iter().zip(self.units()).zip(&region.position);
+        known.map(|((periodic, unit), range)| Chart::of(periodic, &unit, *range)).collect()
+    }
+
     /// States of a region, on the mass shell and inside the domain of the system.
     fn sampled(&self, region: &Region, count: usize, seed: u64) -> PyResult<(Vec<f64>, Vec<f64>)> {
-        let system = self.system_instance().ok();
+        self.sampled_beside(self, region, count, seed)
+    }
+
+    /// The same, inside the domain of another system as well, whose mass shell serves if this one has none.
+    pub fn sampled_beside(
+        &self,
+        other: &Self,
+        region: &Region,
+        count: usize,
+        seed: u64,
+    ) -> PyResult<(Vec<f64>, Vec<f64>)> {
+        let systems: Vec<_> = [other, self].into_iter().filter_map(|one| one.system_instance().ok()).collect();
         let accept = |q: &[f64], v: &mut [f64]| {
-            system.iter().all(|s| s.check_domain(q).is_ok() && s.impose_constraint(q, v).is_ok())
+            systems.iter().all(|s| s.check_domain(q).is_ok() && s.impose_constraint(q, v).is_ok())
         };
         let (q, v) = region.states(count, seed, accept);
         if q.len() < count * self.n() {
@@ -164,7 +201,8 @@ impl Subject {
         Ok((q, v))
     }
 
-    fn name(&self) -> &str {
+    /// Name of the system.
+    pub fn name(&self) -> &str {
         match &self.kind {
             Kind::System(configured, _) => &configured.system.name,
             Kind::Model(header, ..) => &header.system,
@@ -210,7 +248,7 @@ impl Subject {
     }
 
     /// A region with the bounds of the named columns replaced.
-    fn region(&self, usual: Region, given: Vec<(String, f64, f64)>) -> PyResult<Region> {
+    pub fn region(&self, usual: Region, given: Vec<(String, f64, f64)>) -> PyResult<Region> {
         let mut region = usual;
         for (name, low, high) in given {
             let place = self.columns.iter().position(|column| *column == name);
@@ -234,50 +272,58 @@ impl Subject {
     fn attended(
         &self,
         py: Python<'_>,
-        states: (&[f64], &[f64]),
-        request: Request,
+        states: States<'_>,
+        (request, friction): (Request, bool),
         threads: usize,
     ) -> PyResult<Vec<(Terms<f64>, usize)>> {
-        if states.0.len() <= CHUNK * self.n() {
-            return Ok(py.detach(|| self.computed(states, request, threads, &Watch::default())));
-        }
-        whole(py, None, |watch| self.computed(states, request, threads, watch))
-    }
-
-    /// Terms of states, chunk by chunk, parts of them side by side.
-    fn computed(
-        &self,
-        (q, v): (&[f64], &[f64]),
-        request: Request,
-        threads: usize,
-        watch: &Watch,
-    ) -> Vec<(Terms<f64>, usize)> {
-        let (n, model) = (self.n(), self.moving());
-        // The same work of many coordinates takes fewer states.
-        let chunk = (4 * CHUNK / (n * n)).clamp(64, CHUNK);
-        let part = |q: &[f64], v: &[f64]| {
-            let chunks = q.chunks(chunk * n).zip(v.chunks(chunk * n));
-            let chunks = chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed));
-            let terms = chunks.map(|(q, v)| {
-                let mut terms = Terms::default();
-                // Every row that fails is among the failures, its accelerations are NaN.
-                let _ = model.terms(q, v, request, &mut terms);
-                (terms, q.len() / n)
-            });
-            terms.collect::<Vec<_>>()
+        let work = |watch: &Watch| {
+            self.with_friction(friction, |model| computed(model, states, request, threads, &watch.interrupt))
         };
-        let states = q.len() / n;
-        let threads = threads.clamp(1, 256).min(states.div_ceil(CHUNK)).max(1);
-        if threads == 1 {
-            return part(q, v);
+        if states.0.len() <= CHUNK * self.n() {
+            return Ok(py.detach(|| work(&Watch::default())));
         }
-        let share = states.div_ceil(threads).next_multiple_of(CHUNK) * n;
-        std::thread::scope(|scope| {
-            let parts = q.chunks(share).zip(v.chunks(share));
-            let running: Vec<_> = parts.map(|(q, v)| scope.spawn(move || part(q, v))).collect();
-            running.into_iter().flat_map(|part| part.join().unwrap_or_default()).collect()
-        })
+        whole(py, None, work)
     }
+}
+
+/// Coordinates and velocities of states `(b, n)`, and the forces from outside that act on them, if there are some.
+type States<'a> = (&'a [f64], &'a [f64], Option<&'a [f64]>);
+
+/// Terms of states, chunk by chunk, parts of them side by side.
+fn computed(
+    model: &dyn EulerLagrange<f64>,
+    (q, v, force): States<'_>,
+    request: Request,
+    threads: usize,
+    stop: &AtomicBool,
+) -> Vec<(Terms<f64>, usize)> {
+    let n = model.coordinates();
+    // The same work of many coordinates takes fewer states.
+    let chunk = (4 * CHUNK / (n * n)).clamp(64, CHUNK);
+    let part = |range: Range<usize>| {
+        let chunks = range.clone().step_by(chunk).map(|row| row * n..(row + chunk).min(range.end) * n);
+        let terms = chunks.take_while(|_| !stop.load(Ordering::Relaxed)).map(|at| {
+            let (q, v, mut terms) = (&q[at.clone()], &v[at.clone()], Terms::default());
+            // Every row that fails is among the failures, its accelerations are NaN.
+            let _ = model.terms(q, v, request, &mut terms);
+            if let Some(force) = force {
+                let _ = terms.add_force(n, v, &force[at], &mut Workspace::new());
+            }
+            (terms, q.len() / n)
+        });
+        terms.collect::<Vec<_>>()
+    };
+    let states = q.len() / n;
+    let threads = threads.clamp(1, 256).min(states.div_ceil(CHUNK)).max(1);
+    if threads == 1 {
+        return part(0..states);
+    }
+    let share = states.div_ceil(threads).next_multiple_of(CHUNK);
+    std::thread::scope(|scope| {
+        let parts = (0..states).step_by(share).map(|row| row..(row + share).min(states));
+        let running: Vec<_> = parts.map(|rows| scope.spawn(|| part(rows))).collect();
+        running.into_iter().flat_map(|part| part.join().unwrap_or_default()).collect()
+    })
 }
 
 /// What a geometry has of numbers at a point, by name and number of indices.
@@ -390,7 +436,7 @@ impl Subject {
         threads: usize,
     ) -> PyResult<(Vec<Numbers<'py>>, Vec<(usize, String)>)> {
         let (q, v) = self.states(&q, &v)?;
-        let mut parts = self.attended(py, (q, v), Request::ALL, threads)?;
+        let mut parts = self.attended(py, (q, v, None), (Request::ALL, true), threads)?;
         let mut failures = Vec::new();
         let mut before = 0;
         for (terms, states) in &parts {
@@ -416,7 +462,9 @@ impl Subject {
         Ok((found, failures))
     }
 
-    /// One term of states `(b, n)`, flat.
+    /// One term of states `(b, n)`, flat; forces from outside and friction act on accelerations alone.
+    #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (name, q, v, threads, force=None, friction=true))]
     fn term<'py>(
         &self,
         py: Python<'py>,
@@ -424,8 +472,11 @@ impl Subject {
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
         threads: usize,
+        force: Option<PyReadonlyArray2<'py, f64>>,
+        friction: bool,
     ) -> PyResult<Numbers<'py>> {
         let (q, v) = self.states(&q, &v)?;
+        let force = force.as_ref().map(slice).transpose()?;
         let n = self.n();
         let (request, width, take): (Request, usize, Field) = match name {
             "lagrangian" => (Request::LAGRANGIAN, 1, |t| &mut t.lagrangian),
@@ -434,7 +485,7 @@ impl Subject {
             "energy" => (Request::ENERGY, 1, |t| &mut t.energy),
             _ => (Request::ACCELERATION, n, |t| &mut t.acceleration),
         };
-        let mut parts = self.attended(py, (q, v), request, threads)?;
+        let mut parts = self.attended(py, (q, v, force), (request, friction), threads)?;
         Ok(field(py, &mut parts, width, take))
     }
 
@@ -445,16 +496,17 @@ impl Subject {
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
         force: Option<PyReadonlyArray2<'py, f64>>,
+        friction: bool,
     ) -> PyResult<Vec<Numbers<'py>>> {
         let (q, v) = self.states(&q, &v)?;
         let force = force.as_ref().map(slice).transpose()?;
-        let model = self.moving();
-        let found = py.detach(|| Linearizer::new(model).under(q, v, force).cloned()).map_err(value)?;
+        let work = |model: &dyn EulerLagrange<f64>| Linearizer::new(model).under(q, v, force).cloned();
+        let found = py.detach(|| self.with_friction(friction, work)).map_err(value)?;
         let Linearization { acceleration, by_q, by_v, by_force } = found;
         Ok([acceleration, by_q, by_v, by_force].map(|numbers| numbers.into_pyarray(py)).into())
     }
 
-    /// Motions from starts `(b, n)`.
+    /// Motions from starts `(b, n)`, under forces from outside and with their own friction, or not.
     #[allow(clippy::too_many_arguments)]
     fn rollout<'py>(
         &self,
@@ -464,23 +516,30 @@ impl Subject {
         times: (f64, f64, f64),
         method: &str,
         accuracy: (f64, f64, Option<f64>),
-        bounded: bool,
+        acting: (bool, bool),
+        forces: (Option<Samples>, Option<Py<PyAny>>),
         threads: usize,
     ) -> PyResult<Bound<'py, PyList>> {
         let (q, v) = self.states(&q, &v)?;
         let n = self.n();
-        let ((t0, t_end, dt), (rtol, atol, step)) = (times, accuracy);
+        let ((t0, t_end, dt), (rtol, atol, step), (bounded, friction)) = (times, accuracy, acting);
         let method: Integrator = serde_json::from_value(method.into()).map_err(value)?;
         let domain = match &self.kind {
             Kind::Model(header, ..) if bounded => Some(trained_on(header)),
             _ => None,
         };
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
-        let starts: Vec<_> = q.chunks(n).zip(v.chunks(n)).map(|(q, v)| (q.to_vec(), v.to_vec())).collect();
-        let model = self.moving();
+        let forces = Forces::of(n, (t0, t_end), forces.0, forces.1)?;
+        let starts = q.chunks(n).zip(v.chunks(n)).enumerate();
+        let starts: Vec<_> = starts.map(|(k, (q, v))| Start { q, v, force: forces.on(k) }).collect();
         let motions = whole(py, None, |watch| {
-            rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
+            self.with_friction(friction, |model| {
+                rollout_each(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
+            })
         })?;
+        if let Some(error) = forces.raised() {
+            return Err(error);
+        }
         let result = PyList::empty(py);
         for Rollout { trajectory, statistics, stop } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
@@ -536,10 +595,9 @@ impl Subject {
     ) -> PyResult<String> {
         let this = slf.get();
         this.require_free()?;
-        let (n, exact, units) = (this.n(), matches!(this.kind, Kind::System(..)), this.units());
-        let periodic = this.periodic();
+        let (n, exact) = (this.n(), this.is_exact());
         let region = this.region(this.interest(), region)?;
-        let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], region.position[i])).collect();
+        let charts = this.charts(&region);
         let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
         let names = &this.columns[..n];
         let tried = bases(names, &charts, degrees, exact);
@@ -657,7 +715,7 @@ impl Subject {
 
 impl Subject {
     /// Both arrays of states as slices.
-    fn states<'a>(
+    pub fn states<'a>(
         &self,
         q: &'a PyReadonlyArray2<'_, f64>,
         v: &'a PyReadonlyArray2<'_, f64>,

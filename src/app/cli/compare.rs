@@ -5,10 +5,7 @@ use crate::cli::probe::{Bound, Probe, bound};
 use crate::cli::source::parameter;
 use crate::cli::symmetries::degrees;
 use crate::cli::{CliError, number, output};
-use crate::findings::text_table;
-use crate::names::{WIDTH, number as digits, rounded, wrap_text};
-use crate::symmetry::{Comparison, Degrees, compare, unknowns};
-use serde::Serialize;
+use crate::symmetry::{ComparisonSummary, Degrees, compare, unknowns};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -46,16 +43,6 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Compared<'a> {
-    first: &'a str,
-    second: &'a str,
-    #[serde(flatten)]
-    comparison: &'a Comparison,
-    points: usize,
-    seed: u64,
-}
-
 /// Compares and prints.
 ///
 /// # Errors
@@ -76,54 +63,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     // On the mass shell of a system, rather than where a model says nothing.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
-    let compared = Compared { first: &args.first, second: &args.second, comparison: &found, points, seed: args.seed };
+    let [first, second] = [&args.first, &args.second].map(Clone::clone);
+    let compared = ComparisonSummary { first, second, comparison: found, points, seed: args.seed };
     if args.json || args.format == TableOrJson::Json {
         return output::print(&(serde_json::to_string(&compared).map_err(CliError::data)? + "\n"));
     }
-    output::print(&compared.text())
-}
-
-impl Compared<'_> {
-    fn text(&self) -> String {
-        let found = self.comparison;
-        let powers = found.factors.iter().enumerate().map(|(k, factor)| {
-            let power = if k == 0 { "B".to_string() } else { format!("B^{}", k + 1) };
-            format!("{} {power}", rounded(*factor, 6))
-        });
-        let (gauge, function) = match found.gauge_formula.as_str() {
-            "0" => ("", String::new()),
-            formula => (" + dF/dt", format!(", F = {formula}")),
-        };
-        let sign = if found.constant < 0.0 { "-" } else { "+" };
-        let text = format!(
-            "A = {}{gauge} {sign} {}{function}, the best fit at {} states\n",
-            powers.collect::<Vec<_>>().join(" + "),
-            rounded(found.constant.abs(), 6),
-            self.points
-        );
-        let shell =
-            "B is the same at all states: f is determined at this one value, mass matrices up to a part h p p^T\n";
-        let mut text = text + if found.on_shell { shell } else { "" };
-        if !found.group_factors.is_empty() {
-            let factors = found.group_factors.iter().map(|factor| rounded(*factor, 6)).collect::<Vec<_>>().join(", ");
-            text += &format!(
-                "decoupled coordinates have factors of their own, which no motion determines: B was first multiplied by {factors}\n"
-            );
-        }
-        if found.motionless_states > 0 {
-            text += &format!(
-                "one of the two is degenerate: at {} states its mass matrix is singular and does not determine the accelerations\n",
-                found.motionless_states
-            );
-        }
-        let rows = [
-            ("Lagrangian, after the fit", found.lagrangian),
-            ("motion, accelerations", found.motion),
-            ("mass matrix, after the fit", found.mass_matrix),
-            ("energy, after the fit", found.energy),
-        ];
-        let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
-        let rows: Vec<Vec<String>> = rows.iter().map(|(name, x)| vec![name.to_string(), distance(*x)]).collect();
-        format!("{}{}", wrap_text(&text, WIDTH), text_table(&["quantity", "relative distance"], &rows))
-    }
+    output::print(&compared.findings().to_string())
 }

@@ -51,7 +51,6 @@ mod run_args;
 mod run_list;
 mod runs;
 mod shadow;
-mod shadow_facts;
 mod shard;
 mod source;
 mod spool;

@@ -9,8 +9,7 @@ use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::names::unknown;
 use crate::network::file::MAX_COORDINATES;
 use crate::symmetry::{
-    Basis, Chart, Degrees, MOST_UNKNOWNS, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states,
-    most_symmetries, unknowns,
+    Basis, Chart, Degrees, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states, most_symmetries,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -195,26 +194,15 @@ impl Probe {
     /// # Errors
     /// A usage error if there are none.
     pub fn meet(&mut self, other: &mut Self) -> Result<(), CliError> {
-        let Region { position, velocity } = &mut self.region;
-        let ranges = position.iter_mut().chain(velocity);
-        let others = other.region.position.iter_mut().chain(&mut other.region.velocity);
-        for ((own, beside), name) in ranges.zip(others).zip(&self.columns) {
-            let both = [own[0].max(beside[0]), own[1].min(beside[1])];
-            // The velocity that a mass shell fixes has no bounds.
-            let both = match (own[0] < own[1], beside[0] < beside[1]) {
-                // Ranges that touch have nothing in common on which functions could be distinguished.
-                (true, true) if both[0] >= both[1] => {
-                    let [a, b] = [own, beside].map(|range| format!("{}:{}", range[0], range[1]));
-                    let problem =
-                        format_args!("{name}: the ranges {a} and {b} do not overlap; choose one with --region");
-                    return Err(CliError::usage(problem));
-                }
-                (true, true) => both,
-                (true, false) => *own,
-                _ => *beside,
-            };
-            (*own, *beside) = (both, both);
-        }
+        let both = self.region.meet(&other.region).map_err(|column| {
+            let name = &self.columns[column];
+            let [a, b] = [&self.region, &other.region].map(|region| {
+                let [low, high] = region.range(column);
+                format!("{low}:{high}")
+            });
+            CliError::usage(format_args!("{name}: the ranges {a} and {b} do not overlap; choose one with --region"))
+        })?;
+        (self.region, other.region) = (both.clone(), both);
         Ok(())
     }
 
@@ -244,17 +232,8 @@ impl Probe {
     /// # Errors
     /// A usage error for degrees of too many functions, which are not made.
     pub fn basis(&self, degrees: Option<Degrees>) -> Result<(Basis, Degrees), CliError> {
-        let charts = self.charts();
-        let Some(degrees) = degrees else { return Ok(Basis::usual(self.coordinates(), &charts)) };
-        let unknowns = unknowns(charts.len(), Basis::count(&charts, degrees));
-        if unknowns > MOST_UNKNOWNS {
-            let found =
-                if unknowns == usize::MAX { "more than can be counted".to_string() } else { unknowns.to_string() };
-            return Err(CliError::usage(format_args!(
-                "--basis: expected degrees with at most {MOST_UNKNOWNS} unknown coefficients, found {found}"
-            )));
-        }
-        Ok((Basis::new(self.coordinates(), &charts, degrees), degrees))
+        Basis::within(self.coordinates(), &self.charts(), degrees)
+            .map_err(|problem| CliError::usage(format_args!("--basis: {problem}")))
     }
 
     /// Number of states that are examined for so many unknown coefficients: as requested, or the usual one, as far as there is room.

@@ -4,20 +4,18 @@ use crate::cli::files::OutputFile;
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::number::{number, thread_count, threads, weight, whole};
 use crate::cli::progress::Progress;
-use crate::cli::shadow_facts::{Facts, View};
 use crate::cli::source::{Source, parameter};
 use crate::cli::{CliError, interrupt, system_arg};
-use crate::lagrangian::{EulerLagrange, Interruptible, MechanicsError};
+use crate::lagrangian::{EulerLagrange, MechanicsError};
 use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
 use crate::relativity::{
-    Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, TwoSided, difference_image,
-    outline, shadow, time_moves_alone,
+    Camera, Chart, MOST_PIXELS, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, picture,
+    time_moves_alone, views,
 };
 use crate::report::png;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 /// Distances that a camera and the sky may have, in the unit of the coordinates.
 const NEAREST: f64 = 1e-12;
@@ -241,47 +239,23 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let rays = rays as u64;
         progress.advance(done.fetch_add(rays, Ordering::Relaxed) + rays);
     };
-    let mut views = Vec::new();
-    for (name, model) in &models {
-        if stop.load(Ordering::Relaxed) {
-            break;
-        }
-        progress.say(name);
-        let began = Instant::now();
-        let model = Interruptible::new(&**model, &stop);
-        let shadow = shadow(&model, &camera, &tracing, &advance).map_err(refused)?;
-        let seconds = began.elapsed().as_secs_f64();
-        let edge = match args.edges {
-            0 => Ok(None),
-            edges => outline(&model, &camera, &tracing, edges),
-        };
-        // An edge between rays that were not followed does not count.
-        let outline = if stop.load(Ordering::Relaxed) { None } else { edge.map_err(refused)? };
-        views.push(View { name, shadow, outline, seconds });
-    }
+    let metrics: Vec<_> = models.iter().map(|(name, model)| (*name, &**model)).collect();
+    let found = views(&metrics, (&camera, &tracing, args.edges), &stop, &|name| progress.say(name), &advance);
+    let views = found.map_err(refused)?;
     drop(progress);
     let interrupted = stop.load(Ordering::Relaxed);
 
-    let sky = Sky::around(&camera);
-    let mut images: Vec<Image> = views.iter().map(|view| sky.image(&view.shadow)).collect();
-    if let [exact, learned] = views.as_slice() {
-        images.push(difference_image(&exact.shadow, &learned.shadow).map_err(refused)?);
-    }
-    let picture = png(&Image::beside(&images, GAP));
-    out.write(&picture)?;
+    out.write(&png(&picture(&camera, &views).map_err(refused)?))?;
     let alone = |model: &dyn EulerLagrange<f64>| time_moves_alone(model, camera.chart, camera.distance);
-    let facts = Facts {
-        system: &system,
-        unit: unit.as_deref(),
-        camera: &camera,
-        distance: args.distance,
-        far: args.far(),
-        tracing: &tracing,
-        views: &views,
-        free_factor: args.model.is_some() && models.iter().any(|(_, model)| alone(&**model)),
+    let free_factor = args.model.is_some() && models.iter().any(|(_, model)| alone(&**model));
+    let summary = ShadowSummary::of((&system, unit.as_deref()), (&camera, &tracing), &views, free_factor);
+    // A wormhole has radial coordinates.
+    let summary = ShadowSummary { distance: args.distance, far: args.far(), ..summary.map_err(refused)? };
+    let text = match args.json {
+        true => serde_json::to_string(&summary).map_err(CliError::data)? + "\n",
+        false => summary.findings(Some(&args.out.display().to_string())).to_string(),
     };
-    let text = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
-    OutputFile::print(Some(out), &text.map_err(refused)?)?;
+    OutputFile::print(Some(out), &text)?;
     if interrupted {
         let done: usize = views.iter().map(|view| view.shadow.finished()).sum();
         let (rays, place) = (pluralize(pixels, "ray", "rays"), args.out.display());
@@ -296,8 +270,6 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 const FAR: f64 = 100.0;
 /// The same of a learned one, which was trained that far.
 const LEARNED_FAR: f64 = 2.0;
-/// White columns between pictures.
-const GAP: usize = 8;
 
 /// An error with the option that helps.
 fn refused(error: RelativityError) -> CliError {

@@ -8,7 +8,7 @@ use crate::cli::{CliError, train_config};
 use crate::configuration::Config;
 use crate::experiments::{Choice, Variation, combinations, sweep_runs};
 use crate::names::pluralize;
-use crate::pipeline::Experiment;
+use crate::pipeline::Sweep;
 use clap::Parser;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -50,19 +50,6 @@ pub struct Args {
     /// One JSON object per line instead of tables.
     #[arg(long)]
     json: bool,
-}
-
-/// An experiment whose runs the user chooses.
-struct Sweep;
-
-impl Experiment for Sweep {
-    fn name(&self) -> &str {
-        "sweep"
-    }
-
-    fn title(&self) -> &str {
-        "Sweep over configurations"
-    }
 }
 
 /// Trains every combination, or a share of them, lists them, or makes tables of what is finished.

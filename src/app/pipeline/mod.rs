@@ -79,6 +79,7 @@ mod prepared_fit;
 mod report_files;
 mod run_table;
 mod start;
+mod sweep;
 mod tables;
 mod time_steps;
 mod train;
@@ -134,6 +135,7 @@ pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, Proven
 pub use prepared_fit::PreparedFit;
 #[doc(hidden)]
 pub use start::StartModel;
+pub use sweep::{Sweep, Swept, sweep};
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
 #[doc(hidden)]
 pub use watch::EventSink;

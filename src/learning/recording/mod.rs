@@ -54,4 +54,4 @@ pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
-pub(crate) use units::factor;
+pub use units::factor;

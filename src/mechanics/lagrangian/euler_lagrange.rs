@@ -150,7 +150,7 @@ impl<S: Scalar> Terms<S> {
     ///
     /// # Errors
     /// [`MechanicsError`] naming the first row whose force is not finite or whose mass matrix is singular.
-    pub(crate) fn add_force(
+    pub fn add_force(
         &mut self,
         n: usize,
         v: &[S],

@@ -88,7 +88,7 @@ pub use terms::{EulerLagrange, Request, Terms};
 pub use torques::Torques;
 #[doc(hidden)]
 pub use wrappers::Interruptible;
-pub use wrappers::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
+pub use wrappers::{Dissipation, Frictionless, GeneralizedForce, Rayleigh, WithForces};
 
 use crate::scalar::Real;
 use constrained_systems::{constrained_description, constrained_descriptions};

@@ -174,6 +174,37 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
     }
 }
 
+/// A model without its own friction: `M a = g - c + Q` with `Q = 0`, for what a motion would be, or what its torques would be, if nothing rubbed.
+///
+/// Its linearization is that of a type of yours: by differences.
+#[derive(Clone, Copy)]
+pub struct Frictionless<'a, S>(
+    /// The model.
+    pub &'a dyn EulerLagrange<S>,
+);
+
+impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
+    fn coordinates(&self) -> usize {
+        self.0.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let outcome = self.0.terms(q, v, request.without_solution(), terms);
+        let found = terms.drain_failures(outcome)?;
+        terms.force.clear();
+        terms.dissipation.clear();
+        terms.complete_beside(found, self.coordinates(), v, request)
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(self.0)
+    }
+
+    fn conserves_energy(&self) -> bool {
+        true
+    }
+}
+
 /// Wraps a model so that a flag ends its motion: once the flag is raised, every evaluation fails with [`MechanicsError::Interrupted`].
 /// The energy of given states is still returned.
 pub struct Interruptible<'a, S> {
@@ -234,6 +265,22 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
 mod tests {
     use super::*;
     use crate::lagrangian::configure;
+
+    #[test]
+    fn a_model_without_its_friction_moves_as_the_bare_one() {
+        let model = || configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
+        let friction = |_: &[f64], v: &[f64], force: &mut [f64]| {
+            force.iter_mut().zip(v).for_each(|(force, v)| *force = -0.5 * v);
+        };
+        let (q, v) = ([0.3, 0.1], [1.0, 3.0]);
+        let (mut free, mut bare) = (Terms::default(), Terms::default());
+        model().terms(&q, &v, Request::ALL, &mut free).unwrap();
+        let damped = WithForces::new(model(), friction);
+        let frictionless = Frictionless(&damped);
+        frictionless.terms(&q, &v, Request::ALL, &mut bare).unwrap();
+        assert_eq!((&bare.acceleration, &bare.energy), (&free.acceleration, &free.energy));
+        assert!(bare.force.is_empty() && bare.dissipation.is_empty() && frictionless.conserves_energy());
+    }
 
     #[test]
     fn forces_move_and_take_power() {

@@ -29,6 +29,7 @@ mod orbits;
 mod rays;
 #[cfg(feature = "training")]
 mod readings;
+mod says;
 mod shadow;
 mod sky;
 mod two_sided;
@@ -49,6 +50,7 @@ pub use rays::{TOLERANCES, Tracing, trace};
 #[cfg(feature = "training")]
 #[doc(hidden)]
 pub use readings::{LearnedHole, Reading, nearest_parameters};
+pub use says::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary, picture, views};
 #[doc(hidden)]
 pub use shadow::Difference;
 pub use shadow::{Edge, Outline, Shadow, outline, shadow};

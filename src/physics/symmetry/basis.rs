@@ -327,6 +327,22 @@ impl Basis {
         (Self::new(names, charts, degrees), degrees)
     }
 
+    /// Functions up to these degrees, which are not made if they are too many, or the usual ones of the charts, with their degrees.
+    ///
+    /// # Errors
+    /// What was expected.
+    pub fn within(names: &[String], charts: &[Chart], degrees: Option<Degrees>) -> Result<(Self, Degrees), String> {
+        let Some(degrees) = degrees else { return Ok(Self::usual(names, charts)) };
+        let unknowns = unknowns(charts.len(), Self::count(charts, degrees));
+        if unknowns > MOST_UNKNOWNS {
+            let found =
+                if unknowns == usize::MAX { "more than can be counted".to_string() } else { unknowns.to_string() };
+            let expected = format!("expected degrees with at most {MOST_UNKNOWNS} unknown coefficients, found {found}");
+            return Err(expected);
+        }
+        Ok((Self::new(names, charts, degrees), degrees))
+    }
+
     /// The functions that do not depend on these coordinates, times each of the two first harmonics of the coordinate `angle`,
     /// if one is given.
     #[must_use]

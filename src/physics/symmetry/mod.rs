@@ -66,7 +66,7 @@ pub use null_space::{Separation, bases, enough, most_symmetries};
 #[doc(hidden)]
 pub use sample::middle;
 pub use sample::{Invariant, Region};
-pub use says::{QuadraticSummary, SymmetrySummary};
+pub use says::{ComparisonSummary, QuadraticSummary, SymmetrySummary};
 
 use crate::lagrangian::MechanicsError;
 

@@ -249,6 +249,32 @@ pub struct Region {
 const REFUSED: usize = 100;
 
 impl Region {
+    /// The range of a column, coordinates before velocities.
+    pub(crate) fn range(&self, column: usize) -> [f64; 2] {
+        let n = self.position.len();
+        if column < n { self.position[column] } else { self.velocity[column - n] }
+    }
+
+    /// The states of both regions, of as many coordinates; a range without width is no bound, such as that of a velocity that a mass shell fixes.
+    ///
+    /// # Errors
+    /// The first column whose ranges have nothing in common, or a single number, on which no functions could be distinguished.
+    pub fn meet(&self, other: &Self) -> Result<Self, usize> {
+        let mut both = self.clone();
+        let ranges = both.position.iter_mut().chain(&mut both.velocity);
+        for (column, range) in ranges.enumerate() {
+            let ([low, high], beside) = (*range, other.range(column));
+            let common = [low.max(beside[0]), high.min(beside[1])];
+            match (low < high, beside[0] < beside[1]) {
+                (true, true) if common[0] >= common[1] => return Err(column),
+                (true, true) => *range = common,
+                (true, false) => {}
+                _ => *range = beside,
+            }
+        }
+        Ok(both)
+    }
+
     /// Coordinates and velocities `(states, n)`, uniform in the box, the same for the same seed.
     ///
     /// `accept` may change a velocity, such as the one that a mass shell fixes, and refuses a state by `false`; the result is

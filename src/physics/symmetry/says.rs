@@ -1,8 +1,8 @@
-//! Report of symmetries.
+//! Reports of symmetries and of comparisons.
 
-use super::{Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
+use super::{Comparison, Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
-use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
+use crate::names::{WIDTH, number as digits, pluralize, rounded, wrap_text};
 use serde::{Serialize, Serializer};
 
 /// Singular values that are shown beyond the gap, and at most.
@@ -234,5 +234,78 @@ impl QuadraticSummary {
                 findings.line(wrap_text(&text, WIDTH).trim_end())
             }
         };
+    }
+}
+
+/// A comparison of two Lagrangians by name, at states drawn by a seed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ComparisonSummary {
+    /// Name of `A`.
+    pub first: String,
+    /// Name of `B`.
+    pub second: String,
+    /// What they have in common.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+    /// States that were examined.
+    pub points: usize,
+    /// Seed of the states.
+    pub seed: u64,
+}
+
+impl ComparisonSummary {
+    /// The best fit of `A` by `B`, and the distances that it leaves.
+    pub fn findings(&self) -> Findings {
+        let found = &self.comparison;
+        let mut findings = Findings::default();
+        findings.lines(self.fit().iter().map(|line| wrap_text(line, WIDTH).trim_end().to_string()));
+        let rows = [
+            ("Lagrangian, after the fit", found.lagrangian),
+            ("motion, accelerations", found.motion),
+            ("mass matrix, after the fit", found.mass_matrix),
+            ("energy, after the fit", found.energy),
+        ];
+        let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
+        findings
+            .table(&["quantity", "relative distance"], rows.iter().map(|(name, x)| [name.to_string(), distance(*x)]));
+        findings
+    }
+
+    /// The fit, and what it does not determine, a sentence each.
+    fn fit(&self) -> Vec<String> {
+        let found = &self.comparison;
+        let powers = found.factors.iter().enumerate().map(|(k, factor)| {
+            let power = if k == 0 { "B".to_string() } else { format!("B^{}", k + 1) };
+            format!("{} {power}", rounded(*factor, 6))
+        });
+        let (gauge, function) = match found.gauge_formula.as_str() {
+            "0" => ("", String::new()),
+            formula => (" + dF/dt", format!(", F = {formula}")),
+        };
+        let sign = if found.constant < 0.0 { "-" } else { "+" };
+        let mut lines = vec![format!(
+            "A = {}{gauge} {sign} {}{function}, the best fit at {} states",
+            powers.collect::<Vec<_>>().join(" + "),
+            rounded(found.constant.abs(), 6),
+            self.points
+        )];
+        if found.on_shell {
+            let shell =
+                "B is the same at all states: f is determined at this one value, mass matrices up to a part h p p^T";
+            lines.push(shell.to_string());
+        }
+        if !found.group_factors.is_empty() {
+            let factors = found.group_factors.iter().map(|factor| rounded(*factor, 6)).collect::<Vec<_>>().join(", ");
+            lines.push(format!(
+                "decoupled coordinates have factors of their own, which no motion determines: B was first multiplied by {factors}"
+            ));
+        }
+        if found.motionless_states > 0 {
+            lines.push(format!(
+                "one of the two is degenerate: at {} states its mass matrix is singular and does not determine the accelerations",
+                found.motionless_states
+            ));
+        }
+        lines
     }
 }

@@ -1,0 +1,111 @@
+//! The shadow of a black hole before the sky, through a metric written down or learned.
+
+use crate::attend::whole;
+use crate::errors::value;
+use crate::readings::shown;
+use crate::subject::Subject;
+use lnn::pipeline::Event;
+use lnn::relativity::{
+    Camera, Chart, MOST_PIXELS, NamedMetric, Observer, ShadowSummary, Tracing, picture, time_moves_alone, views,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Distance of the sky of an exact metric over that of the camera.
+const FAR: f64 = 100.0;
+
+/// The camera and its rays; angles in degrees.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Choices {
+    time: String,
+    space: Vec<String>,
+    distance: f64,
+    inclination: f64,
+    azimuth: f64,
+    falls: bool,
+    field_of_view: f64,
+    width: usize,
+    height: usize,
+    far: Option<f64>,
+    tolerance: f64,
+    edges: usize,
+    threads: usize,
+}
+
+impl Choices {
+    fn chart(&self, coordinates: &[String]) -> PyResult<Chart> {
+        let place = |what: &str, name: &String| {
+            let found = coordinates.iter().position(|coordinate| coordinate == name);
+            found.ok_or_else(|| value(format_args!("{what}: no coordinate {name:?} among {coordinates:?}")))
+        };
+        let [x, y, z] = self.space.as_slice() else {
+            return Err(value(format_args!("space: expected three names, found {}", self.space.len())));
+        };
+        Ok(Chart {
+            time: place("time", &self.time)?,
+            space: [place("space", x)?, place("space", y)?, place("space", z)?],
+        })
+    }
+
+    fn camera(&self, chart: Chart) -> Camera {
+        Camera {
+            chart,
+            azimuth: self.azimuth.to_radians(),
+            observer: if self.falls { Observer::Normal } else { Observer::Rest },
+            field_of_view: self.field_of_view.to_radians(),
+            width: self.width,
+            height: self.height,
+            ..Camera::new(self.distance, self.inclination.to_radians())
+        }
+    }
+}
+
+/// A picture through metrics, the exact one, a learned one or both: figures as JSON, pixels of red, green and blue, rows and columns.
+#[pyfunction]
+pub fn shadow<'py>(
+    py: Python<'py>,
+    exact: Option<&Subject>,
+    learned: Option<&Subject>,
+    choices: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, Bound<'py, PyBytes>, (usize, usize))> {
+    let choices: Choices = serde_json::from_str(choices).map_err(value)?;
+    let subjects: Vec<(&'static str, &Subject)> =
+        [("exact", exact), ("learned", learned)].into_iter().filter_map(|(name, one)| Some((name, one?))).collect();
+    let Some((_, last)) = subjects.last() else { return Err(value("expected a system, a model, or both")) };
+    subjects.iter().try_for_each(|(_, subject)| subject.require_free())?;
+    if let Some((_, other)) = subjects.iter().find(|(_, subject)| subject.columns != last.columns) {
+        return Err(value(format_args!(
+            "expected metrics of the same columns, found {:?} and {:?}",
+            other.columns, last.columns
+        )));
+    }
+    let camera = choices.camera(choices.chart(&last.columns[..last.columns.len() / 2])?);
+    let mut tracing = Tracing { tolerance: choices.tolerance, threads: choices.threads, ..Tracing::of(&camera) };
+    let usual = if learned.is_none() { FAR * camera.distance } else { tracing.far };
+    tracing.far = choices.far.unwrap_or(usual);
+    let pixels = camera.width.saturating_mul(camera.height);
+    if !(1..=MOST_PIXELS).contains(&pixels) {
+        return Err(value(format_args!("width, height: expected 1 to {MOST_PIXELS} pixels together, found {pixels}")));
+    }
+    let unit = exact.or(learned).and_then(Subject::time_unit);
+    let metrics: Vec<NamedMetric<'_>> = subjects.iter().map(|(name, subject)| (*name, subject.moving())).collect();
+    let (total, done) = (pixels * metrics.len(), AtomicUsize::new(0));
+    let (json, image) = whole(py, progress.as_ref(), |watch| {
+        let advance = |rays: usize| {
+            let done = done.fetch_add(rays, Ordering::Relaxed) + rays;
+            if let Some(events) = &watch.events {
+                events(Event::Step { done, total });
+            }
+        };
+        let looking = (&camera, &tracing, choices.edges);
+        let views = views(&metrics, looking, &watch.interrupt, &|_| (), &advance).map_err(value)?;
+        let free = metrics.iter().any(|(_, model)| time_moves_alone(*model, camera.chart, camera.distance));
+        let about = (last.name(), unit.as_deref());
+        let summary = ShadowSummary::of(about, (&camera, &tracing), &views, free && learned.is_some()).map_err(value)?;
+        Ok::<_, PyErr>((shown(&summary, &summary.findings(None))?, picture(&camera, &views).map_err(value)?))
+    })??;
+    Ok((json, PyBytes::new(py, image.pixels.as_flattened()), (image.height, image.width)))
+}

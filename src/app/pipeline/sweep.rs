@@ -1,0 +1,54 @@
+//! Sweeps: trainings of several configurations, collected in tables.
+
+use crate::configuration::Config;
+use crate::experiments::{Choice, sweep_runs};
+use crate::pipeline::{Experiment, ExperimentDirectory, KeptRecord, PipelineError, Watch, kept_record, run_experiment};
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// An experiment whose runs the user chooses.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep;
+
+impl Experiment for Sweep {
+    fn name(&self) -> &str {
+        "sweep"
+    }
+
+    fn title(&self) -> &str {
+        "Sweep over configurations"
+    }
+}
+
+/// The table of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swept {
+    /// One object for each choice, as in `table.csv`.
+    pub rows: Vec<Map<String, Value>>,
+    /// Runs that are finished.
+    pub finished: usize,
+    /// Headline and tables for a terminal.
+    pub text: String,
+}
+
+/// Trains every configuration, each with so many seeds from its own on, as many at a time as there are threads, into directories of their own
+/// below `path`; finished runs are not run again. Table and report of all of them are written there.
+///
+/// # Errors
+/// [`PipelineError::Taken`] for a finished run of another configuration unless `overwrite` is set; files that cannot be written, an
+/// interruption. Runs that are finished stay finished.
+pub fn sweep(
+    configurations: Vec<(Choice, Config)>,
+    (seeds, threads): (usize, usize),
+    (path, overwrite): (&Path, bool),
+    watch: &Watch,
+) -> Result<Swept, PipelineError> {
+    let (runs, store) = (sweep_runs(configurations, seeds), ExperimentDirectory::new(path));
+    for run in runs.iter().filter(|_| !overwrite) {
+        if matches!(kept_record(&store, run)?, KeptRecord::OtherConfiguration) {
+            return Err(PipelineError::Taken { path: path.to_path_buf(), name: run.name.clone() });
+        }
+    }
+    let done = run_experiment(&Sweep, runs, threads, &store, watch)?;
+    Ok(Swept { rows: done.table.objects(), finished: done.finished, text: done.text().to_string() })
+}
