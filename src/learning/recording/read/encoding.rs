@@ -6,14 +6,16 @@ use std::io::{self, Read};
 
 /// Encoding of a text file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub enum Encoding {
     /// UTF-8, of which ASCII is a part.
     #[default]
+    #[serde(rename = "utf-8")]
     Utf8,
     /// UTF-16 behind a byte order mark, as of Excel's "Unicode text".
+    #[serde(rename = "utf-16")]
     Utf16,
     /// Windows-1252, of which the printable part of Latin-1 is a part.
+    #[serde(rename = "windows-1252")]
     Windows1252,
 }
 
