@@ -3,10 +3,10 @@
 use crate::attend::left;
 use crate::errors::{runtime, value};
 use crate::readings::shown;
-use crate::subject::Subject;
+use crate::subject::{Subject, degrees_of};
 use lnn::geometry::{Change, surfaces};
 use lnn::lagrangian::Interruptible;
-use lnn::symmetry::{Basis, ComparisonSummary, Degrees, compare, enough, most_states, unknowns};
+use lnn::symmetry::{Basis, ComparisonSummary, compare, enough, most_states, unknowns};
 use pyo3::prelude::*;
 
 /// What two Lagrangians of the same coordinates have in common beyond factor and gauge, as JSON.
@@ -34,7 +34,7 @@ pub fn compare_lagrangians(
     let region = a.region(both, region)?;
     let charts = a.charts(&region);
     let names = &a.columns[..n];
-    let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
+    let degrees = degrees.map(degrees_of).transpose()?;
     let basis = Basis::within(names, &charts, degrees);
     let (basis, _) = basis.map_err(|problem| value(format_args!("basis: {problem}")))?;
     let most = most_states(n, unknowns(n, basis.len()));

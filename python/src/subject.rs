@@ -598,7 +598,7 @@ impl Subject {
         let (n, exact) = (this.n(), this.is_exact());
         let region = this.region(this.interest(), region)?;
         let charts = this.charts(&region);
-        let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
+        let degrees: Option<Degrees> = degrees.map(degrees_of).transpose()?;
         let names = &this.columns[..n];
         let tried = bases(names, &charts, degrees, exact);
         let most = tried.iter().map(|(basis, _)| unknowns(n, basis.len())).max().unwrap_or(0);
@@ -732,6 +732,14 @@ impl Subject {
         }
         Ok((slice(q)?, slice(v)?))
     }
+}
+
+/// Degrees of the functions of a basis.
+///
+/// # Errors
+/// `ValueError` for a text that is none.
+pub fn degrees_of(text: &str) -> PyResult<Degrees> {
+    text.parse().map_err(|problem: String| value(format_args!("basis: {problem}")))
 }
 
 /// The numbers of an array, row by row.

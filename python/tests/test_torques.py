@@ -19,7 +19,6 @@ def arm():
 @pytest.fixture(scope="module")
 def robot():
     """Seven joints with masses and friction."""
-    values = {"friction": {}}
     system = lnn.System.from_toml(ROOT / "examples/systems/seven_joints.toml")
     values = {f"m{k}": 2.0 for k in range(1, 8)} | {f"Fv{k}": 0.5 for k in range(1, 8)}
     values |= {f"I{axis}{k}": 0.05 for k in range(1, 8) for axis in ("xx", "yy", "zz")}
