@@ -148,7 +148,7 @@ mod tests {
             ("lnn train x --epochs -1", &["--epochs", "-1", "1 to 16777216"]),
             ("lnn train x --seed", &["--seed", "value"]),
             ("lnn evaluate m --rtol 1e-30", &["--rtol", "1e-30", "2e-15"]),
-            ("lnn check data.csv", &["--coords"]),
+            ("lnn check", &["DATA"]),
             ("lnn sweep small.toml --seds 3", &["--seds", "--seeds"]),
             ("lnn check d --coords x --rate 5 --time t", &["--rate", "--time"]),
         ] {

@@ -86,7 +86,7 @@ fn degrees_and_milliseconds_are_seen() {
 #[test]
 fn a_circle_has_two_coordinates() {
     // The position y is minus the derivative of x, and x the derivative of y.
-    for header in ["t,x,y", "t,a1,b1"] {
+    for header in ["t,x,y", "t,c1,b1"] {
         let text = rows(header, 700, |t| vec![t, t.cos(), t.sin()]);
         assert_eq!(of(&text, &Columns::default()).unwrap().columns.coords.len(), 2, "{header}");
     }
