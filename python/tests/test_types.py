@@ -17,6 +17,9 @@ system = lnn.System("kepler", mu=2)
 learned = lnn.train(system, epochs=1)
 motion: lnn.Trajectory = learned.model.rollout([1.0, 0.0], np.zeros(2), 1.0, 0.1)
 error: float | None = lnn.identify(motion.q, system, dt=0.1).constants["mu"].standard_error
+torque = system.inverse_dynamics([1.0, 0.0], [0.0, 1.0], [0.0, 0.0]).external
+driven = system.rollout([1.0, 0.0], [0.0, 1.0], 1.0, 0.1, force=lambda t, q, v: -0.1 * v, friction=False)
+look: str = lnn.check(motion.q, dt=0.1, units={"q1": "mm"}).next
 wrong: int = system.name
 system.terms([1.0, 0.0], [0.0, 1.0], treads=2)
 """
@@ -35,7 +38,7 @@ def test_the_package_is_typed(tmp_path):
     (tmp_path / "use.py").write_text(USE)
     status, text = run("mypy", *cache, tmp_path / "use.py", cwd=tmp_path)
     found = [line for line in text.splitlines() if "error:" in line]
-    assert status == 1 and len(found) == 2 and "use.py:9" in found[0] and "use.py:10" in found[1] and "treads" in found[1], text
+    assert status == 1 and len(found) == 2 and "use.py:12" in found[0] and "use.py:13" in found[1] and "treads" in found[1], text
 
 
 def test_stubs_are_those_of_the_extension():

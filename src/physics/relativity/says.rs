@@ -232,13 +232,14 @@ impl ShadowSummary {
     pub fn findings(&self, place: Option<&str>) -> Findings {
         let mut findings = Findings::default();
         let unit = self.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
-        findings.line(format!(
+        let seen = format!(
             "{}, seen from {}{unit} at {} degrees from the axis{}",
             self.system,
             rounded(self.distance, 4),
             rounded(self.inclination, 4),
             place.map_or(String::new(), |place| format!(": {place}"))
-        ));
+        );
+        findings.line(wrap_text(&seen, WIDTH).trim_end());
         let headers: Vec<&str> = std::iter::once("").chain(self.views.keys().copied()).collect();
         findings.gap().table(&headers, self.rows(&unit));
         if let Some(found) = &self.difference {

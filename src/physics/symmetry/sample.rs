@@ -314,3 +314,20 @@ pub fn middle([low, high]: [f64; 2]) -> [f64; 2] {
     let (middle, half) = (0.5 * (low + high), 0.5 * INNER * (high - low));
     [middle - half, middle + half]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_meet_where_both_are() {
+        let region =
+            |position: [f64; 2], velocity: [f64; 2]| Region { position: vec![position], velocity: vec![velocity] };
+        let (wide, free) = (region([0.0, 4.0], [-1.0, 1.0]), region([2.0, 6.0], [0.0, 0.0]));
+        // A velocity that a mass shell fixes is bounded by the other region.
+        assert_eq!(wide.meet(&free), Ok(region([2.0, 4.0], [-1.0, 1.0])));
+        assert_eq!(free.meet(&wide), wide.meet(&free));
+        assert_eq!(wide.meet(&region([4.0, 5.0], [-1.0, 1.0])), Err(0));
+        assert_eq!(wide.meet(&region([0.0, 4.0], [2.0, 3.0])), Err(1));
+    }
+}
