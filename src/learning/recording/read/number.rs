@@ -23,35 +23,38 @@ impl Numbers {
     #[inline]
     pub fn parse(&mut self, field: &[u8], row: u64) -> Option<f64> {
         let text = std::str::from_utf8(field).ok()?;
-        if self.point.is_some()
-            && let Ok(x) = text.parse::<f64>()
-            && x.is_finite()
-        {
-            return Some(x);
-        }
-        self.parse_any(unquoted(text), row)
-    }
-
-    /// The same whatever is known.
-    fn parse_any(&mut self, text: &str, row: u64) -> Option<f64> {
-        if self.comma.is_none()
-            && let Ok(x) = text.parse::<f64>()
-        {
-            if text.contains('.') {
-                self.point.get_or_insert(row);
+        match self.parse_point(text, row) {
+            None => {
+                let text = unquoted(text);
+                self.parse_point(text, row).or_else(|| self.parse_comma(text, row))
             }
-            return Some(x).filter(|x| x.is_finite());
+            number => number,
         }
-        if self.point.is_none() { self.parse_comma(text, row) } else { None }
     }
 
-    /// A number without a decimal point.
+    /// A number without a decimal comma.
+    #[inline]
+    fn parse_point(&mut self, text: &str, row: u64) -> Option<f64> {
+        if self.comma.is_some() {
+            return None;
+        }
+        let number = text.parse().ok().filter(|x: &f64| x.is_finite())?;
+        if self.point.is_none() && text.contains('.') {
+            self.point = Some(row);
+        }
+        Some(number)
+    }
+
+    /// A number without a decimal point, where there has been none.
     fn parse_comma(&mut self, text: &str, row: u64) -> Option<f64> {
+        if self.point.is_some() || text.contains('.') {
+            return None;
+        }
         let number = with_point(text);
         if number.is_some() {
             self.comma.get_or_insert(row);
         }
-        number.or_else(|| if text.contains('.') { None } else { text.parse().ok() }).filter(|x| x.is_finite())
+        number.or_else(|| text.parse().ok()).filter(|x| x.is_finite())
     }
 
     /// Why a field is no number.
