@@ -72,7 +72,11 @@ fn a_bob_in_a_tracker_s_table_is_learned_under_its_rod() {
     }
     let file = folder.file("bob.tsv", text);
     let (check, fit) = first_run(&folder, &[&file], &["--json"]);
-    assert!(check.stdout.contains("--trajectory trial") && check.stdout.contains("--constraints find"), "{}", check.stdout);
+    assert!(
+        check.stdout.contains("--trajectory trial") && check.stdout.contains("--constraints find"),
+        "{}",
+        check.stdout
+    );
     assert!(serde_json::from_str::<serde_json::Value>(&fit.stdout).is_ok());
 }
 

@@ -12,6 +12,8 @@ use std::path::Path;
 const SAMPLES: usize = 4000;
 /// Rows between the samples of a difference; of noisy positions longer ones show more.
 const REACHES: [usize; 5] = [1, 2, 4, 8, 16];
+/// Difference of correlations that counts as none.
+const EQUAL: f64 = 1e-3;
 /// Smallest correlation with the derivative of a position, for a column whose name says velocity and for any other.
 const NAMED: f64 = 0.8;
 const UNNAMED: f64 = 0.995;
@@ -248,7 +250,10 @@ impl Roles<'_> {
             }
             (xx > 0.0 && yy > 0.0).then(|| (xy / (xx * yy).sqrt(), xy / xx))
         };
-        REACHES.iter().filter_map(|&reach| compared(reach)).max_by(|a, b| a.0.total_cmp(&b.0))
+        let found: Vec<(f64, f64)> = REACHES.iter().filter_map(|&reach| compared(reach)).collect();
+        let most = found.iter().map(|(correlation, _)| *correlation).fold(f64::NEG_INFINITY, f64::max);
+        // Of differences that show as much, the shortest, which are nearest to the derivative.
+        found.into_iter().find(|(correlation, _)| *correlation >= most - EQUAL)
     }
 
     /// Takes what is left as coordinates; beside positions whose velocities were measured, only what a name tells.
