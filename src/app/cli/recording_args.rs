@@ -51,7 +51,8 @@ pub struct RecordingArgs {
 
 /// Dashes for a contradiction that begins with an option's name without them.
 fn option(problem: &str) -> &'static str {
-    let options = ["velocity:", "acceleration:", "force:", "error:", "periodic:", "units:", "rate:", "columns:"];
+    let options =
+        ["coords:", "velocity:", "acceleration:", "force:", "error:", "periodic:", "units:", "rate:", "columns:"];
     if options.iter().any(|name| problem.starts_with(name)) { "--" } else { "" }
 }
 

@@ -205,7 +205,7 @@ fn bad_files_are_refused() {
 #[test]
 fn what_is_recognised_in_a_file_is_told() {
     let folder = Folder::new();
-    let german = csv("Zeit [s],Weg x [cm],Winkel (°)", &swing(200, 1)).replace(',', ";").replace('.', ",");
+    let german = csv("Zeit [s],Weg x [cm],Winkel (°)", &swing(1500, 1)).replace(',', ";").replace('.', ",");
     let file = folder.file("german.csv", german);
     let columns = ["--coords", "Weg x [cm],Winkel", "--time", "Zeit", "--periodic", "Winkel"];
     let found = survey(&[&file], &columns);

@@ -141,7 +141,7 @@ fn a_motion_is_rolled_out_under_recorded_torques() {
     let balance = said.lines().nth(1).unwrap();
     assert!(balance.contains("forces added ") && balance.contains("friction removed 0,"), "{said}");
     let (without, said) = roll(&[]);
-    assert!(without > 2.0 * error && said.lines().count() == 1, "{without} {error} {said}");
+    assert!(without > 2.0 * error && !said.contains("forces added"), "{without} {error} {said}");
     let units = ["--force", &milli, "--force-time", "clock", "--force-units", "clock=ms,shoulder=mN,lower_force=1e-3"];
     let (same, _) = roll(&units);
     assert!((same - error).abs() < 1e-6, "{same} {error}");
