@@ -66,9 +66,8 @@ impl<M: EulerLagrange<f64>> TwoSided<M> {
         (q[self.space[0]], q[self.space[1]]) = (radius, FRAC_PI_2);
         let mut terms = Terms::default();
         let refused = RelativityError::OneSided { radius };
-        match self.model.terms(&q, &[0.0; 4], Request::MASS_MATRIX, &mut terms) {
-            Err(MechanicsError::Interrupted) => return Err(MechanicsError::Interrupted.into()),
-            Ok(()) | Err(_) => {}
+        if let Err(MechanicsError::Interrupted) = self.model.terms(&q, &[0.0; 4], Request::MASS_MATRIX, &mut terms) {
+            return Err(MechanicsError::Interrupted.into());
         }
         let metric = Metric::new(4, &terms.mass_matrix).map_err(|_| refused.clone())?;
         let signs = (metric.signature.negative, metric.signature.positive);
