@@ -22,7 +22,7 @@ impl Called {
         let found = Python::attach(|py| {
             let [q, v] = [q, v].map(|x| PyArray1::from_slice(py, x));
             let found = self.function.call1(py, (t, q, v))?;
-            let found: PyReadonlyArray1<'_, f64> = found.extract(py).map_err(PyErr::from)?;
+            let found: PyReadonlyArray1<'_, f64> = found.extract(py)?;
             Ok::<_, PyErr>(found.as_slice().map_err(value)?.to_vec())
         });
         match found {

@@ -104,7 +104,8 @@ pub fn shadow<'py>(
         let views = views(&metrics, looking, &watch.interrupt, &|_| (), &advance).map_err(value)?;
         let free = metrics.iter().any(|(_, model)| time_moves_alone(*model, camera.chart, camera.distance));
         let about = (last.name(), unit.as_deref());
-        let summary = ShadowSummary::of(about, (&camera, &tracing), &views, free && learned.is_some()).map_err(value)?;
+        let summary =
+            ShadowSummary::of(about, (&camera, &tracing), &views, free && learned.is_some()).map_err(value)?;
         Ok::<_, PyErr>((shown(&summary, &summary.findings(None))?, picture(&camera, &views).map_err(value)?))
     })??;
     Ok((json, PyBytes::new(py, image.pixels.as_flattened()), (image.height, image.width)))
