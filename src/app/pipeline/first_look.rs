@@ -20,8 +20,6 @@ const LEAST: usize = 200;
 const COORDINATES: usize = 4;
 /// Time in which a formula is looked for, at most.
 const LIMIT: Duration = Duration::from_secs(3);
-/// Nothing accelerates if the accelerations of no coordinate exceed their error.
-const ACCELERATES: f64 = 1.0;
 
 /// What to do next with recorded motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -49,6 +47,8 @@ pub struct FirstLook {
     pub survey: Survey,
     /// Why no fit can learn from the data, if none can.
     pub obstacle: Option<String>,
+    /// Samples in which constraints and a formula were looked for.
+    pub searched: usize,
     /// Constraints that the motion obeys; none if they were not looked for.
     pub constraints: Option<FoundConstraints>,
     /// The formula that explains the motion, if there is one among small ones.
@@ -81,20 +81,20 @@ impl FirstLook {
         let prepared = PreparedFit::new(reading, &FitOptions::default());
         let obstacle = prepared.and_then(|prepared| prepared.suggest("", Precision::F64)).err();
         let obstacle = obstacle.map(|error| error.to_string());
-        let accelerates = survey.accelerates();
         let some = part(&reading.recording);
-        let search = obstacle.is_none() && accelerates && survey.motionless.is_empty();
+        let searched = some.samples();
+        let search = obstacle.is_none() && survey.accelerates && survey.motionless.is_empty();
         let constraints = if search { constraints(&some, cancellation)? } else { None };
         let held = constraints.as_ref().is_some_and(|found| found.count > 0);
         let (formula, unfinished) = if search && !held { formula(&some, cancellation)? } else { (None, false) };
         let next = match (&obstacle, &formula) {
-            _ if !accelerates => NextStep::Record,
+            _ if !survey.accelerates => NextStep::Record,
             (Some(_), _) => NextStep::Mend,
             (None, Some(_)) => NextStep::Formula,
             _ if held => NextStep::FitConstrained,
             _ => NextStep::Fit,
         };
-        Ok(Self { guessed, survey, obstacle, constraints, formula, unfinished, next })
+        Ok(Self { guessed, survey, obstacle, searched, constraints, formula, unfinished, next })
     }
 
     /// The verdict, what the columns are taken as, the survey, the laws, and the warnings.
@@ -102,7 +102,7 @@ impl FirstLook {
         let mut findings = Findings::default();
         findings.line(match &self.obstacle {
             _ if self.next == NextStep::Record => {
-                "Nothing accelerates here beyond the noise: no Lagrangian can be learned from this motion.".to_string()
+                "Nothing accelerates here beyond the noise: this motion does not determine a Lagrangian.".to_string()
             }
             Some(obstacle) => format!("A fit cannot learn from these data: {obstacle}."),
             None => self.survey.headline(),
@@ -121,9 +121,16 @@ impl FirstLook {
 
     /// The laws that were found, each in a sentence: what to use instead of a network that knows nothing.
     pub fn laws(&self) -> Vec<String> {
-        let constraints = self.constraints.iter().flat_map(|found| found.formulas().into_values());
-        let mut laws: Vec<String> =
-            constraints.map(|formula| format!("the motion stays on {formula} = 0: add --constraints find")).collect();
+        let mut laws = Vec::new();
+        if let Some(found) = &self.constraints {
+            // A single trajectory cannot distinguish the two.
+            let limit = match found.trajectories {
+                1 => ", or conserves it: another trajectory tells which",
+                _ => "",
+            };
+            let stays = |formula: String| format!("the motion stays on {formula} = 0{limit}: add --constraints find");
+            laws.extend(found.formulas().into_values().map(stays));
+        }
         if let Some(found) = &self.formula {
             laws.push(format!("a formula explains this motion: L = {}", found.text(false)));
             if self.has_friction() {
@@ -133,19 +140,18 @@ impl FirstLook {
         if self.unfinished {
             laws.push(format!("no formula was found within {} s; lnn formula searches on", LIMIT.as_secs()));
         }
+        if !laws.is_empty() && self.searched < self.survey.samples {
+            laws.push(format!(
+                "these laws were looked for in {} of the {} samples",
+                self.searched, self.survey.samples
+            ));
+        }
         laws
     }
 
     /// `true` if the formula has terms of friction.
     pub fn has_friction(&self) -> bool {
         self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
-    }
-}
-
-impl Survey {
-    /// `true` if the acceleration of a coordinate exceeds its error.
-    fn accelerates(&self) -> bool {
-        self.coordinates.iter().any(|c| c.acceleration_error_relative < ACCELERATES)
     }
 }
 
@@ -192,5 +198,40 @@ fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFo
         Err(FormulaError::Cancelled(Cancelled)) if stop.is_cancelled() => Err(PipelineError::Interrupted),
         Err(FormulaError::Cancelled(Cancelled)) => Ok((None, true)),
         found => Ok((found.ok().filter(|found| found.verdict == Verdict::Found && found.doubts.is_empty()), false)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Circles of these radii at unit angular velocity, with noise of 1e-4.
+    fn circles(radii: &[f64]) -> Recording {
+        let track = |&r: &f64| {
+            let times: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
+            let noise = |k: usize| 1e-4 * (1.7 * ((k * k) as f64)).sin();
+            let q = times.iter().enumerate().flat_map(|(k, t)| [r * t.cos() + noise(k), r * t.sin() + noise(k + 1000)]);
+            let q = q.collect();
+            RecordedTrajectory { name: r.to_string(), times, q, v: vec![], a: vec![], force: vec![] }
+        };
+        let coordinates = ["x", "y"].map(String::from).to_vec();
+        Recording { coordinates, periodic: vec![false; 2], tracks: radii.iter().map(track).collect() }
+    }
+
+    #[test]
+    fn one_orbit_may_conserve_what_two_rods_hold() {
+        let look = |radii: &[f64]| {
+            let stop = Cancellation::default();
+            FirstLook::new(&LoadedRecording::from(circles(radii)), Vec::new(), &stop).unwrap()
+        };
+        let stays =
+            |look: &FirstLook| look.laws().iter().filter(|law| law.contains("stays on")).cloned().collect::<Vec<_>>();
+        // Two runs on one rod; one run, which may be an orbit; two orbits, which are under no constraint.
+        let (rod, orbit, orbits) = (look(&[1.0, 1.0]), look(&[1.0]), look(&[1.0, 1.5]));
+        assert!(stays(&rod).len() == 1 && !stays(&rod)[0].contains("conserves"), "{:?}", rod.laws());
+        assert!(stays(&orbit).len() == 1 && stays(&orbit)[0].contains("conserves"), "{:?}", orbit.laws());
+        assert!(stays(&orbits).is_empty(), "{:?}", orbits.laws());
+        assert_eq!((rod.next, rod.searched), (NextStep::FitConstrained, 800));
+        assert!(orbits.next != NextStep::FitConstrained && orbits.next != NextStep::Record);
     }
 }

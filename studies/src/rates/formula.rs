@@ -12,10 +12,10 @@ type Found = Result<FoundFormula, FormulaError>;
 type Law = Box<dyn Fn(f64, &[f64], &[f64]) -> Vec<f64>>;
 
 /// Random numbers of a system.
-struct Draw(ChaCha8Rng);
+pub(super) struct Draw(ChaCha8Rng);
 
 impl Draw {
-    fn of(seed: u64, case: u64) -> Self {
+    pub(super) fn of(seed: u64, case: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(1000 * case + seed))
     }
 
@@ -23,19 +23,19 @@ impl Draw {
         self.0.random_range(low..high)
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
 }
 
 /// How motion is recorded: share of the rows that are lost, and scatter of the times in steps.
 #[derive(Clone, Copy)]
-struct Clock {
+pub(super) struct Clock {
     lost: f64,
     jitter: f64,
 }
 
-const EVEN: Clock = Clock { lost: 0.0, jitter: 0.0 };
+pub(super) const EVEN: Clock = Clock { lost: 0.0, jitter: 0.0 };
 const LOST: Clock = Clock { lost: 0.04, jitter: 0.1 };
 /// Runs, samples of each, and the step between them in s.
 const RUNS: usize = 10;
@@ -47,7 +47,7 @@ const NOISE: f64 = 1e-3;
 type Seen = fn(&[f64]) -> Vec<f64>;
 
 /// A system with what is true of it.
-struct System {
+pub(super) struct System {
     coordinates: &'static [&'static str],
     periodic: &'static [bool],
     law: Law,
@@ -66,7 +66,7 @@ impl System {
     }
 
     /// Positions with independent noise.
-    fn record(&self, clock: Clock, draw: &mut Draw) -> Recording {
+    pub(super) fn record(&self, clock: Clock, draw: &mut Draw) -> Recording {
         let tracks = (0..RUNS).map(|run| self.run(run, clock, draw)).collect();
         let coordinates: Vec<String> = self.coordinates.iter().map(ToString::to_string).collect();
         Recording { periodic: self.periodic.to_vec(), coordinates, tracks }
@@ -93,7 +93,7 @@ impl System {
     }
 }
 
-fn track(run: usize, times: Vec<f64>, q: Vec<f64>) -> RecordedTrajectory {
+pub(super) fn track(run: usize, times: Vec<f64>, q: Vec<f64>) -> RecordedTrajectory {
     RecordedTrajectory { name: run.to_string(), times, q, v: vec![], a: vec![], force: vec![] }
 }
 
@@ -114,7 +114,7 @@ fn step(law: &Law, (q, v): (&mut Vec<f64>, &mut Vec<f64>), (t, h): (f64, f64)) {
 }
 
 /// A system whose Lagrangian some library of the ladder holds.
-fn inside(seed: u64, draw: &mut Draw) -> System {
+pub(super) fn inside(seed: u64, draw: &mut Draw) -> System {
     let [a, b] = [(); 2].map(|()| draw.between(0.5, 2.0));
     match seed % 5 {
         0 => System {
@@ -186,7 +186,7 @@ fn precessing(draw: &mut Draw) -> System {
 }
 
 /// A system that no library holds.
-fn outside(seed: u64, draw: &mut Draw) -> System {
+pub(super) fn outside(seed: u64, draw: &mut Draw) -> System {
     let a = draw.between(0.8, 1.6);
     let law: Law = match seed % 5 {
         0 => Box::new(move |_, q, _| vec![-3.0 * a * q[0].signum()]),
@@ -213,7 +213,7 @@ fn beside(draw: &mut Draw) -> System {
 }
 
 /// A pendulum in Cartesian coordinates, or a bead on a parabola.
-fn constrained(seed: u64, draw: &mut Draw) -> System {
+pub(super) fn constrained(seed: u64, draw: &mut Draw) -> System {
     let a = draw.between(0.5, 2.0);
     let names: &'static [&'static str] = &["x", "y"];
     let (law, seen): (Law, Seen) = match seed % 2 {
@@ -227,9 +227,9 @@ fn constrained(seed: u64, draw: &mut Draw) -> System {
 }
 
 /// Columns that hold no motion, by name.
-const NULLS: [&str; 5] = ["white noise", "a random walk", "constants", "steps", "copies of a coordinate"];
+pub(super) const NULLS: [&str; 5] = ["white noise", "a random walk", "constants", "steps", "copies of a coordinate"];
 
-fn null(kind: &str, draw: &mut Draw) -> Recording {
+pub(super) fn null(kind: &str, draw: &mut Draw) -> Recording {
     let n = if kind == "copies of a coordinate" { 2 } else { 1 };
     let tracks = (0..4).map(|run| {
         let [mut level, speed] = [draw.normal(), draw.between(1.0, 3.0)];

@@ -1,9 +1,10 @@
 //! How often a verdict is wrong: every word that judges is tried on systems drawn at random whose truth is known, and above all where the
 //! right answer is "no".
 //!
-//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints` or `readings` prints a part of it and `--seeds N`
+//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints`, `check` or `readings` prints a part of it and `--seeds N`
 //! gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
+mod check;
 mod constraints;
 mod convergence;
 mod determined;
@@ -56,11 +57,12 @@ enum Part {
     Identify,
     Formula,
     Constraints,
+    Check,
     Readings,
 }
 
 impl Part {
-    const ALL: [Self; 4] = [Self::Identify, Self::Formula, Self::Constraints, Self::Readings];
+    const ALL: [Self; 5] = [Self::Identify, Self::Formula, Self::Constraints, Self::Check, Self::Readings];
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
@@ -70,6 +72,7 @@ impl Part {
             }
             Self::Formula => formula::rates(seeds),
             Self::Constraints => constraints::rates(seeds),
+            Self::Check => check::rates(seeds),
             Self::Readings => readings::rates(seeds),
         }
     }

@@ -7,8 +7,7 @@ mod suspicious;
 mod warnings;
 
 pub(crate) use coordinate::CoordinateSurvey;
-pub(crate) use motionless::Stillness;
-pub(crate) use motionless::stillness;
+pub(crate) use motionless::{Stillness, is_uniform, stillness};
 pub(crate) use suspicious::{Kind, Warning, find as find_suspicious};
 
 use crate::recording::clock::Clock;
@@ -98,6 +97,8 @@ pub struct Survey {
     pub(crate) held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
+    /// `true` if a coordinate leaves uniform motion by more than its noise.
+    pub accelerates: bool,
     /// Names of coordinates that stand still: nothing can be learned about them.
     pub motionless: Vec<String>,
     /// Names of coordinates that follow from those before them: nothing can be learned of both.
@@ -173,6 +174,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         targets: Targets::advised(recording, &planned),
         held_out_text: held_out.as_ref().map(|held| held.describe(recording)).unwrap_or_default(),
         held_out,
+        accelerates: (0..n).any(|i| !is_uniform(recording, i, &alone)),
         motionless: Vec::new(),
         copies: Vec::new(),
         warnings: Vec::new(),

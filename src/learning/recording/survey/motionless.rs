@@ -59,16 +59,34 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
         return Some(Stillness::Constant(*first));
     }
     let noise = smoothing.coordinates.get(i)?.noise;
+    // Numbers whose squares overflow cannot be compared.
+    let still = noise.resolved && noise.sigma.is_finite() && scatter(recording, i, false) <= MOVES * noise.sigma;
+    still.then_some(Stillness::Noise(noise.sigma))
+}
+
+/// `true` if coordinate `i` moves uniformly, or not at all, in every trajectory: it leaves a straight line over time by no more than its
+/// noise, or than rounding.
+pub fn is_uniform(recording: &Recording, i: usize, smoothing: &Smoothing) -> bool {
+    let noise = smoothing.coordinates[i].noise;
+    let beside = scatter(recording, i, true);
+    (noise.resolved && beside <= MOVES * noise.sigma) || beside <= ROUNDING * scatter(recording, i, false)
+}
+
+/// Root mean square deviation of coordinate `i` from the mean of each trajectory or, `sloped`, from its straight line over time.
+fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
-    for track in tracks {
-        let samples = values(track).count() as f64;
-        let mean = values(track).map(|x| x / samples).sum::<f64>();
-        square += values(track).map(|x| (x - mean).powi(2)).sum::<f64>();
+    for track in &recording.tracks {
+        let values = || track.q.iter().skip(i).step_by(recording.n());
+        let samples = track.len() as f64;
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x / samples).sum::<f64>();
+        let (middle, level) = (mean(&mut track.times.iter().copied()), mean(&mut values().copied()));
+        let pairs = || track.times.iter().map(|t| t - middle).zip(values().map(|x| x - level));
+        let (tx, tt) = pairs().fold((0.0, 0.0), |(tx, tt), (t, x)| (tx + t * x, tt + t * t));
+        let slope = if sloped && tt > 0.0 { tx / tt } else { 0.0 };
+        square += pairs().map(|(t, x)| (x - slope * t).powi(2)).sum::<f64>();
         count += samples;
     }
-    // Numbers whose squares overflow cannot be compared.
-    let still = noise.resolved && noise.sigma.is_finite() && (square / count).sqrt() <= MOVES * noise.sigma;
-    still.then_some(Stillness::Noise(noise.sigma))
+    (square / count).sqrt()
 }
 
 /// Those of the coordinates `moving` that are linear functions of the ones before them, the same in every trajectory but for a
@@ -128,7 +146,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    fn look(motion: impl Fn(f64) -> f64, sigma: f64) -> Option<Stillness> {
+    fn both(motion: impl Fn(f64) -> f64, sigma: f64) -> (Option<Stillness>, bool) {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let times: Vec<f64> = (0..800).map(|k| 0.01 * f64::from(k)).collect();
         let q =
@@ -136,7 +154,24 @@ mod tests {
         let track = RecordedTrajectory { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
         let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
-        stillness(&recording, &smoothing).pop().map(|(_, how)| how)
+        (stillness(&recording, &smoothing).pop().map(|(_, how)| how), is_uniform(&recording, 0, &smoothing))
+    }
+
+    fn look(motion: impl Fn(f64) -> f64, sigma: f64) -> Option<Stillness> {
+        both(motion, sigma).0
+    }
+
+    #[test]
+    fn uniform_motion_differs_from_accelerated() {
+        let uniform = |motion: fn(f64) -> f64, sigma: f64| both(motion, sigma).1;
+        for sigma in [0.0, 1e-3] {
+            assert!(uniform(|t| 0.3 - 0.7 * t, sigma) && uniform(|_| 0.3, sigma), "{sigma}");
+            let accelerated: [fn(f64) -> f64; 3] =
+                [|t| 0.01 * t * t, |t| (3.0 * t).sin(), |t| 2.0 * t + 0.02 * (20.0 * t).cos()];
+            assert!(accelerated.iter().all(|motion| !uniform(*motion, sigma)), "{sigma}");
+        }
+        // Large noise hides no motion that is larger, and all that is much smaller.
+        assert!(!uniform(|t| (3.0 * t).sin(), 0.5) && uniform(|t| 1e-5 * t * t, 1e-3));
     }
 
     #[test]
