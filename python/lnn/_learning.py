@@ -301,7 +301,8 @@ def fit(
     trajectory : str, optional
         Column whose value distinguishes the trajectories of a file or a DataFrame.
     columns : dict, optional
-        More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``.
+        More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``, and
+        ``wide``, whether trajectories are side by side.
     units : dict of str to str or float, optional
         Units of columns that are not SI, or factors to SI, such as ``{"theta": "deg", "t": "ms", "x": 0.01}``. Arrays have the columns ``t``,
         the coordinates, and ``x_dot``, ``x_ddot`` and ``x_force`` of a coordinate ``x``.

@@ -91,7 +91,7 @@ pub fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
 }
 
-/// A finite number for each of `names`, separated by commas, read in the precision of `S`; `option` is what asked for them.
+/// A finite number for each of `names`, separated by commas, read in the precision of `S`; `option` is the option that they are read for.
 ///
 /// # Errors
 /// A usage error that says how many were expected of what.
@@ -106,7 +106,7 @@ pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec
 }
 
 /// A value for each of `names` from `NAME=VALUE,..` in any order, numbers or formulas of numbers, read in the precision of `S`;
-/// `option` is what asked for them.
+/// `option` is the option that they are read for.
 ///
 /// # Errors
 /// A usage error that names an unknown, repeated or missing name, or a value that is not a finite number.

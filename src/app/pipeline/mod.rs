@@ -85,8 +85,7 @@ mod time_steps;
 mod train;
 mod watch;
 
-#[doc(hidden)]
-pub use checkpoints::{Begin, Checkpoints};
+pub(crate) use checkpoints::{Begin, Checkpoints};
 #[doc(hidden)]
 pub use determination::Determined;
 #[doc(hidden)]
@@ -125,20 +124,15 @@ pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_h
 #[doc(hidden)]
 pub use judging::Unjudged;
 #[doc(hidden)]
-pub use members::{Member, Members};
-#[doc(hidden)]
 pub use model::{CONSTRAINTS_UNSUPPORTED, model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
 #[doc(hidden)]
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
 #[doc(hidden)]
 pub use prepared_fit::PreparedFit;
-#[doc(hidden)]
-pub use start::StartModel;
+pub(crate) use start::StartModel;
 pub use sweep::{Sweep, Swept, sweep};
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
-#[doc(hidden)]
-pub use watch::EventSink;
 pub use watch::{Event, Watch};
 
 pub(crate) use fit::usual_force;

@@ -13,7 +13,6 @@ mod measured;
 mod preset;
 mod trainer;
 
-#[doc(hidden)]
 pub(crate) use measured::restructure;
 #[doc(hidden)]
 pub use measured::suggested;

@@ -32,8 +32,7 @@ mod torques;
 mod wrappers;
 
 pub use accelerations::Accelerations;
-#[doc(hidden)]
-pub use accelerations::Solved;
+pub(crate) use accelerations::Solved;
 pub(crate) use configure::{LagrangianVisitor, resolve};
 pub use configure::{SystemError, SystemInstance, build, configure, systems};
 #[doc(hidden)]

@@ -37,7 +37,6 @@ pub use loops::vectorized;
 pub(crate) use loops::{
     Column, Simd, WithSimd, are_finite, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
 };
-#[doc(hidden)]
 pub(crate) use matrix::product_by_loops;
 pub use matrix::{MatMut, MatRef, Matrices};
 #[doc(hidden)]

@@ -38,7 +38,6 @@ pub use distance::{
     CoordinateError, VALID, ValidTime, ValidTimes, coordinate_error, spread, valid_time, velocity_error,
 };
 pub(crate) use distance::{angle_difference, relative_error};
-#[doc(hidden)]
 pub(crate) use energy::conserved_change;
 pub use energy::{EnergyError, energy_error};
 #[doc(hidden)]

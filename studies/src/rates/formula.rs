@@ -19,7 +19,7 @@ impl Draw {
         Self(ChaCha8Rng::seed_from_u64(1000 * case + seed))
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0.random_range(low..high)
     }
 

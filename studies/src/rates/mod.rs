@@ -1,10 +1,11 @@
 //! How often a verdict is wrong: every word that judges is tried on systems drawn at random whose truth is known, and above all where the
 //! right answer is "no".
 //!
-//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints`, `check` or `readings` prints a part of it and `--seeds N`
+//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints`, `check`, `columns` or `readings` prints a part of it and `--seeds N`
 //! gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
 mod check;
+mod columns;
 mod constraints;
 mod convergence;
 mod determined;
@@ -58,11 +59,13 @@ enum Part {
     Formula,
     Constraints,
     Check,
+    Columns,
     Readings,
 }
 
 impl Part {
-    const ALL: [Self; 5] = [Self::Identify, Self::Formula, Self::Constraints, Self::Check, Self::Readings];
+    const ALL: [Self; 6] =
+        [Self::Identify, Self::Formula, Self::Constraints, Self::Check, Self::Columns, Self::Readings];
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
@@ -73,6 +76,7 @@ impl Part {
             Self::Formula => formula::rates(seeds),
             Self::Constraints => constraints::rates(seeds),
             Self::Check => check::rates(seeds),
+            Self::Columns => columns::rates(seeds),
             Self::Readings => readings::rates(seeds),
         }
     }

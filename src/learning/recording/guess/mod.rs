@@ -1,4 +1,4 @@
-//! What the columns of recorded motion probably are: time, trajectories, coordinates, angles, velocities, accelerations and forces.
+//! A guess of what the columns of recorded motion are: time, trajectories, coordinates, angles, velocities, accelerations and forces.
 //!
 //! Names decide first, then the numbers: a time increases, a velocity is the derivative of a position, an angle jumps by a turn.
 

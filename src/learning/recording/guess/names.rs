@@ -94,13 +94,13 @@ pub fn is_angle(name: &str) -> bool {
     part || is(name, &["psi", "alpha", "beta", "gamma", "ang", "deg", "rot"]) || in_degrees(name)
 }
 
-/// `true` if a name says degrees.
+/// `true` if a name ends in degrees, or has them in it.
 pub fn in_degrees(name: &str) -> bool {
     let name = name.to_lowercase();
     name.ends_with("deg") || name.contains("_deg") || name.contains("degree")
 }
 
-/// The unit of time that a name says.
+/// The unit of time in a name.
 pub fn unit_of_time(name: &str) -> Option<&'static str> {
     let name = name.to_lowercase();
     let ends = |unit: &str| name == unit || name.ends_with(&format!("_{unit}"));

@@ -29,12 +29,12 @@ enum Role {
     /// A derivative of a coordinate, of this order.
     Derivative(usize, usize),
     Force,
-    /// What an option says.
+    /// Given by an option.
     Given(&'static str),
     Unused,
 }
 
-/// A table while its columns are told apart.
+/// A table and the roles of its columns as far as they are known.
 struct Roles<'a> {
     table: &'a RawTable,
     given: &'a Columns,
@@ -77,7 +77,7 @@ impl Roles<'_> {
         self.time.as_ref().map_or(&[], |time| &time.restarts)
     }
 
-    /// Takes what the reader has been told.
+    /// Takes the roles that options give.
     fn take_given(&mut self) {
         let place = |name: &String| self.table.names.iter().position(|known| known == name);
         let lists: [(&[String], Role); 6] = [
@@ -99,8 +99,8 @@ impl Roles<'_> {
 
     fn find_time(&mut self) {
         let (table, given) = (self.table, self.given);
-        let told = self.of(&Role::Time).first().copied();
-        self.time = match told {
+        let given_time = self.of(&Role::Time).first().copied();
+        self.time = match given_time {
             Some(column) => {
                 let restarts = table.numbers[column].as_deref().ok().and_then(time::restarts).unwrap_or_default();
                 Some(Time { column, unit: None, restarts, because: "as given".to_string() })

@@ -38,7 +38,7 @@ pub enum Problem {
     /// Nothing in it.
     #[error("the file is empty")]
     Empty,
-    /// No coordinates were asked for; the columns that there are, by name or by number.
+    /// No coordinates are given; the columns of the file, by name or by number.
     #[error("the coordinates are not named; the columns are {}", .0.join(", "))]
     Names(Vec<String>),
     /// Bytes that are not text.
@@ -222,7 +222,7 @@ pub(super) struct Faults {
 }
 
 impl Faults {
-    /// Problems that are told of one file.
+    /// Largest number of problems that are reported for one file.
     const SHOWN: usize = 5;
 
     /// Notes a problem.
@@ -255,8 +255,8 @@ impl Faults {
 
 /// Problems one after another.
 fn joined(first: &[Problem], more: usize) -> String {
-    let told = first.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-    if more == 0 { told } else { format!("{told}; and {more} more") }
+    let listed = first.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    if more == 0 { listed } else { format!("{listed}; and {more} more") }
 }
 
 /// The first few names of columns, such as ` (there are s, x, y)`; nothing if there are none.

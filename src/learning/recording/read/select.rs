@@ -35,7 +35,7 @@ pub struct Selection {
     pub number: Option<String>,
 }
 
-/// The columns of a file, and what is asked of them.
+/// The columns of a file, and which of them are wanted.
 struct File<'a> {
     columns: &'a Columns,
     /// None in a file without names.
@@ -50,7 +50,7 @@ impl Selection {
     /// trajectory side by side.
     ///
     /// # Errors
-    /// All columns that are missing, units that are not known; the names of all columns if no coordinates are asked for.
+    /// [`Problem::Several`] for columns that are missing and units that are not known; [`Problem::Names`] if `columns` has no coordinates.
     pub fn all(columns: &Columns, names: Option<&[String]>, width: usize, row: u64) -> Result<Vec<Self>, Problem> {
         let file = File { columns, headings: names.map(headings), width, row };
         if columns.coords.is_empty() {
@@ -171,7 +171,7 @@ impl File<'_> {
     fn find(&self, what: &'static str, asked: &str, name: &str) -> Result<Used, Problem> {
         let position = self.position(what, name)?;
         let heading = self.headings.as_ref().and_then(|headings| headings.get(position));
-        // A column that was asked for by its number keeps that as its name.
+        // A column that is given by its number keeps the number as its name.
         let named = heading.filter(|heading| is_same(&heading.text, name) || is_same(&heading.name, name));
         let name = named.map_or(name, |heading| &heading.name).to_string();
         let mut used = Used { name, position, factor: 1.0, unit: None };

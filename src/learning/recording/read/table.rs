@@ -1,4 +1,4 @@
-//! All columns of a file, before anybody says what they are.
+//! All columns of a file, whatever they mean.
 
 use super::{MAX_BYTES, Problem, parse};
 use crate::recording::{Columns, DataError};

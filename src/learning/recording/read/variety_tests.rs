@@ -37,7 +37,7 @@ fn decimal_commas_are_read() {
     }
     let (q, facts) = taken(rows("t;x", ";", ".", ""), &coordinates("x"));
     assert_eq!((q, facts.decimal_comma, facts.separator), (expected(), false, Some(Separator::Semicolon)));
-    // Exponents, whole numbers, and the line by which Excel is told the separator.
+    // Exponents, whole numbers, and the line that states the separator to Excel.
     let text = rows("sep=;\nt;x", ";", ",", "").replace(";0,25", ";2,5e-1").replace(";-0,75", ";-75E-2");
     assert_eq!(taken(text.replace("4,0;", "4;"), &coordinates("x")).0, expected());
 }
