@@ -19,7 +19,7 @@ const LEAST: usize = 200;
 /// Coordinates up to which a formula is looked for: the number of terms grows with their fourth power.
 const COORDINATES: usize = 4;
 /// Time in which a formula is looked for, at most.
-const LIMIT: Duration = Duration::from_secs(3);
+const LIMIT: Duration = Duration::from_secs(2);
 
 /// What to do next with recorded motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -67,7 +67,7 @@ fn text_of<S: Serializer>(formula: &Option<FoundFormula>, to: S) -> Result<S::Ok
 
 impl FirstLook {
     /// Looks at a recording; `guessed` is what its columns were taken as. Constraints and formulas are looked for in parts of the trajectories,
-    /// of at most 2000 samples together, and formulas for at most 3 s.
+    /// of at most 2000 samples together, and formulas for at most 2 s.
     ///
     /// # Errors
     /// [`PipelineError::Smooth`] for trajectories too short for any window, [`PipelineError::Interrupted`].
@@ -125,7 +125,7 @@ impl FirstLook {
         if let Some(found) = &self.constraints {
             // A single trajectory cannot distinguish the two.
             let limit = match found.trajectories {
-                1 => ", or conserves it: another trajectory tells which",
+                1 => " (a single trajectory may conserve it instead)",
                 _ => "",
             };
             let stays = |formula: String| format!("the motion stays on {formula} = 0{limit}: add --constraints find");
@@ -141,10 +141,7 @@ impl FirstLook {
             laws.push(format!("no formula was found within {} s; lnn formula searches on", LIMIT.as_secs()));
         }
         if !laws.is_empty() && self.searched < self.survey.samples {
-            laws.push(format!(
-                "these laws were looked for in {} of the {} samples",
-                self.searched, self.survey.samples
-            ));
+            laws.push(format!("laws were looked for in {} of the {} samples", self.searched, self.survey.samples));
         }
         laws
     }
@@ -228,8 +225,8 @@ mod tests {
             |look: &FirstLook| look.laws().iter().filter(|law| law.contains("stays on")).cloned().collect::<Vec<_>>();
         // Two runs on one rod; one run, which may be an orbit; two orbits, which are under no constraint.
         let (rod, orbit, orbits) = (look(&[1.0, 1.0]), look(&[1.0]), look(&[1.0, 1.5]));
-        assert!(stays(&rod).len() == 1 && !stays(&rod)[0].contains("conserves"), "{:?}", rod.laws());
-        assert!(stays(&orbit).len() == 1 && stays(&orbit)[0].contains("conserves"), "{:?}", orbit.laws());
+        assert!(stays(&rod).len() == 1 && !stays(&rod)[0].contains("conserve"), "{:?}", rod.laws());
+        assert!(stays(&orbit).len() == 1 && stays(&orbit)[0].contains("conserve"), "{:?}", orbit.laws());
         assert!(stays(&orbits).is_empty(), "{:?}", orbits.laws());
         assert_eq!((rod.next, rod.searched), (NextStep::FitConstrained, 800));
         assert!(orbits.next != NextStep::FitConstrained && orbits.next != NextStep::Record);
