@@ -137,7 +137,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let found = found.with_rows_of(&reading);
     let title = format!("Constants of {}", instance.system.name);
-    result_page::write(page, &title, &found.findings(), &identification_figures(&found))?;
+    result_page::write(page, &title, &found.findings(), &identification_figures(&found, &reading.recording.periodic))?;
     OutputFile::print(out, &output::shown(&found, args.json, Identified::findings)?)
 }
 

@@ -13,15 +13,19 @@ const POINTS: usize = 4000;
 const LAGS: usize = 40;
 
 /// Measured and fitted values of the stretch with the median residual, all residuals over time, and their autocorrelation, for each
-/// coordinate; the correlations of the constants.
-pub fn identification_figures(found: &Identified) -> Vec<Figure> {
+/// coordinate; the correlations of the constants. `periodic` are the coordinates that are angles.
+pub fn identification_figures(found: &Identified, periodic: &[bool]) -> Vec<Figure> {
     let n = found.residuals.len();
     let of = |i: usize| {
         let name = &found.residuals[i].coordinate;
         let file = |what: &str| format!("{what}_{}.svg", file_part(name));
-        let what = if found.segments == 0 { format!("force on {name}") } else { name.clone() };
+        let (what, unit) = match (found.segments, periodic.get(i)) {
+            (0, _) => (format!("force on {name}"), "SI"),
+            (_, Some(true)) => (name.clone(), "rad"),
+            _ => (name.clone(), "SI"),
+        };
         let [fitted, residuals, correlation] =
-            [fitted(found, i, &what), residuals(found, i, &what), lags(found, i, &what)];
+            [fitted(found, i, unit), residuals(found, i, unit), lags(found, i, &what)];
         [
             figure(
                 &file("fitted"),
@@ -47,23 +51,28 @@ pub fn identification_figures(found: &Identified) -> Vec<Figure> {
     (0..n.min(COORDINATES)).flat_map(of).flatten().chain(correlations(found)).collect()
 }
 
-/// Correlations of the errors of the constants as a map.
+/// Points of a map along the side of a cell.
+const CELL: usize = 16;
+
+/// Correlations of the errors of the constants as a map, a cell for each pair.
 fn correlations(found: &Identified) -> Option<Figure> {
     let names = &found.correlations.names;
-    let places: Vec<f64> = (1..=names.len()).map(|k| k as f64).collect();
-    let label = || "constant".to_string();
+    if names.len() < 2 {
+        return None;
+    }
+    let places: Vec<f64> = (0..names.len() * CELL).map(|k| 0.5 + (k as f64 + 0.5) / CELL as f64).collect();
+    let row = |row: &Vec<f64>| row.iter().flat_map(|&x| [x; CELL]).collect::<Vec<f64>>().repeat(CELL);
     let map = HeatMap {
         title: String::new(),
-        x_label: label(),
-        y_label: label(),
-        grid: Grid { x: places.clone(), y: places, values: found.correlations.matrix.concat() },
+        x_label: "constant".to_string(),
+        y_label: "constant".to_string(),
+        grid: Grid { x: places.clone(), y: places, values: found.correlations.matrix.iter().flat_map(row).collect() },
         range: Some((-1.0, 1.0)),
         diverging: true,
         marks: Vec::new(),
     };
     let names: Vec<String> = names.iter().enumerate().map(|(k, name)| format!("{}: {name}", k + 1)).collect();
-    let drawn = if names.len() < 2 { return None } else { heat_maps(&[map]) };
-    figure("correlations.svg", "Correlations of the constants", drawn, names.join(", "))
+    figure("correlations.svg", "Correlations of the constants", heat_maps(&[map]), names.join(", "))
 }
 
 /// Column `i` of `(samples, n)`.
@@ -81,7 +90,7 @@ fn plot([title, x_label, y_label]: [&str; 3], series: Vec<Series>) -> LinePlot {
     LinePlot { title, x_label, y_label, log_y: false, turn: None, level: None, series }
 }
 
-fn fitted(found: &Identified, i: usize, what: &str) -> LinePlot {
+fn fitted(found: &Identified, i: usize, unit: &str) -> LinePlot {
     let n = found.residuals.len();
     let mut order: Vec<&ResidualPath> = found.paths.iter().collect();
     order.sort_by(|a, b| mean_square(a).total_cmp(&mean_square(b)));
@@ -91,10 +100,10 @@ fn fitted(found: &Identified, i: usize, what: &str) -> LinePlot {
     let lines = [("measured", &measured), ("fitted", &fitted)];
     let lines = lines.map(|(name, values)| Series::new(name, &path.times, values));
     let [measured, fitted] = lines;
-    plot(["", "t [s]", what], vec![measured, fitted.over()])
+    plot(["", "t [s]", &format!("value [{unit}]")], vec![measured, fitted.over()])
 }
 
-fn residuals(found: &Identified, i: usize, what: &str) -> LinePlot {
+fn residuals(found: &Identified, i: usize, unit: &str) -> LinePlot {
     let n = found.residuals.len();
     let samples: usize = found.paths.iter().map(|path| path.times.len()).sum();
     let stride = samples.div_ceil(POINTS).max(1);
@@ -106,7 +115,7 @@ fn residuals(found: &Identified, i: usize, what: &str) -> LinePlot {
     }
     let level = Some(Level { value: 0.0, name: String::new() });
     let series = vec![Series { name: String::new(), points, over: false }];
-    LinePlot { level, ..plot(["", "t [s]", &format!("residual of {what}")], series) }
+    LinePlot { level, ..plot(["", "t [s]", &format!("residual [{unit}]")], series) }
 }
 
 fn lags(found: &Identified, i: usize, what: &str) -> LinePlot {
@@ -125,12 +134,11 @@ fn lags(found: &Identified, i: usize, what: &str) -> LinePlot {
     let points =
         (1..=LAGS).filter(|&lag| counts[lag] > 1.0).map(|lag| (lag as f64, sums[lag] / counts[lag] / variance));
     let own = Series { name: what.to_string(), points: points.collect(), over: false };
-    let bound = |sign: f64, name: &str| {
-        let points =
-            (1..=LAGS).filter(|&lag| counts[lag] > 1.0).map(|lag| (lag as f64, sign * 1.96 / counts[lag].sqrt()));
-        Series { name: name.to_string(), points: points.collect(), over: false }
-    };
+    let seen = || (1..=LAGS).filter(|&lag| counts[lag] > 1.0);
+    let bound = |sign: f64| seen().map(move |lag| (lag as f64, sign * 1.96 / counts[lag].sqrt()));
+    let points = bound(1.0).chain([(f64::NAN, f64::NAN)]).chain(bound(-1.0)).collect();
+    let bounds = Series { name: "95 % of white noise".to_string(), points, over: false };
     let level = Some(Level { value: 0.0, name: String::new() });
-    let series = vec![own, bound(1.0, "95 % of white noise"), bound(-1.0, "")];
+    let series = vec![own, bounds];
     LinePlot { level, ..plot(["", "lag [samples]", "autocorrelation"], series) }
 }

@@ -40,6 +40,22 @@ fn constants_and_friction_of_the_example_are_found_and_written() {
 }
 
 #[test]
+fn a_page_shows_what_was_fitted_and_stays() {
+    let folder = Folder::new();
+    let page = text(&folder.path("constants.html"));
+    let arguments = ["identify", DATA, "--system", SYSTEM, "--trajectory", "run", "--html", &page];
+    let printed = lnn(&arguments);
+    assert_eq!(printed.code, Some(0), "{}", printed.stderr);
+    let html = std::fs::read_to_string(&page).unwrap();
+    // Three pictures for each of two coordinates and one of the correlations; the verdict that was printed.
+    assert_eq!(html.matches("<figure").count(), 7);
+    let verdict = printed.stdout.lines().find(|line| line.starts_with("The model fits")).unwrap();
+    assert!(html.contains(verdict) && html.contains("value [rad]"), "{verdict}");
+    lnn(&arguments).refused(1, &["constants.html", "--overwrite"]);
+    assert_eq!(lnn(&[&arguments[..], &["--overwrite", "--json"]].concat()).code, Some(0));
+}
+
+#[test]
 fn segments_are_as_short_as_asked_for_and_no_shorter_than_six_samples() {
     let run = |seconds: &str| {
         let all = ["identify", DATA, "--system", SYSTEM, "--trajectory", "run", "--json", "--segment", seconds];
