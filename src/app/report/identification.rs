@@ -131,12 +131,12 @@ fn lags(found: &Identified, i: usize, what: &str) -> LinePlot {
         }
     }
     let variance = sums[0] / f64::max(counts[0], 1.0);
-    let points =
-        (1..=LAGS).filter(|&lag| counts[lag] > 1.0).map(|lag| (lag as f64, sums[lag] / counts[lag] / variance));
-    let own = Series { name: what.to_string(), points: points.collect(), over: false };
-    let seen = || (1..=LAGS).filter(|&lag| counts[lag] > 1.0);
-    let bound = |sign: f64| seen().map(move |lag| (lag as f64, sign * 1.96 / counts[lag].sqrt()));
-    let points = bound(1.0).chain([(f64::NAN, f64::NAN)]).chain(bound(-1.0)).collect();
+    let seen: Vec<usize> = (1..=LAGS).filter(|&lag| counts[lag] > 1.0).collect();
+    let over_lags = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&lag| (lag as f64, of(lag))).collect::<Vec<_>>();
+    let points = over_lags(&|lag| sums[lag] / counts[lag] / variance);
+    let own = Series { name: what.to_string(), points, over: false };
+    let bound = |sign: f64| over_lags(&|lag| sign * 1.96 / counts[lag].sqrt());
+    let points = [bound(1.0), vec![(f64::NAN, f64::NAN)], bound(-1.0)].concat();
     let bounds = Series { name: "95 % of white noise".to_string(), points, over: false };
     let level = Some(Level { value: 0.0, name: String::new() });
     let series = vec![own, bounds];
