@@ -269,7 +269,8 @@ impl Kept {
             Invariant::Square => "g(v, v)",
             other => other.charge(),
         };
-        format!("conserved: {name} = {}, largest change {}\n", rounded(self.start, 10), rounded(self.largest_change, 2))
+        let [start, change] = [rounded(self.start, 10), rounded(self.largest_change, 2)];
+        format!("the equations conserve {name}: {start} at the start, largest change {change}\n")
     }
 }
 

@@ -90,7 +90,7 @@ fn a_motion_with_friction_comes_with_its_energy_balance() {
     let plain = saved(&folder, "plain.safetensors", &plain);
     let run = lnn(&[&["rollout", &plain], &start[..], &["--method", "variational"]].concat());
     assert_eq!((run.code, run.stdout.lines().count()), (Some(0), 2), "{}", run.stderr);
-    assert!(run.stdout.contains("conserved: energy"), "{}", run.stdout);
+    assert!(run.stdout.contains("conserve energy"), "{}", run.stdout);
 }
 
 #[test]
