@@ -202,13 +202,14 @@ fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFo
 mod tests {
     use super::*;
 
-    /// Circles of these radii at unit angular velocity, with noise of 1e-4.
+    /// Swings on circles of these radii, with noise of 1e-4.
     fn circles(radii: &[f64]) -> Recording {
         let track = |&r: &f64| {
             let times: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
             let noise = |k: usize| 1e-4 * (1.7 * ((k * k) as f64)).sin();
-            let q = times.iter().enumerate().flat_map(|(k, t)| [r * t.cos() + noise(k), r * t.sin() + noise(k + 1000)]);
-            let q = q.collect();
+            let angle = |t: &f64| 1.5 * t.cos() + 0.4 * (1.7 * t).sin();
+            let point = |(k, t)| [r * angle(t).cos() + noise(k), r * angle(t).sin() + noise(k + 1000)];
+            let q = times.iter().enumerate().flat_map(point).collect();
             RecordedTrajectory { name: r.to_string(), times, q, v: vec![], a: vec![], force: vec![] }
         };
         let coordinates = ["x", "y"].map(String::from).to_vec();

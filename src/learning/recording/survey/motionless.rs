@@ -76,14 +76,18 @@ pub fn is_uniform(recording: &Recording, i: usize, smoothing: &Smoothing) -> boo
 fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for track in &recording.tracks {
-        let values = || track.q.iter().skip(i).step_by(recording.n());
         let samples = track.len() as f64;
-        let mean = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x / samples).sum::<f64>();
-        let (middle, level) = (mean(&mut track.times.iter().copied()), mean(&mut values().copied()));
-        let pairs = || track.times.iter().map(|t| t - middle).zip(values().map(|x| x - level));
-        let (tx, tt) = pairs().fold((0.0, 0.0), |(tx, tt), (t, x)| (tx + t * x, tt + t * t));
+        // From the first sample and from the mean of that, so that no constant leaves rounding.
+        let centred = |values: Vec<f64>| {
+            let first = values.first().copied().unwrap_or_default();
+            let mean = values.iter().map(|x| (x - first) / samples).sum::<f64>();
+            values.into_iter().map(move |x| x - first - mean)
+        };
+        let values = track.q.iter().skip(i).step_by(recording.n()).copied().collect();
+        let pairs: Vec<(f64, f64)> = centred(track.times.clone()).zip(centred(values)).collect();
+        let (tx, tt) = pairs.iter().fold((0.0, 0.0), |(tx, tt), (t, x)| (tx + t * x, tt + t * t));
         let slope = if sloped && tt > 0.0 { tx / tt } else { 0.0 };
-        square += pairs().map(|(t, x)| (x - slope * t).powi(2)).sum::<f64>();
+        square += pairs.iter().map(|(t, x)| (x - slope * t).powi(2)).sum::<f64>();
         count += samples;
     }
     (square / count).sqrt()
