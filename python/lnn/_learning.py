@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 def _learned(found: _lnn._Learned) -> Learned:
-    subjects, history, summary, text, stop = found
+    subjects, history, summary, (text, html), stop = found
     models = [Model(subject) for subject in subjects]
-    return Learned(models[0], _history(history), json.loads(summary), text, stop, models)
+    return Learned(models[0], _history(history), json.loads(summary), stop, models, text, html)
 
 
 def _history(text: str) -> dict[str, np.ndarray]:
@@ -138,8 +138,8 @@ def sweep(
     if len({complete for _, complete in runs}) < len(runs):
         raise ValueError("vary: expected values that differ")
     target = os.fspath(out), bool(overwrite)
-    rows, text, finished = _lnn.sweep(runs, (counts[-1], thread_count(threads)), target, receiver(progress))
-    return Swept(json.loads(rows), finished, os.fspath(out), text)
+    rows, (text, html), finished = _lnn.sweep(runs, (counts[-1], thread_count(threads)), target, receiver(progress))
+    return Swept(json.loads(rows), finished, os.fspath(out), text, html)
 
 
 def _target(out: str | os.PathLike | None, overwrite: bool) -> tuple[str, bool] | None:
@@ -226,12 +226,7 @@ def learn(
     choices["dissipation"] = None if dissipation is None else whole("dissipation", dissipation, 1)
     choices["constraints"] = _constraints(constraints)
     described = columns, names("angles", angles)
-    found = _lnn.learn(q, v, np.ascontiguousarray(rows), described, as_json(choices), receiver(progress))
-    subject, history, validation, test, stop = found
-    summary = {"validation_loss": validation, "test_loss": test}
-    text = f"loss (paper): validation {validation:.4g}, fresh states {test:.4g}\n"
-    model = Model(subject)
-    return Learned(model, _history(history), summary, text, stop, [model])
+    return _learned(_lnn.learn(q, v, np.ascontiguousarray(rows), described, as_json(choices), receiver(progress)))
 
 
 def _choices(

@@ -32,7 +32,7 @@ _Receiver = Callable[[str, float, float, str], None] | None
 _Numbers = Sequence[float]
 _Track = tuple[str, _Numbers, _Numbers, _Numbers, _Numbers, _Numbers]
 _Motion = tuple[Sequence[str], Sequence[_Track], str]
-_Learned = tuple[list[Subject], str, str, str, str | None]
+_Learned = tuple[list[Subject], str, str, tuple[str, str], str | None]
 
 @final
 class Subject:
@@ -100,7 +100,7 @@ def sweep(
     plan: tuple[int, int],
     out: tuple[str, bool],
     progress: _Receiver,
-) -> tuple[str, str, int]: ...
+) -> tuple[str, tuple[str, str], int]: ...
 def learn(
     q: _Doubles,
     v: _Doubles,
@@ -108,7 +108,7 @@ def learn(
     columns: tuple[Sequence[str], Sequence[str]],
     choices: str,
     progress: _Receiver,
-) -> tuple[Subject, str, float, float, str | None]: ...
+) -> _Learned: ...
 def fit(motion: _Motion, choices: str, out: tuple[str, bool] | None, progress: _Receiver) -> _Learned: ...
 def find_constraints(motion: _Motion, degrees: tuple[int, int]) -> str: ...
 def formula(motion: _Motion, choices: str) -> str: ...

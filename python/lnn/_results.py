@@ -902,7 +902,7 @@ class Certificate(_Shown):
 
 
 @dataclass(frozen=True)
-class Learned:
+class Learned(_Shown):
     """What a training or a fit learned.
 
     Attributes
@@ -914,8 +914,6 @@ class Learned:
     summary : dict
         The judgement: beside the exact system for a training, by held-out motion for a fit (``hold_out``), by held-out states
         for `learn`.
-    text : str
-        The same for a terminal.
     stop : str or None
         Why learning ended before its time: ``"interrupted"``, or a failure.
     members : list of Model
@@ -925,12 +923,10 @@ class Learned:
     model: Model
     history: dict[str, np.ndarray]
     summary: dict
-    text: str = field(repr=False)
-    stop: str | None = None
-    members: list[Model] = field(default_factory=list, repr=False)
-
-    def __str__(self) -> str:
-        return self.text
+    stop: str | None
+    members: list[Model] = field(repr=False)
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
     def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws the losses over the epochs into `ax` or new axes of matplotlib, and returns these."""
@@ -943,7 +939,7 @@ class Learned:
 
 
 @dataclass(frozen=True)
-class Swept:
+class Swept(_Shown):
     """What the runs of a sweep learned.
 
     Attributes
@@ -954,17 +950,13 @@ class Swept:
         Runs that are finished.
     out : str
         Their directory, with tables and report.
-    text : str
-        The table for a terminal.
     """
 
     rows: list[dict[str, object]]
     finished: int
     out: str
-    text: str = field(repr=False)
-
-    def __str__(self) -> str:
-        return self.text
+    _text: str = field(repr=False)
+    _html: str = field(repr=False)
 
     def to_pandas(self) -> pd.DataFrame:
         """A DataFrame of the rows."""

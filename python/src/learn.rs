@@ -2,10 +2,12 @@
 
 use crate::attend::attended;
 use crate::errors::{pipeline, runtime, value};
+use crate::readings::said;
 use crate::recorded::{Motion, Source};
 use crate::subject::{Subject, slice, values};
 use lnn::configuration::{Config, Known, Precision};
 use lnn::data::Dataset;
+use lnn::findings::Findings;
 use lnn::network::Structure;
 use lnn::pipeline::{
     Fit, FitConfig, FitConstraints, FitOptions, InMemory, LockedDirectory, Output, PipelineError, RunOptions, Swept,
@@ -17,13 +19,14 @@ use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// What was learned: models, that of the fit or training first, history as JSON, facts as JSON, text for a terminal, why it ended.
-type Learned = (Vec<Subject>, String, String, String, Option<String>);
+/// What was learned: models, that of the fit or training first, history as JSON, facts as JSON, what a terminal and what a notebook shows of
+/// them, why it ended.
+type Learned = (Vec<Subject>, String, String, (String, String), Option<String>);
 
 fn preset(name: &str) -> PyResult<Preset> {
     match name {
@@ -149,12 +152,12 @@ pub fn train(
         Err(PipelineError::Unjudged(learned)) => return unjudged(*learned),
         report => report.map_err(pipeline)?,
     };
-    let (text, result, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
+    let (history, stop, said) = (history(&report.history)?, ended(&report.stop), said(&report.findings()));
     let json = report.json().map_err(pipeline)?;
-    Ok((vec![Subject::learned(report.header, report.network)?], result, json, text, stop))
+    Ok((vec![Subject::learned(report.header, report.network)?], history, json, said, stop))
 }
 
-/// Trains several configurations, JSON with the choices that make each, into a directory: the table as JSON, a text, finished runs.
+/// Trains several configurations, JSON with the choices that make each, into a directory: the table as JSON and as it is shown, finished runs.
 #[pyfunction]
 pub fn sweep(
     py: Python<'_>,
@@ -162,21 +165,22 @@ pub fn sweep(
     plan: (usize, usize),
     out: Target,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(String, String, usize)> {
+) -> PyResult<(String, (String, String), usize)> {
     let parsed = configurations.into_iter().map(|(choice, text)| Ok((choice, serde_json::from_str(&text)?)));
     let parsed: Vec<(Vec<(String, String)>, Config)> =
         parsed.collect::<Result<_, serde_json::Error>>().map_err(value)?;
     let swept = attended(py, progress.as_ref(), |watch| lnn::pipeline::sweep(parsed, plan, (&out.0, out.1), &watch))?;
-    let Swept { rows, finished, text } = swept.map_err(pipeline)?;
-    Ok((serde_json::to_string(&rows).map_err(runtime)?, text, finished))
+    let Swept { rows, finished, findings } = swept.map_err(pipeline)?;
+    Ok((serde_json::to_string(&rows).map_err(runtime)?, said(&findings), finished))
 }
 
 /// A model whose judgement was interrupted: there are no figures of it.
 fn unjudged(learned: Unjudged) -> PyResult<Learned> {
     let Unjudged { header, network, history: epochs, .. } = learned;
     let (model, history) = (Subject::learned(header, network)?, history(&epochs)?);
-    let text = "interrupted while the model was judged: there are no figures\n".to_string();
-    Ok((vec![model], history, "{}".to_string(), text, Some("interrupted".to_string())))
+    let mut findings = Findings::default();
+    findings.line("interrupted while the model was judged: there are no figures");
+    Ok((vec![model], history, "{}".to_string(), said(&findings), Some("interrupted".to_string())))
 }
 
 /// Choices of [`learn`] and [`fit`], as JSON.
@@ -243,7 +247,7 @@ pub fn learn(
     columns: (Vec<String>, Vec<String>),
     choices: &str,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Subject, String, f64, f64, Option<String>)> {
+) -> PyResult<Learned> {
     let choices: Choices = serde_json::from_str(choices).map_err(value)?;
     let (names, angles) = columns;
     let owned = |array| slice(array).map(<[f64]>::to_vec);
@@ -284,9 +288,9 @@ pub fn learn(
         lnn::presets::TrainerError::Training(_) => runtime(error),
         _ => value(error),
     })?;
-    let (result, stop) = (history(&learned.history)?, ended(&learned.stop));
-    let subject = Subject::learned(learned.header, learned.model)?;
-    Ok((subject, result, learned.validation_loss, learned.test_loss, stop))
+    let (history, stop, said) = (history(&learned.history)?, ended(&learned.stop), said(&learned.findings()));
+    let losses = json!({ "validation_loss": learned.validation_loss, "test_loss": learned.test_loss });
+    Ok((vec![Subject::learned(learned.header, learned.model)?], history, losses.to_string(), said, stop))
 }
 
 /// Learns from recorded motion: files, or trajectories in memory.
@@ -313,12 +317,12 @@ pub fn fit(
         Err(PipelineError::Unjudged(learned)) => return unjudged(*learned),
         report => report.map_err(pipeline)?,
     };
-    let (text, result, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
+    let (history, stop, said) = (history(&report.history)?, ended(&report.stop), said(report.findings()));
     let json = report.json().to_string();
     let models = [(report.header, report.network)].into_iter();
     let models = models.chain(report.others.into_iter().map(|other| (other.header, other.network)));
     let models = models.map(|(header, network)| Subject::learned(header, network)).collect::<PyResult<_>>()?;
-    Ok((models, result, json, text, stop))
+    Ok((models, history, json, said, stop))
 }
 
 /// The fit with its choices; a change that the configuration refuses is put into `refused`.

@@ -155,7 +155,11 @@ pub fn formula_shown(found: &FoundFormula, name: &str) -> PyResult<String> {
 
 /// A result as JSON, with what it says for a terminal and for a notebook.
 pub fn shown(result: &impl Serialize, findings: &Findings) -> PyResult<String> {
-    let html = Report::new("").findings(findings);
-    let whole = json!({ "result": result, "text": findings.to_string(), "html": html.fragment() });
-    serde_json::to_string(&whole).map_err(runtime)
+    let (text, html) = said(findings);
+    serde_json::to_string(&json!({ "result": result, "text": text, "html": html })).map_err(runtime)
+}
+
+/// Findings for a terminal and for a notebook.
+pub fn said(findings: &Findings) -> (String, String) {
+    (findings.to_string(), Report::new("").findings(findings).fragment().to_string())
 }

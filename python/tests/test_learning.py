@@ -34,7 +34,7 @@ def test_a_system_is_learned(tmp_path):
     )
     losses = learned.history["validation_loss"]
     assert losses.shape == (20,) and losses[-1] < losses[0] and learned.stop is None
-    assert learned.summary["validation_loss"] == losses.min() and "loss" in learned.text
+    assert learned.summary["validation_loss"] == losses.min() and "loss" in str(learned)
     assert {kind for kind, *_ in result} >= {"step", "epoch"}
     same = lnn.Model.load(tmp_path / "run")
     assert same.to_bytes() == learned.model.to_bytes()

@@ -1,6 +1,7 @@
 //! Reports of results, as sentences and tables: a result writes its report, and a terminal, a page or a notebook shows it.
 
-use crate::names::{WIDTH, cut, cut_hard, width};
+use crate::names::{WIDTH, cut, cut_hard, width, wrap_text};
+use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result};
@@ -9,8 +10,19 @@ use core::fmt::{Display, Formatter, Result};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Finding {
+    /// What matters most, in a sentence, and a few quantities with their values.
+    Summary {
+        /// The sentence.
+        sentence: String,
+        /// Quantities and values.
+        rows: Vec<[String; 2]>,
+    },
+    /// What follows is about.
+    Heading(String),
     /// A sentence, or a line of a list.
     Line(String),
+    /// Text to copy, such as a formula or a command: it is never cut.
+    Code(String),
     /// The end of a paragraph.
     Gap,
     /// A table: what its columns are, and its rows.
@@ -24,7 +36,7 @@ pub enum Finding {
 
 /// The report of a result, in reading order.
 ///
-/// [`Display`] writes it for a terminal; the parts are there for other media.
+/// [`Display`] writes it for a terminal, in lines of at most 120 characters; the parts are there for other media.
 ///
 /// ```
 /// use lnn::findings::Findings;
@@ -39,6 +51,18 @@ pub struct Findings {
 }
 
 impl Findings {
+    /// Adds what matters most: a sentence, and quantities with their values.
+    pub fn summary(&mut self, sentence: impl Into<String>, rows: &[[String; 2]]) -> &mut Self {
+        self.parts.push(Finding::Summary { sentence: sentence.into(), rows: rows.to_vec() });
+        self
+    }
+
+    /// Adds a heading.
+    pub fn heading(&mut self, text: impl Into<String>) -> &mut Self {
+        self.parts.push(Finding::Heading(text.into()));
+        self
+    }
+
     /// Adds a sentence.
     pub fn line(&mut self, text: impl Into<String>) -> &mut Self {
         self.parts.push(Finding::Line(text.into()));
@@ -48,6 +72,12 @@ impl Findings {
     /// Adds sentences, one each.
     pub fn lines<T: Into<String>>(&mut self, texts: impl IntoIterator<Item = T>) -> &mut Self {
         self.parts.extend(texts.into_iter().map(|text| Finding::Line(text.into())));
+        self
+    }
+
+    /// Adds text to copy.
+    pub fn code(&mut self, text: impl Into<String>) -> &mut Self {
+        self.parts.push(Finding::Code(text.into()));
         self
     }
 
@@ -85,9 +115,17 @@ impl Findings {
 
 impl Display for Findings {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        for part in &self.parts {
+        for (place, part) in self.parts.iter().enumerate() {
+            let mut line = |text: &str| writeln!(f, "{}", wrap_text(text, WIDTH));
             match part {
-                Finding::Line(text) => writeln!(f, "{text}")?,
+                Finding::Summary { sentence, rows } => {
+                    line(sentence)?;
+                    rows.iter().try_for_each(|[what, value]| line(&format!("{what}: {value}")))?;
+                }
+                Finding::Heading(text) if place == 0 => line(text)?,
+                Finding::Heading(text) => line(&format!("\n{text}"))?,
+                Finding::Code(text) => writeln!(f, "{text}")?,
+                Finding::Line(text) => line(text)?,
                 Finding::Gap => writeln!(f)?,
                 Finding::Table { headers, rows } => f.write_str(&text_table(headers, rows))?,
             }
@@ -254,6 +292,14 @@ mod tests {
         findings.line("first").gap().table(&["a"], [["1"]]).table::<_, &str, [&str; 1]>(&["b"], []).lines(["x", "y"]);
         assert_eq!(findings.to_string(), "first\n\na\n-\n1\nx\ny\n");
         assert_eq!(findings.parts().len(), 5);
+        let mut findings = Findings::default();
+        findings.heading("on top").summary("good", &[["of", "it"].map(String::from)]).heading("below");
+        assert_eq!(findings.to_string(), "on top\ngood\nof: it\n\nbelow\n");
+        // Words are wrapped, and what is to be copied is not.
+        let long = "word ".repeat(40);
+        let mut findings = Findings::default();
+        findings.line(long.trim_end()).code(long.trim_end());
+        assert_eq!(findings.to_string().lines().map(|line| line.split(' ').count()).collect::<Vec<_>>(), [24, 16, 40]);
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use crate::cancellation::Cancellation;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, interrupt, output};
-use crate::names::{WIDTH, wrap_text};
 use crate::pipeline::{FirstLook, NextStep, PipelineError};
 use crate::recording::{ColumnGuess, Columns, Guess, LoadedRecording};
 
@@ -27,8 +26,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.json {
         return output::print(&output::json(&look)?);
     }
-    let next = command(&args.recording, &columns, &look).map(|next| format!("\nnext:\n  {next}\n"));
-    output::print(&(wrap_text(&look.findings().to_string(), WIDTH) + &next.unwrap_or_default()))
+    let mut findings = look.findings();
+    if let Some(next) = command(&args.recording, &columns, &look) {
+        findings.heading("next:").code(format!("  {next}"));
+    }
+    output::print(&findings.to_string())
 }
 
 /// A first look at recorded motion.

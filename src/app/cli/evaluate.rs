@@ -110,7 +110,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::print(&json)?;
     } else {
         let report = folder.file("report.html");
-        output::print(&format!("{}\nreport: {}\n", evaluation.text(&system.system.title), report.display()))?;
+        output::print(&format!("{}\nreport: {}\n", evaluation.findings(&system.system.title), report.display()))?;
     }
     match evaluation.interrupted {
         Some(part) => {

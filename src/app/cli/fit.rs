@@ -65,8 +65,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let session = Session::new(&args.run, folder, begin, Some(identity))?;
     let report = fit(&prepared, &config, &session.options, &session.folder, &session.watch());
     session.conclude(report.map(|report| {
-        let (json, text, epochs) = (report.json().to_string(), format!("{}\n", report.text()), report.history.len());
-        Learned { json, text, stop: report.stop, epochs, unfinished: report.unfinished }
+        let (json, findings, epochs) = (report.json().to_string(), report.findings().clone(), report.history.len());
+        Learned { json, findings, stop: report.stop, epochs, unfinished: report.unfinished }
     }))
 }
 

@@ -11,6 +11,7 @@ use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
 use crate::configuration::Config;
 use crate::data::SamplingError;
+use crate::findings::Findings;
 use crate::names::pluralize;
 use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, Watch};
 use crate::shooting::ShootingError;
@@ -24,7 +25,7 @@ pub struct Learned {
     /// Text of `summary.json`.
     pub json: String,
     /// Headline and tables.
-    pub text: String,
+    pub findings: Findings,
     /// Reason for which learning ended.
     pub stop: StopReason,
     /// Epochs that were run.
@@ -82,7 +83,7 @@ impl<'a> Session<'a> {
     /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
     pub fn conclude(self, learned: Result<Learned, PipelineError>) -> Result<(), CliError> {
         let path = self.folder.path();
-        let Learned { json, text, stop, epochs, unfinished } = match learned {
+        let Learned { json, findings, stop, epochs, unfinished } = match learned {
             Ok(learned) => learned,
             Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
                 let on = how_to_go_on(path);
@@ -98,7 +99,7 @@ impl<'a> Session<'a> {
         if self.args.json {
             output::print(&json)?;
         } else {
-            output::print(&format!("{text}report: {}\n", self.folder.file("report.html").display()))?;
+            output::print(&format!("{findings}\nreport: {}\n", self.folder.file("report.html").display()))?;
         }
         let kept = format!("the best of {} is in {}", pluralize(epochs, "epoch", "epochs"), path.display());
         match stop {

@@ -8,7 +8,7 @@ use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
 use crate::experiments::Run;
 use crate::findings::text_table;
-use crate::names::{WIDTH, pluralize, wrap_text};
+use crate::names::pluralize;
 use crate::pipeline::{
     Experiment, ExperimentDirectory, ExperimentReport, KeptRecord, finish_runs, kept_record, merge_experiment,
     run_experiment,
@@ -205,7 +205,7 @@ fn print_results(work: &Work, done: &ExperimentReport, json: bool) -> Result<(),
         });
         return output::print(&format!("{object}\n"));
     }
-    output::print(&(done.text().to_string() + &wrap_text(&format!("report: {}\n\n", report.display()), WIDTH)))
+    output::print(&format!("{}report: {}\n\n", done.findings, report.display()))
 }
 
 /// Prints what became of a share of an experiment.

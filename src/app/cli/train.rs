@@ -49,8 +49,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let session = Session::new(&args.run, folder, begin, None)?;
     let report = train(&config, &system, &session.options, &session.folder, &session.watch());
     session.conclude(report.and_then(|report| {
-        let (json, text, epochs) = (report.json()?, report.text(), report.history.len());
-        Ok(Learned { json, text, stop: report.stop, epochs, unfinished: None })
+        let (json, findings, epochs) = (report.json()?, report.findings(), report.history.len());
+        Ok(Learned { json, findings, stop: report.stop, epochs, unfinished: None })
     }))
 }
 

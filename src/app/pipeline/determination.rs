@@ -5,14 +5,13 @@ use crate::analysis::{
     misfit,
 };
 use crate::data::RecordingSplit;
-use crate::findings::text_table;
+use crate::findings::Findings;
 use crate::lagrangian::EulerLagrange;
 use crate::names::{number, percent};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::PipelineError;
 use crate::pipeline::hold_out::HoldOut;
 use crate::recording::Targets;
-use crate::report::Report;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -217,15 +216,14 @@ impl Determined {
         self.determination.iter().map(row).collect()
     }
 
-    fn about(&self) -> String {
+    fn about(&self) -> [String; 2] {
         let unit = match self.unit.as_str() {
             "SI" => "In SI units, which the known forces fix.".to_string(),
             unit => format!("Relative to the {unit}: without known forces (--force) L has no unit."),
         };
-        format!(
-            "How well the data determine the model, averaged over the learned states: ranges contain the true value in about 9 \
-             cases of 10.\n{unit}"
-        )
+        let meaning = "How well the data determine the model, averaged over the learned states: ranges contain the true value \
+                       in about 9 cases of 10.";
+        [meaning.to_string(), unit]
     }
 
     /// Why there is no table, in a sentence.
@@ -260,25 +258,17 @@ impl Determined {
         ))
     }
 
-    /// For a terminal.
-    pub fn text(&self) -> String {
-        let beyond = self.apart().into_iter().chain(self.beyond()).map(|text| text + "\n").collect::<String>();
+    /// The ranges, or why there are none, with remarks.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        findings.heading("What the data determine");
         if self.determination.is_empty() {
-            return format!("\n{}\n{beyond}", self.nothing());
-        }
-        format!("\n{}\n{}{beyond}", self.about(), text_table(&self.headers(), &self.rows()))
-    }
-
-    /// Adds the table to a report.
-    pub fn report(&self, report: Report) -> Report {
-        let report = report.heading("What the data determine");
-        let report = if self.determination.is_empty() {
-            report.paragraph(&self.nothing())
+            findings.line(self.nothing());
         } else {
-            report.paragraph(&self.about()).table(&self.headers(), &self.rows())
-        };
-        let remarks = self.apart().into_iter().chain(self.beyond()).chain(self.suggestion());
-        remarks.fold(report, |report, text| report.paragraph(&text))
+            findings.lines(self.about()).table(&self.headers(), self.rows());
+        }
+        findings.lines(self.apart().into_iter().chain(self.beyond()).chain(self.suggestion()));
+        findings
     }
 }
 

@@ -138,7 +138,7 @@ impl Balance {
     }
 
     /// The balance in two lines, its parts over the mean kinetic energy.
-    pub fn text(&self) -> String {
+    pub fn lines(&self) -> [String; 2] {
         let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();
         let [change, work, friction] = [self.change, self.work, self.friction].map(tenths);
         // Uses the rounded parts, so that they add up as printed.
@@ -154,13 +154,11 @@ impl Balance {
         };
         let work =
             if self.forced { format!("work of the known forces {} - ", percent(work)) } else { "- ".to_string() };
-        format!(
-            "energy along {along}, over the mean kinetic energy:\n  change {} = {work}taken by friction {} + not accounted for \
-             {}{spread}\n",
-            percent(change),
-            percent(friction),
-            percent(rest)
-        )
+        let [change, friction, rest] = [change, friction, rest].map(percent);
+        [
+            format!("energy along {along}, over the mean kinetic energy:"),
+            format!("  change {change} = {work}taken by friction {friction} + not accounted for {rest}{spread}"),
+        ]
     }
 }
 
@@ -180,7 +178,7 @@ mod tests {
             defect_rms: 0.2,
             forced: true,
         };
-        let text = balance.text();
+        let text = balance.lines().join("\n");
         let part = |after: &str| -> f64 {
             let rest = &text[text.find(after).unwrap() + after.len()..];
             rest.split_whitespace().next().unwrap().parse().unwrap()
@@ -189,7 +187,7 @@ mod tests {
         assert!((change - (work - friction + rest)).abs() < 1e-9, "{text}");
         assert!((rest - 5.0).abs() < 0.11 && text.contains("3 held-out trajectories (mean)"), "{text}");
         assert!(text.contains("(rms 10.0 %)") && text.lines().all(|line| line.len() <= 120), "{text}");
-        let free = Balance { trajectories: 1, forced: false, work: 0.0, ..balance }.text();
+        let free = Balance { trajectories: 1, forced: false, work: 0.0, ..balance }.lines().join("\n");
         assert!(free.contains("along the held-out trajectory,") && !free.contains("forces"), "{free}");
         assert!(!free.contains("rms"), "{free}");
     }

@@ -420,8 +420,8 @@ mod tests {
             assert_eq!(part.mass_matrix.factor, whole.mass_matrix.factor);
             assert!(part.trajectories.iter().all(|motion| motion.summary.stopped.is_none()));
             // It has its tables.
-            let report = part.report(part.summarise(Report::new("part"), "oscillator")).to_html();
-            assert!(report.contains("interrupted") && !part.text("oscillator").is_empty());
+            let report = part.report(Report::new("part").findings(&part.headline("oscillator"))).to_html();
+            assert!(report.contains("interrupted") && !part.findings("oscillator").parts().is_empty());
         }
     }
 

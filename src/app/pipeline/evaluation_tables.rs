@@ -1,9 +1,9 @@
 //! Tables, report and `evaluation.json` of an evaluation.
 
 use crate::analysis::{MassMatrixError, Statistics};
-use crate::findings::text_table;
+use crate::findings::{Finding, Findings};
 use crate::lagrangian::SystemInstance;
-use crate::names::{WIDTH, number, percentage, rounded, wrap_text};
+use crate::names::{number, percentage, rounded};
 use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
 use crate::pipeline::evaluation::Evaluation;
@@ -15,13 +15,6 @@ use std::fmt::Write as _;
 
 /// Stands where there is no finite number.
 const NONE: &str = "-";
-
-/// A table of a report.
-struct Table {
-    title: String,
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
 
 /// Contents of `evaluation.json`.
 #[derive(Serialize)]
@@ -51,8 +44,8 @@ impl Evaluation {
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
         output.write("evaluation.json", json.as_bytes())?;
         let title = format!("{}: learned against exact", system.system.title);
-        let report = self
-            .summarise(Report::new(&title), &system.system.title)
+        let report = Report::new(&title)
+            .findings(&self.headline(&system.system.title))
             .paragraph(&format!("Model {name}, starts of seed {seed}."));
         let report = write_page(output, report, (header, network), Some(system))?;
         let report = self.report(parameter_table(self.pictures(report), system));
@@ -60,7 +53,9 @@ impl Evaluation {
         Ok(json)
     }
 
-    fn tables(&self) -> Vec<Table> {
+    /// The tables.
+    pub(crate) fn tables(&self) -> Findings {
+        let mut findings = Findings::default();
         let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
         let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
@@ -96,7 +91,6 @@ impl Evaluation {
         let MassMatrixError { factor, error: m, .. } = &self.mass_matrix;
         let matrix = [m.mean, m.median, m.p99, m.max].map(percentage);
         let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
-        let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = with_unit("until", &self.time_unit);
         let lyapunov = with_unit("Lyapunov time", &self.time_unit);
         let conserved = self.conserved.map(|_| "conserved, max [%]");
@@ -120,58 +114,44 @@ impl Evaluation {
             let (time, unit) = (t_end / t_end.ln(), &self.time_unit);
             let _ = write!(about, "; motion without chaos has a Lyapunov time of about {time:.0} {unit}");
         }
-        let equivalence = self.physics.equivalence.as_ref().map(|found| {
+        if let Some(found) = &self.physics.equivalence {
             let powers: Vec<String> = found.factors.iter().map(|factor| number(*factor)).collect();
             let differences = found.differences().map(|(_, difference)| percentage(difference));
             let names = found.differences().map(|(name, _)| format!("{name} [%]"));
-            Table {
-                title: "Difference of the learned Lagrangian from the exact one, after the best factor and gauge term"
-                    .into(),
-                header: [vec!["factor [1]".to_string()], names.to_vec(), vec!["states [1]".into()]].concat(),
-                rows: vec![[vec![powers.join("; ")], differences.to_vec(), vec![found.states.to_string()]].concat()],
-            }
-        });
-        let tables = [
-            Table {
-                title: "Error of accelerations on fresh states".into(),
-                header: [vec!["acceleration of".to_string()], measures.map(of_unit).to_vec(), vec!["failed".into()]]
-                    .concat(),
-                rows: accelerations.collect(),
-            },
-            Table {
-                title: "Relative error of the mass matrix at rest, up to one factor".into(),
-                header: header(&["factor [1]", "mean [%]", "median [%]", "99 % below [%]", "max [%]", "failed"]),
-                rows: vec![matrix],
-            },
-            Table { title: about, header: header(&motions), rows: trajectories.collect() },
-        ];
-        equivalence.into_iter().chain(tables).collect()
-    }
-
-    /// Headline and tables for a terminal, of a model of the system called `title`.
-    pub(crate) fn text(&self, title: &str) -> String {
-        let tables = self.tables();
-        let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
-        let first = headline::of_evaluation(title, self).text();
-        wrap_text(&format!("{first}\n{}{}", text.collect::<Vec<_>>().join("\n"), self.note()), WIDTH)
-    }
-
-    /// Meaning of [`NONE`], if there is one in the tables.
-    fn note(&self) -> String {
-        let tables = self.tables();
-        let mut cells = tables.iter().flat_map(|table| table.rows.iter().flatten());
-        let none = cells.any(|cell| cell == NONE);
-        if none {
-            "\n-: no finite number; failed states and remarks say why, no Lyapunov time means no chaos\n"
-        } else {
-            ""
+            let header = [vec!["factor [1]".to_string()], names.to_vec(), vec!["states [1]".into()]].concat();
+            let row = [vec![powers.join("; ")], differences.to_vec(), vec![found.states.to_string()]].concat();
+            findings.heading(
+                "Difference of the learned Lagrangian from the exact one, after the best factor and gauge term",
+            );
+            findings.table(&header, [row]);
         }
-        .to_string()
+        let header = [vec!["acceleration of".to_string()], measures.map(of_unit).to_vec(), vec!["failed".into()]];
+        findings.heading("Error of accelerations on fresh states").table(&header.concat(), accelerations);
+        findings.heading("Relative error of the mass matrix at rest, up to one factor");
+        findings.table(&["factor [1]", "mean [%]", "median [%]", "99 % below [%]", "max [%]", "failed"], [matrix]);
+        findings.heading(about).table(&motions, trajectories);
+        let none = |part: &Finding| match part {
+            Finding::Table { rows, .. } => rows.iter().flatten().any(|cell| cell == NONE),
+            _ => false,
+        };
+        if findings.parts().iter().any(none) {
+            findings
+                .gap()
+                .line("-: no finite number; failed states and remarks say why, no Lyapunov time means no chaos");
+        }
+        findings
     }
 
-    /// The headline, at the beginning of a report about the system called `title`.
-    pub(crate) fn summarise(&self, report: Report, title: &str) -> Report {
-        headline::of_evaluation(title, self).begin(report)
+    /// Headline and tables, of a model of the system called `title`.
+    pub(crate) fn findings(&self, title: &str) -> Findings {
+        let mut findings = self.headline(title);
+        findings.append(self.tables());
+        findings
+    }
+
+    /// The headline, about the system called `title`.
+    pub(crate) fn headline(&self, title: &str) -> Findings {
+        headline::of_evaluation(title, self).findings()
     }
 
     /// Pictures for a report, of the motion first.
@@ -184,14 +164,7 @@ impl Evaluation {
     }
 
     /// Tables for a report.
-    pub(crate) fn report(&self, mut report: Report) -> Report {
-        for Table { title, header, rows } in self.tables() {
-            report = report.heading(&title).table(&header, &rows);
-        }
-        let note = self.note();
-        if !note.is_empty() {
-            report = report.paragraph(note.trim());
-        }
-        self.physics.report(report)
+    pub(crate) fn report(&self, report: Report) -> Report {
+        self.physics.report(report.findings(&self.tables()))
     }
 }

@@ -1,8 +1,8 @@
 //! The report of an experiment: table, pictures, page, words.
 
 use crate::experiments::{Record, Run, rows};
-use crate::findings::text_table;
-use crate::names::{WIDTH, pluralize, wrap_text};
+use crate::findings::Findings;
+use crate::names::pluralize;
 use crate::pipeline::experiment::Experiment;
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::run_table::run_table;
@@ -24,14 +24,8 @@ pub struct ExperimentReport {
     pub finished: usize,
     /// Seconds of training of all runs.
     pub training_seconds: f64,
-    text: String,
-}
-
-impl ExperimentReport {
-    /// Headline and tables for a terminal.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
+    /// Headline and tables.
+    pub findings: Findings,
 }
 
 /// More of a report.
@@ -50,8 +44,8 @@ pub struct Additions {
     pub above: Option<Part>,
     /// What stands below it and its remarks.
     pub below: Option<Part>,
-    /// Text for a terminal below the remarks.
-    pub text: String,
+    /// What stands below the remarks on a terminal.
+    pub tables: Findings,
 }
 
 /// Conventions of the table.
@@ -92,8 +86,8 @@ pub(crate) fn conclude(
         Some(scale) => format!("Scale {scale}, {runs}{of_all}"),
         None => format!("{runs}{of_all}"),
     };
-    let headline = headline::of_experiment(&rows);
-    let report = headline.begin(Report::new(experiment.title()));
+    let headline = headline::of_experiment(&rows).findings();
+    let report = Report::new(experiment.title()).findings(&headline);
     let report = more.introduction.iter().fold(report, |report, text| report.paragraph(text));
     let report = report.paragraph(&format!("{budget}.")).section("Pictures of all runs", &figures);
     let report = with(report, more.above);
@@ -107,19 +101,15 @@ pub(crate) fn conclude(
 
     let (energies, others): (Vec<usize>, Vec<usize>) =
         (1..header.len()).partition(|&k| ["energy", "motions"].iter().any(|word| header[k].contains(word)));
-    let table_of = |columns: &[usize]| {
-        let columns: Vec<usize> = [0].iter().chain(columns).copied().collect();
-        let rows: Vec<Vec<&str>> = view.iter().map(|row| columns.iter().map(|&k| row[k].as_str()).collect()).collect();
-        text_table(&columns.iter().map(|&k| header[k]).collect::<Vec<_>>(), &rows)
-    };
-    let tables =
-        [others, energies].iter().filter(|columns| !columns.is_empty()).map(|c| table_of(c)).collect::<Vec<_>>();
-    let mut text = format!("{}\n{}\n", headline.text(), tables.join("\n"));
-    remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
-    text += &more.text;
+    let mut findings = Findings::default();
+    findings.heading(format!("{}{}", experiment.title(), more.subtitle)).append(headline);
+    for columns in [others, energies].into_iter().filter(|columns| !columns.is_empty()) {
+        let columns: Vec<usize> = [0].into_iter().chain(columns).collect();
+        let of = |row: &Vec<String>| columns.iter().map(|&k| row[k].clone()).collect::<Vec<_>>();
+        findings.gap().table(&columns.iter().map(|&k| header[k]).collect::<Vec<_>>(), view.iter().map(of));
+    }
+    findings.gap().lines(remarks).append(more.tables);
     let clock = started.map(|began| format!(", {:.0} s on the clock this time", began.elapsed().as_secs_f64()));
-    let note = format!("{budget}, {training:.0} s of training{}.", clock.unwrap_or_default());
-    let (title, subtitle) = (experiment.title(), more.subtitle);
-    let text = wrap_text(&format!("{title}{subtitle}\n{text}\n{note}\n"), WIDTH);
-    Ok(ExperimentReport { results, table, finished, training_seconds: training, text })
+    findings.gap().line(format!("{budget}, {training:.0} s of training{}.", clock.unwrap_or_default()));
+    Ok(ExperimentReport { results, table, finished, training_seconds: training, findings })
 }

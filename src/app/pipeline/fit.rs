@@ -3,6 +3,7 @@
 use crate::cancellation::Cancellation;
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit, sizes};
+use crate::findings::Findings;
 use crate::formula::{FormulaError, FormulaOptions, FoundFormula, formula_of_motion};
 use crate::lagrangian::EulerLagrange;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
@@ -46,7 +47,7 @@ pub struct FitReport {
     /// Fits of the other [members](FitConfig::members), from the second on; those that an interruption ended are left out.
     pub others: Vec<FitReport>,
     json: String,
-    text: String,
+    findings: Findings,
 }
 
 impl FitReport {
@@ -61,17 +62,17 @@ impl FitReport {
     /// A member that an earlier run trained; its history is not known any more.
     pub(crate) fn restored(header: Header, network: NetworkLagrangian<f64>, hold_out: HoldOut) -> Self {
         let (stop, unfinished, others) = (StopReason::Finished, None, Vec::new());
-        let (history, json, text) = (Vec::new(), String::new(), String::new());
-        Self { stop, unfinished, header, network, history, hold_out, others, json, text }
+        let (history, json, findings) = (Vec::new(), String::new(), Findings::default());
+        Self { stop, unfinished, header, network, history, hold_out, others, json, findings }
     }
     /// Text of `summary.json`.
     #[doc(hidden)]
     pub fn json(&self) -> &str {
         &self.json
     }
-    /// Headline and tables for a terminal.
-    pub fn text(&self) -> &str {
-        &self.text
+    /// Headline and tables.
+    pub fn findings(&self) -> &Findings {
+        &self.findings
     }
 }
 
@@ -130,7 +131,6 @@ fn fit_in<S: Scalar>(
         }
         error => error,
     })?;
-    judged.determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
     let (formula, mut unfinished) = formula(prepared, config, &network, (options.threads, watch, was_interrupted));
     let (members, others) = match (&trained.stop, &unfinished) {
         (StopReason::Finished, None) => {
@@ -156,9 +156,9 @@ fn fit_in<S: Scalar>(
         physics: &judged.physics,
         model: (&header, &network),
     };
-    let (json, text) = found.write(output, &toml)?;
+    let (json, findings) = found.write(output, &toml)?;
     let (stop, history, hold_out) = (trained.stop, trained.history, judged.hold_out);
-    Ok(FitReport { stop, unfinished, header, network, history, hold_out, others, json, text })
+    Ok(FitReport { stop, unfinished, header, network, history, hold_out, others, json, findings })
 }
 
 /// What a fit starts to learn from.

@@ -1,9 +1,9 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
 use crate::configuration::Config;
-use crate::findings::text_table;
+use crate::findings::Findings;
 use crate::formula::{FormulaSummary, FoundFormula, Verdict};
-use crate::names::{WIDTH, number, percentage, pluralize, wrap_text};
+use crate::names::{number, percentage, pluralize};
 use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
 use crate::pipeline::determination::Determined;
@@ -21,7 +21,6 @@ use crate::shooting::Fitted;
 use crate::training::Trained;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 /// One coordinate of `summary.json`: what the data are like and what smoothing makes of them, in SI units.
 #[derive(Serialize)]
@@ -136,47 +135,43 @@ impl<'a, S: Scalar> Found<'a, S> {
     ///
     /// # Errors
     /// [`PipelineError::Output`].
-    pub fn write(&self, output: &dyn Output, toml: &str) -> Result<(String, String), PipelineError> {
+    pub fn write(&self, output: &dyn Output, toml: &str) -> Result<(String, Findings), PipelineError> {
         let (recording, name) = (&self.prepared.reading.recording, self.config.system.as_str());
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
         output.write(SUMMARY, json.as_bytes())?;
         let formula = self.formula.filter(|formula| formula.verdict == Verdict::Found);
-        let formula = formula.map(|formula| formula.findings().to_string());
-        let headline = headline::of_hold_out(name, self.hold_out, self.determined, self.formula);
+        let formula = formula.map_or_else(Findings::default, |formula| {
+            let mut findings = Findings::default();
+            findings.heading("The Lagrangian as a formula").append(formula.findings());
+            findings
+        });
+        let headline = headline::of_hold_out(name, self.hold_out, self.determined, self.formula).findings();
         let opening = summary.opening(recording);
+        let (judged, determined) = (self.hold_out.findings(), self.determined.findings());
+        let members = self.members.map(Members::findings).unwrap_or_default();
         let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
             let mut later = training_pictures(&shot.history);
             later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
             figures.extend(later);
         }
-        let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
-        let report = match &formula {
-            Some(text) => report.heading("The Lagrangian as a formula").preformatted(text),
-            None => report,
-        };
+        let report = Report::new(&format!("{name}: learned from recorded motion"));
+        let report = report.findings(&headline).findings(&formula);
         let report = write_page(output, report, self.model, None)?;
         let report = report.section("Predictions of motion that the model has not seen", &self.hold_out.figures);
         let report = report.section("The functions that were learned", &self.physics.figures);
-        let report = self.determined.report(self.hold_out.report(report));
-        let report = match self.members {
-            Some(members) => members.report(report),
-            None => report,
-        };
-        let report = self.physics.report(report).heading("Data");
-        let report = report.preformatted(&wrap_text(opening.trim_end(), WIDTH)).section("Training", &figures);
+        let report = self.physics.report(report.findings(&judged).findings(&determined).findings(&members));
+        let report = report.findings(&opening).section("Training", &figures);
         let report = report.heading("Configuration").preformatted(toml);
         write_report_and_figures(
             output,
             &report,
             figures.iter().chain(&self.hold_out.figures).chain(&self.physics.figures),
         )?;
-        let members = self.members.map(Members::text).unwrap_or_default();
-        let tables = self.hold_out.text() + &self.determined.text() + &members;
-        let formula = formula.map_or(String::new(), |text| text + "\n");
-        let text = wrap_text(&format!("{}\n{formula}{opening}{tables}", headline.text()), WIDTH);
-        Ok((json, text))
+        let mut whole = headline;
+        [formula, opening, judged, determined, members].into_iter().for_each(|part| _ = whole.append(part));
+        Ok((json, whole))
     }
 
     fn summary(&self) -> Summary<'a> {
@@ -242,7 +237,7 @@ impl<'a, S: Scalar> Found<'a, S> {
 
 impl Summary<'_> {
     /// Data, losses and times of the run in words, with the table of what smoothing makes of the coordinates.
-    fn opening(&self, recording: &Recording) -> String {
+    fn opening(&self, recording: &Recording) -> Findings {
         let [training, validation, test] = self.samples;
         let way = match self.targets {
             Targets::Measured => "measured accelerations",
@@ -257,13 +252,11 @@ impl Summary<'_> {
                 format!("best epoch chosen on {validation} samples, judged on {test} that were held out: {held}")
             }
         };
-        let mut text = format!(
-            "learned from {way}: {} of {}\n{}{judged}\n\n",
-            pluralize(training, "sample", "samples"),
-            pluralize(self.trajectories[0], "trajectory", "trajectories"),
-            self.time_steps.text()
-        );
-        // Writing to a string cannot fail.
+        let mut findings = Findings::default();
+        let (samples, trajectories) = (pluralize(training, "sample", "samples"), self.trajectories[0]);
+        let trajectories = pluralize(trajectories, "trajectory", "trajectories");
+        findings.heading("Data and training").line(format!("learned from {way}: {samples} of {trajectories}"));
+        findings.lines(self.time_steps.lines()).line(judged).gap();
         let row = |c: &Coordinate| {
             let lost = "no larger than its error".to_string();
             let error = c.acceleration_error_relative;
@@ -276,10 +269,9 @@ impl Summary<'_> {
                 if error.is_finite() { percentage(error) } else { lost },
             ]
         };
-        text += &text_table(&SMOOTHING, &self.coordinates.iter().map(row).collect::<Vec<_>>());
-        let _ = writeln!(
-            text,
-            "\nloss (paper) against those {}: validation {}{}; {}, {}, seed {}",
+        findings.table(&SMOOTHING, self.coordinates.iter().map(row)).gap();
+        findings.line(format!(
+            "loss (paper) against those {}: validation {}{}; {}, {}, seed {}",
             if self.targets == Targets::Forces {
                 "forces, each over the error to expect of it"
             } else {
@@ -293,26 +285,24 @@ impl Summary<'_> {
             pluralize(self.epochs, "epoch", "epochs"),
             pluralize(self.weights, "weight", "weights"),
             self.seed
-        );
+        ));
         if let Some(shooting) = &self.shooting {
-            let _ = writeln!(
-                text,
+            findings.line(format!(
                 "mean squared residual of predictions, in units of the noise: {} before, {} after {} over {} (1 is noise alone)",
                 number(shooting.start_loss),
                 number(shooting.validation_loss),
                 pluralize(shooting.epochs, "epoch", "epochs"),
                 pluralize(shooting.segments, "segment", "segments")
-            );
+            ));
         }
         if let Some(ConstraintsSummary { found, formulas, distance }) = &self.constraints {
             let how = if *found { "found in the motion" } else { "given" };
             let all: Vec<String> = formulas.values().map(|formula| format!("{formula} = 0")).collect();
-            let _ = writeln!(
-                text,
+            findings.line(format!(
                 "under constraints, {how}: {}; smoothed positions were {} away from them, root mean square",
                 all.join("; "),
                 number(*distance)
-            );
+            ));
         }
         if !self.constants.is_empty() {
             let one = |(name, &x): (&String, &f64)| match self.determined.constant(name) {
@@ -320,9 +310,9 @@ impl Summary<'_> {
                 None => format!("{name} {}", number(x)),
             };
             let constants: Vec<String> = self.constants.iter().map(one).collect();
-            let _ = writeln!(text, "constants of the known part: {}", constants.join(", "));
+            findings.line(format!("constants of the known part: {}", constants.join(", ")));
         }
-        let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
-        text
+        findings.line(format!("{:.1} s of training, {:.1} s in all", self.training_seconds, self.wall_seconds));
+        findings
     }
 }

@@ -3,13 +3,13 @@
 
 use crate::analysis::{PredictionError, ValidTimes};
 use crate::experiments::{Row, RunSpread};
+use crate::findings::Findings;
 use crate::formula::{FoundFormula, Verdict};
 use crate::names::{number, percent, pluralize};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::force_errors::{ForceError, judged as judged_by_forces};
 use crate::pipeline::hold_out::{HoldOut, factor, is_better};
-use crate::report::Report;
 
 /// Share of states of wrong signature at and above which it is worth a remark.
 const MOST_WRONG: f64 = 0.01;
@@ -31,15 +31,11 @@ pub(crate) struct Headline {
 }
 
 impl Headline {
-    /// Lines for a terminal: the sentence, then one line per quantity.
-    pub fn text(&self) -> String {
-        let rows = self.rows.iter().map(|[what, value]| format!("{what}: {value}\n"));
-        format!("{}\n{}", self.sentence, rows.collect::<String>())
-    }
-
-    /// The same at the beginning of a report.
-    pub fn begin(&self, report: Report) -> Report {
-        report.summary(&self.sentence, &self.rows)
+    /// The beginning of a report.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        findings.summary(&self.sentence, &self.rows);
+        findings
     }
 }
 
@@ -323,6 +319,7 @@ mod tests {
     use crate::experiments::Reported;
     use crate::pipeline::energy::Balance;
     use crate::pipeline::hold_out::{CoordinatePredictions, UsefulTime};
+    use crate::report::Report;
 
     #[test]
     fn headlines_of_predictions_say_good_or_bad() {
@@ -466,7 +463,7 @@ mod tests {
             [row("a", spread(0.5), Some(0.25), 0), row("b", spread(0.125), Some(0.75), 1), row("c", None, None, 0)];
         let found = of_experiment(&rows);
         assert_eq!(
-            found.text(),
+            found.findings().to_string(),
             "Lowest loss 0.125 (b): below the paper's in 1 of 2 rows for which it states one.\n\
              Lowest loss in the paper: 0.250 (a)\n\
              Runs: 6, 1 learned nothing\n\
@@ -474,7 +471,7 @@ mod tests {
              Energy error of predicted motion (best row): -\n"
         );
         assert_eq!(of_experiment(&rows[2..]).sentence, "No run learned anything.");
-        let page = found.begin(Report::new("Experiment")).to_html();
+        let page = Report::new("Experiment").findings(&found.findings()).to_html();
         assert!(page.contains(&found.sentence.replace('\'', "&#39;")) || page.contains(&found.sentence), "{page}");
     }
 }

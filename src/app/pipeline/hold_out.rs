@@ -5,7 +5,7 @@ use crate::analysis::{
     prediction_error, spread, window_valid_times,
 };
 use crate::data::Split;
-use crate::findings::text_table;
+use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
@@ -16,7 +16,7 @@ use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::recording::Smoothed;
-use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot};
+use crate::report::{Figure, LinePlot, Series, Turn, figure, line_plot};
 use crate::rollout::SampledForce;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -463,57 +463,27 @@ impl HoldOut {
         self.wrong_signature.is_nan()
     }
 
-    /// Table of the errors of the forces, if the model was learned from them.
-    fn force_table(&self) -> Option<Vec<Vec<String>>> {
-        (!self.force_errors.is_empty()).then(|| self.force_errors.iter().map(ForceError::row).collect())
-    }
-
-    /// Remarks below the table of predictions, in words.
-    fn remarks(&self) -> String {
+    /// Errors of forces and predictions, and the balance of energy.
+    pub(crate) fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        if !self.force_errors.is_empty() {
+            findings.heading("Errors of the forces of held-out motion");
+            findings.table(&ForceError::HEADERS, self.force_errors.iter().map(ForceError::row));
+        }
+        findings.heading("Errors of the predictions of held-out motion");
         if self.is_of_nothing() {
-            return "nothing was held out (--hold-out 0): this model was not tested\n".to_string();
+            findings.line("Nothing was held out (--hold-out 0): this model was not tested.");
+            return findings;
         }
-        let mut text = self.given_up.clone();
-        if let Some(balance) = &self.energy {
-            text += &balance.text();
-        }
-        text
-    }
-
-    /// For a terminal.
-    pub(crate) fn text(&self) -> String {
-        if self.is_of_nothing() {
-            return self.remarks();
-        }
-        let forces = self.force_table().map(|rows| format!("{}\n", text_table(&ForceError::HEADERS, &rows)));
-        let forces = forces.unwrap_or_default();
         if self.model.is_empty() {
-            let none = "no window of the held-out motion is as long as the horizon: nothing was predicted\n";
-            return format!("{forces}{none}{}", self.remarks());
+            findings.line("No window of the held-out motion is as long as the horizon: nothing was predicted.");
         }
-        let apart = self.table_by_coordinate();
-        let apart = apart.map(|(headers, rows)| format!("\n{}\n", text_table(&headers, &rows))).unwrap_or_default();
-        format!("{forces}{}{apart}{}", text_table(&self.headers(), &self.rows()), self.remarks())
-    }
-
-    /// Adds the tables to a report; the pictures stand above all tables of a page.
-    pub(crate) fn report(&self, report: Report) -> Report {
-        let report = match self.force_table() {
-            Some(rows) => report
-                .heading("Errors of the forces of held-out motion")
-                .table(&ForceError::HEADERS.map(str::to_string), &rows),
-            None => report,
-        };
-        let report = report.heading("Errors of the predictions of held-out motion");
-        if self.is_of_nothing() {
-            return report.paragraph(self.remarks().trim_end());
+        findings.table(&self.headers(), self.rows());
+        if let Some((headers, rows)) = self.table_by_coordinate() {
+            findings.gap().table(&headers, rows);
         }
-        let report = report.table(&self.headers(), &self.rows());
-        let report = match self.table_by_coordinate() {
-            Some((headers, rows)) => report.table(&headers, &rows),
-            None => report,
-        };
-        self.remarks().lines().fold(report, |report, line| report.paragraph(line))
+        findings.lines(self.given_up.lines()).lines(self.energy.iter().flat_map(Balance::lines));
+        findings
     }
 }
 

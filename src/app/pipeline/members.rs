@@ -3,7 +3,7 @@
 
 use crate::analysis::{PredictionError, prediction_error};
 use crate::configuration::{Config, MOST_SEED};
-use crate::findings::text_table;
+use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::names::{number, percent, percentage};
 use crate::network::NetworkLagrangian;
@@ -15,7 +15,6 @@ use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{Event, InMemory, MODEL, Output, PipelineError, SUMMARY, Watch, fit};
-use crate::report::Report;
 use crate::storage::read_regular;
 use crate::symmetry::{Chart, SymmetryError};
 use crate::training::StopReason;
@@ -186,30 +185,26 @@ impl Members {
         ["model", "seed"].map(String::from).into_iter().chain(times).chain(ends).collect()
     }
 
-    /// The text below the table.
-    fn remark(&self) -> String {
+    /// What stands below the table.
+    fn remarks(&self) -> Vec<String> {
         if !self.not_compared.is_empty() {
-            return format!("the Lagrangians of the members were not compared: {}\n", self.not_compared);
+            return vec![format!("the Lagrangians of the members were not compared: {}", self.not_compared)];
         }
         let one = |name: &str, spread: Option<f64>| spread.map(|spread| format!("{name} {}", percent(spread)));
         let known = [one("mass matrix", self.mass_matrix_spread), one("potential", self.potential_spread)];
         let known: Vec<String> = known.into_iter().flatten().collect();
         let known = if known.is_empty() { "not finite".to_string() } else { known.join(", ") };
-        format!(
-            "factor: multiplies a member's L to match the first, up to a gauge; off: the remaining difference at held-out states\n\
-             spread between the members there: {known}\n"
-        )
+        let meaning = "factor: multiplies a member's L to match the first, up to a gauge; off: the remaining difference at \
+                       held-out states";
+        vec![meaning.to_string(), format!("spread between the members there: {known}")]
     }
 
-    /// For a terminal.
-    pub(crate) fn text(&self) -> String {
-        format!("\n{}{}", text_table(&self.headers(), &self.rows()), self.remark())
-    }
-
-    /// Adds the table to a report.
-    pub(crate) fn report(&self, report: Report) -> Report {
-        let report = report.heading("Members, trained from different seeds");
-        report.table(&self.headers(), &self.rows()).paragraph(self.remark().trim_end())
+    /// The members beside each other.
+    pub(crate) fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        findings.heading("Members, trained from different seeds");
+        findings.table(&self.headers(), self.rows()).lines(self.remarks());
+        findings
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::configuration::Config;
 use crate::experiments::{Choice, sweep_runs};
+use crate::findings::Findings;
 use crate::pipeline::{Experiment, ExperimentDirectory, KeptRecord, PipelineError, Watch, kept_record, run_experiment};
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -27,8 +28,8 @@ pub struct Swept {
     pub rows: Vec<Map<String, Value>>,
     /// Runs that are finished.
     pub finished: usize,
-    /// Headline and tables for a terminal.
-    pub text: String,
+    /// Headline and tables.
+    pub findings: Findings,
 }
 
 /// Trains every configuration, each with so many seeds from its own on, as many at a time as there are threads, into directories of their own
@@ -50,5 +51,5 @@ pub fn sweep(
         }
     }
     let done = run_experiment(&Sweep, runs, threads, &store, watch)?;
-    Ok(Swept { rows: done.table.objects(), finished: done.finished, text: done.text().to_string() })
+    Ok(Swept { rows: done.table.objects(), finished: done.finished, findings: done.findings })
 }

@@ -38,8 +38,8 @@ impl TimeSteps {
         Self { bridged: reading.bridged, cuts: reading.cuts.len(), jitter: jitter.fold(0.0, f64::max), left_out }
     }
 
-    /// In words; empty where steps are even and there is no gap.
-    pub fn text(&self) -> String {
+    /// In words; nothing where steps are even and there is no gap.
+    pub fn lines(&self) -> Vec<String> {
         let mut parts = Vec::new();
         let Bridged { gaps, rows, longest } = self.bridged;
         if gaps > 0 {
@@ -53,15 +53,15 @@ impl TimeSteps {
             parts.push(format!("time steps vary by {}", percent(self.jitter)));
         }
         if parts.is_empty() {
-            return String::new();
+            return Vec::new();
         }
         let LeftOut { between_gaps, at_ends, near_gaps } = self.left_out;
         let rows = pluralize(between_gaps, "row", "rows");
         let samples = pluralize(at_ends, "training sample", "training samples");
-        format!(
-            "{}\nnot learned from: {rows} between gaps, {samples} at ends and {near_gaps} near gaps, without full windows\n",
-            parts.join("; ")
-        )
+        let lost = format!(
+            "not learned from: {rows} between gaps, {samples} at ends and {near_gaps} near gaps, without full windows"
+        );
+        vec![parts.join("; "), lost]
     }
 }
 

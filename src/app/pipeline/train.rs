@@ -4,6 +4,7 @@ use crate::analysis::{stretches, training_instability};
 use crate::configuration::{Config, Phase, Precision};
 use crate::data::{Dataset, Datasets, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
+use crate::findings::Findings;
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
 use crate::names::{number, pluralize};
@@ -117,20 +118,22 @@ impl TrainReport {
         Ok(serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n")
     }
 
-    /// Headline and tables for a terminal.
-    pub fn text(&self) -> String {
-        format!("{}\n{}\n", self.evaluation.text(&self.title), self.headline())
+    /// Headline and tables.
+    pub fn findings(&self) -> Findings {
+        let mut findings = self.evaluation.findings(&self.title);
+        findings.gap().line(self.losses());
+        findings
     }
 
-    /// One-line summary of the run.
-    fn headline(&self) -> String {
+    /// Losses, times and sizes in a line.
+    fn losses(&self) -> String {
         let TrainFigures { validation_loss, test_loss, epochs, weights, .. } = self.figures;
         let fresh = match test_loss {
             loss if loss.is_finite() => number(loss),
             _ => format!("not finite ({} states left out)", self.figures.test_states_left_out),
         };
         format!(
-            "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
+            "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}",
             number(validation_loss),
             pluralize(epochs, "epoch", "epochs"),
             self.figures.training_seconds,
@@ -166,7 +169,7 @@ impl TrainReport {
         output.write(SUMMARY, self.json()?.as_bytes())?;
         let training = training_pictures(&self.history);
         let report = Report::new(&format!("{}: learned", self.title));
-        let report = self.evaluation.summarise(report, &self.title).paragraph(&self.headline());
+        let report = report.findings(&self.evaluation.headline(&self.title)).paragraph(&self.losses());
         let report = write_page(output, report, (&self.header, &self.network), Some(system))?;
         let report = self.evaluation.pictures(report);
         let report = self.evaluation.report(parameter_table(report, system)).section("Training", &training);

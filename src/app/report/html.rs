@@ -107,7 +107,10 @@ impl Report {
     #[must_use]
     pub fn findings(self, findings: &Findings) -> Self {
         findings.parts().iter().fold(self, |report, part| match part {
+            Finding::Summary { sentence, rows } => report.summary(sentence, rows),
+            Finding::Heading(text) => report.heading(text),
             Finding::Line(text) => report.paragraph(text),
+            Finding::Code(text) => report.preformatted(text),
             Finding::Table { headers, rows } => report.table(headers, rows),
             _ => report,
         })

@@ -2,7 +2,9 @@
 
 use crate::configuration::{Config, ConfigError, Precision};
 use crate::data::{Dataset, DatasetError, Datasets, Weighting};
+use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, FormulaConstraints, FormulaError};
+use crate::names::{number, pluralize};
 use crate::network::file::{Header, ModelFile, ModelFileError};
 use crate::network::{NetworkError, NetworkLagrangian, Structure};
 use crate::presets::preset::{of_states, take_structure};
@@ -74,6 +76,17 @@ pub struct Learned {
     pub stop: StopReason,
     /// Contents of the model's file besides the weights.
     pub header: Header,
+}
+
+impl Learned {
+    /// The losses and the length of the training, in a sentence.
+    pub fn findings(&self) -> Findings {
+        let [validation, fresh] = [self.validation_loss, self.test_loss].map(number);
+        let epochs = pluralize(self.history.len(), "epoch", "epochs");
+        let mut findings = Findings::default();
+        findings.line(format!("loss (paper): validation {validation}, held-out states {fresh}; {epochs}"));
+        findings
+    }
 }
 
 /// Failure of a [`Trainer`].

@@ -9,9 +9,9 @@ impl FoundFormula {
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         self.say_verdict(&mut findings);
-        findings.gap().line(format!("L = {}", self.text(false)));
+        findings.gap().code(format!("L = {}", self.text(false)));
         if self.friction {
-            findings.line(format!("D = {}", self.text(true)));
+            findings.code(format!("D = {}", self.text(true)));
         }
         let headers = ["term", "constant", "coefficient", "error", "95 % range", "unit", "probability", "near"];
         findings.gap().table(&headers, self.terms.iter().map(FoundTerm::row));

@@ -3,7 +3,7 @@
 use super::{Camera, Image, Outline, RelativityError, Shadow, Tracing, difference_image, outline, shadow};
 use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, Interruptible};
-use crate::names::{WIDTH, percentage, pluralize, rounded, wrap_text};
+use crate::names::{percentage, pluralize, rounded};
 use crate::relativity::Sky;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -239,7 +239,7 @@ impl ShadowSummary {
             rounded(self.inclination, 4),
             place.map_or(String::new(), |place| format!(": {place}"))
         );
-        findings.line(wrap_text(&seen, WIDTH).trim_end());
+        findings.line(seen);
         let headers: Vec<&str> = std::iter::once("").chain(self.views.keys().copied()).collect();
         findings.gap().table(&headers, self.rows(&unit));
         if let Some(found) = &self.difference {
@@ -251,12 +251,12 @@ impl ShadowSummary {
                 rounded(found.median_angle, 2),
                 rounded(found.angle_99, 2)
             );
-            findings.gap().line(wrap_text(&text, WIDTH).trim_end());
+            findings.gap().line(text);
         }
         if self.free_factor {
             let text = "Time and space are not coupled: motion does not determine the unit of time relative to that of space. The learned \
                         impact parameters are known up to one factor, and the area up to its square.";
-            findings.line(wrap_text(text, WIDTH).trim_end());
+            findings.line(text);
         }
         let unfinished: usize = self.views.values().map(|view| view.unfinished).sum();
         if unfinished > 0 {

@@ -2,7 +2,7 @@
 
 use super::{Comparison, Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
-use crate::names::{WIDTH, number as digits, pluralize, rounded, wrap_text};
+use crate::names::{number as digits, pluralize, rounded};
 use serde::{Serialize, Serializer};
 
 /// Singular values that are shown beyond the gap, and at most.
@@ -157,7 +157,7 @@ impl SymmetrySummary {
                 "L is degenerate: its mass matrix is singular at {singular} of {points} states and does not determine the motion there; a null \
                  direction times any function may be a symmetry, so that the number of symmetries depends on the basis"
             );
-            findings.line(wrap_text(&text, WIDTH).trim_end());
+            findings.line(text);
         }
     }
 
@@ -165,7 +165,7 @@ impl SymmetrySummary {
         let last = (self.count.unwrap_or(0) + BEYOND).min(SHOWN);
         let shown: Vec<String> = self.singular_values.iter().take(last).map(|x| digits(*x)).collect();
         let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
-        findings.line(wrap_text(&format!("singular values {}{more}", shown.join(", ")), WIDTH).trim_end());
+        findings.line(format!("singular values {}{more}", shown.join(", ")));
         let gap = self.gap.map_or(String::new(), |gap| format!("gap {}; ", digits(gap)));
         findings.line(format!("{gap}{} functions ({}), {} states", self.functions, self.basis, self.points));
     }
@@ -226,12 +226,9 @@ impl QuadraticSummary {
                 .line("no conserved quantity quadratic in the momenta beyond the energy and products of charges"),
             Some(count) => {
                 let count = pluralize(count, "conserved quantity", "conserved quantities");
-                let list = self.conserved.iter().map(|quantity| format!("  {quantity}\n"));
-                let text = format!(
-                    "{count} quadratic in the momenta beyond the energy and products of charges:\n{}",
-                    list.collect::<String>()
-                );
-                findings.line(wrap_text(&text, WIDTH).trim_end())
+                findings
+                    .line(format!("{count} quadratic in the momenta beyond the energy and products of charges:"))
+                    .lines(self.conserved.iter().map(|quantity| format!("  {quantity}")))
             }
         };
     }
@@ -258,7 +255,7 @@ impl ComparisonSummary {
     pub fn findings(&self) -> Findings {
         let found = &self.comparison;
         let mut findings = Findings::default();
-        findings.lines(self.fit().iter().map(|line| wrap_text(line, WIDTH).trim_end().to_string()));
+        findings.lines(self.fit());
         let rows = [
             ("Lagrangian, after the fit", found.lagrangian),
             ("motion, accelerations", found.motion),

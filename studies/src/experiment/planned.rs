@@ -6,7 +6,7 @@ use super::readings::{self, READING_HEADER, RowOfHoles, read_hole, rows_of_holes
 use super::reductions::{REDUCTION_HEADER, reduction_table};
 use super::run_figures::{pictures_of_runs, within};
 use lnn::experiments::Run;
-use lnn::findings::text_table;
+use lnn::findings::Findings;
 use lnn::network::NetworkLagrangian;
 use lnn::pipeline::{Additions, ExperimentDirectory, Output, PipelineError, Results, Watch};
 use lnn::report::Report;
@@ -84,12 +84,10 @@ impl lnn::pipeline::Experiment for Planned {
         let reads = experiment.reads_holes();
         let holes = if reads { rows_of_holes(results, store, output, watch)? } else { Vec::new() };
         let reductions = reduction_table(&experiment.reductions(results));
-        let mut text = String::new();
-        if !reductions.is_empty() {
-            text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
-        }
+        let mut tables = Findings::default();
+        tables.gap().table(&REDUCTION_HEADER, reductions.iter().cloned());
         for RowOfHoles { label, table, .. } in &holes {
-            text += &format!("\n{label}\n{}", text_table(&READING_HEADER, table));
+            tables.heading(label).table(&READING_HEADER, table.iter().cloned());
         }
         let above = move |report: Report| holes.iter().fold(within(taken, report), |report, row| row.add_to(report));
         let below = move |report: Report| match reductions.is_empty() {
@@ -103,7 +101,7 @@ impl lnn::pipeline::Experiment for Planned {
             figures: figures(experiment, results, &curves),
             above: Some(Box::new(above)),
             below: Some(Box::new(below)),
-            text,
+            tables,
         })
     }
 }

@@ -79,7 +79,7 @@ fn is_good(motion: &Motion<'_>, rng: &mut ChaCha8Rng, (periodic, epochs): ([bool
         config.training.network.hidden = vec![24, 24];
         config.training.phases.iter_mut().for_each(|phase| phase.epochs = epochs);
     });
-    Ok(fit.run().is_ok_and(|found| found.text().starts_with("measured: good: ")))
+    Ok(fit.run().is_ok_and(|found| found.findings().to_string().starts_with("measured: good: ")))
 }
 
 fn fits(seeds: u64) -> Outcome<Vec<Rate>> {

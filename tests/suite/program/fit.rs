@@ -199,7 +199,7 @@ fn measured_accelerations_and_friction_are_learned() {
         let found = summary(&folder, &run, out);
         assert_eq!(found["targets"], "measured");
         // A steady loss of energy asks for friction where there is none.
-        assert_eq!(run.stderr.contains("--friction learns it"), friction.is_empty(), "{}", run.stderr);
+        assert_eq!(run.stdout.contains("--friction learns it"), friction.is_empty(), "{}", run.stdout);
         assert_eq!(found["energy_loss"].is_object(), friction.is_empty());
         let ranges = found["determination"].as_array().unwrap();
         assert_eq!(ranges.len(), if friction.is_empty() { 4 } else { 6 }, "{ranges:?}");

@@ -18,9 +18,9 @@ fn fitted(folder: &Folder, data: &str, out: &str, more: &[&str]) -> (Run, Value)
     (run, summary)
 }
 
-/// `true` if a note asks for `--friction`.
+/// `true` if the report asks for `--friction`.
 fn asks_for_friction(run: &Run) -> bool {
-    run.stderr.lines().any(|line| line.contains("--friction"))
+    run.stdout.lines().any(|line| line.contains("--friction"))
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn a_model_that_learned_nothing_is_stated_to_be_determined_in_nothing() {
         let worst = found["misfit"].as_object().unwrap().values().map(|x| x.as_f64().unwrap()).fold(0.0, f64::max);
         assert!(worst > 0.3, "{worst}");
         assert!(!run.stdout.contains("cases of 10") && !run.stdout.contains("well determined"), "{}", run.stdout);
-        assert!(!asks_for_friction(&run), "{}", run.stderr);
+        assert!(!asks_for_friction(&run), "{}", run.stdout);
     }
 }
 
@@ -108,7 +108,7 @@ fn friction_of_one_coordinate_is_asked_for_where_there_is_some() {
         let data = folder.file("swings.csv", pendulum(12, damped, sigma));
         let more = [&COLUMNS[..], &["--hidden", "8", "--epochs", "2", "--overwrite"]].concat();
         let (run, found) = fitted(&folder, &data, "out", &more);
-        assert_eq!(asks_for_friction(&run), damped, "{damped} {sigma} {}", run.stderr);
+        assert_eq!(asks_for_friction(&run), damped, "{damped} {sigma} {}", run.stdout);
         let decay = &found["decay"];
         let [rate, error] = ["rate", "error"].map(|key| decay[key].as_f64().unwrap());
         assert!(if damped { rate > 0.3 } else { rate.abs() < 4.0 * error.max(1e-3) }, "{decay}");
