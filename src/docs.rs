@@ -2,6 +2,9 @@
 //!
 //! | page | for |
 //! |---|---|
+//! | [`tutorial_film`] | a quarter of an hour: from a film's tracked points to a law with its constants |
+//! | [`tutorial_robot`] | the same from a robot's log of angles and torques to its constants and to inverse dynamics |
+//! | [`tutorial_metric`] | the same from a metric to its curvature, its geodesics, and a picture of its sky |
 //! | [`commands`] | every command and option of the program, exit codes, files |
 //! | [`many_machines`] | running an experiment on a cluster or in many processes |
 //! | [`system_files`] | describing your own system in a text file, by a Lagrangian or a metric |
@@ -14,6 +17,7 @@
 //! | [`constraints`] | constraints beside a Lagrangian, found in data, kept in roll-outs; degenerate Lagrangians |
 //! | [`formula`] | a Lagrangian as a formula, from recorded motion or from a model |
 //! | [`identify`] | the constants of a Lagrangian whose form is known, from recorded motion |
+//! | [`limits`] | what motion does not determine: gauge, factor, factors of blocks |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`summary`] | `summary.json` and `evaluation.json`, key by key |
 //! | [`method`] | equations, penalties, identities, units and conventions |
@@ -88,6 +92,17 @@ macro_rules! page {
             "[architecture]: crate::docs::architecture\n",
             "[building]: crate::docs::building\n",
             "[studies]: crate::docs::building#studies\n",
+            "[the-factor]: crate::docs::limits#the-factor\n",
+            "[limits]: crate::docs::limits\n",
+            "[tutorial-film]: crate::docs::tutorial_film\n",
+            "[tutorial-robot]: crate::docs::tutorial_robot\n",
+            "[tutorial-metric]: crate::docs::tutorial_metric\n",
+            "[fitted-to-forces]: crate::docs::identify#constants-fitted-to-forces\n",
+            "[functions]: crate::docs::symmetries#functions\n",
+            "[comparison]: crate::docs::symmetries#comparing-two-lagrangians\n",
+            "[search]: crate::docs::formula#how-it-is-found\n",
+            "[known-forces]: crate::docs::recorded_motion#known-forces\n",
+            "[base-parameters]: crate::docs::tutorial_robot#identify\n",
             "\n",
             include_str!(concat!("../docs/", $file))
         )
@@ -101,6 +116,9 @@ macro_rules! pages {
 }
 
 pages! {
+    tutorial_film "tutorial-film.md";
+    tutorial_robot "tutorial-robot.md";
+    tutorial_metric "tutorial-metric.md";
     commands "commands.md";
     many_machines "many-machines.md";
     system_files "system-files.md";
@@ -113,6 +131,7 @@ pages! {
     constraints "constraints.md";
     formula "formula.md";
     identify "identify.md";
+    limits "limits.md";
     certificates "certificates.md";
     verdicts "verdicts.md";
     summary "summary.md";

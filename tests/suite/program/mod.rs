@@ -33,5 +33,6 @@ mod symmetries;
 mod system_files;
 mod train;
 mod tube;
+mod tutorials;
 mod verdicts;
 mod words;
