@@ -262,7 +262,7 @@ fn a_metric_has_a_curvature_a_fall_and_a_sky() {
     let speed = (1.0 - 1.0 / 65_f64.sqrt()).exp_m1().sqrt();
     let fastest = metric.column("fall.csv", "l_dot").into_iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     assert!((fastest - speed).abs() < 1e-3, "{fastest}, not {speed}");
-    let farthest = metric.column("fall.csv", "l").into_iter().fold(0.0, |least: f64, value| least.min(value));
+    let farthest = metric.column("fall.csv", "l").into_iter().fold(0.0, f64::min);
     assert!((farthest + 8.0).abs() < 1e-3, "{farthest}");
     for (picture, impact) in [("sky.png", 0.5_f64.exp()), ("massless.png", 1.0)] {
         let edge = metric.step(picture).json()["exact"]["right"].as_f64().unwrap();
