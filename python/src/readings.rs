@@ -35,7 +35,7 @@ pub fn check(py: Python<'_>, motion: Motion) -> PyResult<String> {
         };
         let call = verb.map(|verb| format!("lnn.{verb}({meaning}{more})"));
         if let Some(call) = &call {
-            findings.gap().line("next:").line(format!("  {call}"));
+            findings.heading("next:").code(format!("  {call}"));
         }
         let constraints = look.constraints.as_ref().map(|found| found.formulas()).unwrap_or_default();
         shown(&json!({ "facts": look, "call": call, "constraints": constraints }), &findings)

@@ -27,8 +27,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return output::print(&output::json(&look)?);
     }
     let mut findings = look.findings();
-    if let Some(next) = command(&args.recording, &columns, &look) {
-        findings.heading("next:").code(format!("  {next}"));
+    for (when, next) in commands(&args.recording, &columns, &look) {
+        findings.heading(when).code(format!("  {next}"));
     }
     output::print(&findings.to_string())
 }
@@ -45,14 +45,21 @@ pub fn first_look(reading: &LoadedRecording, guessed: Vec<ColumnGuess>) -> Resul
     })
 }
 
-/// The command to run next, if there is one.
-fn command(recording: &RecordingArgs, columns: &Columns, look: &FirstLook) -> Option<String> {
-    let (verb, options) = match look.next {
-        NextStep::Mend | NextStep::Record => return None,
-        NextStep::Formula if look.has_friction() => ("formula", " --friction"),
-        NextStep::Formula => ("formula", ""),
-        NextStep::FitConstrained => ("fit", " --constraints find"),
-        NextStep::Fit => ("fit", ""),
+/// The commands to run next, the first one first, each with the occasion for it.
+fn commands(recording: &RecordingArgs, columns: &Columns, look: &FirstLook) -> Vec<(&'static str, String)> {
+    let command = |verb: &str, options: &str| format!("lnn {verb}{}{options}", recording.command(columns));
+    let friction = if look.has_friction() { " --friction" } else { "" };
+    let mut commands = match look.next {
+        NextStep::Mend | NextStep::Record => return Vec::new(),
+        NextStep::Formula => vec![("next:", command("formula", friction))],
+        NextStep::FitConstrained => vec![("next:", command("fit", " --constraints find"))],
+        NextStep::Fit => vec![("next:", command("fit", ""))],
     };
-    Some(format!("lnn {verb}{}{options}", recording.command(columns)))
+    if look.unfinished {
+        commands.push(("if that finds no formula:", command("fit", "")));
+    }
+    if !columns.force.is_empty() {
+        commands.push(("if you know the form of L, in a file FORM.toml:", command("identify", " --system FORM.toml")));
+    }
+    commands
 }

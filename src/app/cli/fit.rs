@@ -7,7 +7,7 @@ use crate::cli::print_config::{PrintFormat, commented, fit_reference, training_r
 use crate::cli::recording_args::read;
 use crate::cli::resume::{Learner, Text, reopen};
 use crate::cli::{CliError, output};
-use crate::pipeline::{Begin, FitConfig, NextStep, PipelineError, PreparedFit, fit};
+use crate::pipeline::{Begin, FitConfig, PipelineError, PreparedFit, fit};
 use crate::recording::LoadedRecording;
 use std::time::Instant;
 
@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 fn advise(reading: &LoadedRecording) -> Result<(), CliError> {
     let look = first_look(reading, Vec::new())?;
     look.laws().iter().for_each(|law| output::note(law));
-    if look.next == NextStep::Formula {
+    if look.formula.is_some() {
         output::note(
             "lnn formula states its constants with their errors; lnn identify fits those of a form that you know",
         );

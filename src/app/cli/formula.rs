@@ -13,6 +13,7 @@ use crate::formula::{
 };
 use crate::identification::Between;
 use crate::recording::LoadedRecording;
+use crate::report::formula_figures;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -153,7 +154,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             .map_err(|(_, problem)| CliError::usage(format_args!("--out: no system file: {problem}")))?;
         out.write(text.as_bytes())?;
     }
-    result_page::write(page, "The Lagrangian as a formula", &found.findings(), &[])?;
+    result_page::write(page, "The Lagrangian as a formula", &found.findings(), &formula_figures(&found))?;
     if args.json {
         return OutputFile::print(out, &output::json(&found.summary(&args.name))?);
     }

@@ -29,7 +29,7 @@ pub enum NextStep {
     Mend,
     /// Record other motion: nothing accelerates.
     Record,
-    /// Take the formula that explains the motion.
+    /// Take the formula that explains the motion, or search on for one if the search ended at its limit of time.
     Formula,
     /// Learn a network under the constraints that hold the motion.
     FitConstrained,
@@ -90,8 +90,9 @@ impl FirstLook {
         let next = match (&obstacle, &formula) {
             _ if !survey.accelerates => NextStep::Record,
             (Some(_), _) => NextStep::Mend,
-            (None, Some(_)) => NextStep::Formula,
             _ if held => NextStep::FitConstrained,
+            (None, Some(_)) => NextStep::Formula,
+            _ if unfinished => NextStep::Formula,
             _ => NextStep::Fit,
         };
         Ok(Self { guessed, survey, obstacle, searched, constraints, formula, unfinished, next })
@@ -138,7 +139,7 @@ impl FirstLook {
             }
         }
         if self.unfinished {
-            laws.push(format!("no formula was found within {} s; lnn formula searches on", LIMIT.as_secs()));
+            laws.push(format!("no formula was found within {} s; a longer search may find one", LIMIT.as_secs()));
         }
         if !laws.is_empty() && self.searched < self.survey.samples {
             laws.push(format!("laws were looked for in {} of the {} samples", self.searched, self.survey.samples));
@@ -146,9 +147,9 @@ impl FirstLook {
         laws
     }
 
-    /// `true` if the formula has terms of friction.
+    /// `true` if a formula is to be looked for with friction: it has terms of friction, or none was found in time.
     pub fn has_friction(&self) -> bool {
-        self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
+        self.unfinished || self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
     }
 }
 

@@ -1,7 +1,8 @@
-//! Pictures of an identification: what was measured and fitted, the residuals, their autocorrelation.
+//! Pictures of an identification and of a formula: what was measured and fitted, the residuals, their autocorrelation.
 
 use super::{Figure, HeatMap, Level, LinePlot, Series, figure, file_part, heat_maps, line_plot};
 use crate::analysis::Grid;
+use crate::formula::FoundFormula;
 use crate::identification::{Identified, ResidualPath};
 use crate::names::number;
 
@@ -12,43 +13,136 @@ const POINTS: usize = 4000;
 /// Largest lag of an autocorrelation, in samples.
 const LAGS: usize = 40;
 
+/// What was measured and fitted, for pictures.
+struct Fit<'a> {
+    /// Names of the coordinates, of which files have theirs.
+    names: Vec<&'a str>,
+    /// `true` if forces on them were fitted.
+    is_force: bool,
+    units: Vec<&'static str>,
+    noise: Vec<f64>,
+    paths: &'a [ResidualPath],
+}
+
 /// Measured and fitted values of the stretch with the median residual, all residuals over time, and their autocorrelation, for each
 /// coordinate; the correlations of the constants. `periodic` are the coordinates that are angles.
 pub fn identification_figures(found: &Identified, periodic: &[bool]) -> Vec<Figure> {
-    let n = found.residuals.len();
-    let of = |i: usize| {
-        let name = &found.residuals[i].coordinate;
+    let is_force = found.segments == 0;
+    let fit = Fit {
+        names: found.residuals.iter().map(|residual| residual.coordinate.as_str()).collect(),
+        is_force,
+        units: units(periodic, is_force),
+        noise: found.residuals.iter().map(|residual| residual.noise).collect(),
+        paths: &found.paths,
+    };
+    fit.figures().chain(correlations(found)).collect()
+}
+
+/// Measured and fitted values of held-out motion, as [`identification_figures`] draws them; none for the formula of a model.
+pub fn formula_figures(found: &FoundFormula) -> Vec<Figure> {
+    let fit = Fit {
+        names: found.coordinates.iter().map(String::as_str).collect(),
+        is_force: false,
+        units: units(&found.periodic, false),
+        noise: found.noise.clone(),
+        paths: &found.paths,
+    };
+    if found.paths.is_empty() { Vec::new() } else { fit.figures().collect() }
+}
+
+fn units(periodic: &[bool], is_force: bool) -> Vec<&'static str> {
+    periodic.iter().map(|angle| if *angle && !is_force { "rad" } else { "SI" }).collect()
+}
+
+impl Fit<'_> {
+    fn figures(&self) -> impl Iterator<Item = Figure> {
+        (0..self.names.len().min(COORDINATES)).flat_map(|i| self.of(i)).flatten()
+    }
+
+    /// The pictures of coordinate `i`.
+    fn of(&self, i: usize) -> [Option<Figure>; 3] {
+        let (name, unit, noise) = (self.names[i], self.units[i], number(self.noise[i]));
         let file = |what: &str| format!("{what}_{}.svg", file_part(name));
-        let (what, unit) = match (found.segments, periodic.get(i)) {
-            (0, _) => (format!("force on {name}"), "SI"),
-            (_, Some(true)) => (name.clone(), "rad"),
-            _ => (name.clone(), "SI"),
+        let what = if self.is_force { format!("force on {name}") } else { name.to_string() };
+        let noise = match self.is_force {
+            true => format!("The fit weighs averages of these, whose noise is {noise}."),
+            false => format!("The noise is {noise}."),
         };
-        let [fitted, residuals, correlation] =
-            [fitted(found, i, unit), residuals(found, i, unit), lags(found, i, &what)];
         [
             figure(
                 &file("fitted"),
                 format!("Measured and fitted {what}"),
-                line_plot(&fitted),
+                line_plot(&self.fitted(i, unit)),
                 "The stretch whose residual is the median of all stretches.",
             ),
             figure(
                 &file("residuals"),
                 format!("Residuals of {what}"),
-                line_plot(&residuals),
-                format!("Measured minus fitted, at all samples. The noise is {}.", number(found.residuals[i].noise)),
+                line_plot(&self.residuals(i, unit)),
+                format!("Measured minus fitted, at all samples. {noise}"),
             ),
             figure(
                 &file("autocorrelation"),
                 format!("Autocorrelation of the residuals of {what}"),
-                line_plot(&correlation),
+                line_plot(&self.lags(i, &what)),
                 "That of a model that fits scatters about 0, apart from the lags within which the initial states of short stretches \
                  take up residuals.",
             ),
         ]
-    };
-    (0..n.min(COORDINATES)).flat_map(of).flatten().chain(correlations(found)).collect()
+    }
+
+    fn fitted(&self, i: usize, unit: &str) -> LinePlot {
+        let n = self.names.len();
+        let mut order: Vec<&ResidualPath> = self.paths.iter().collect();
+        order.sort_by(|a, b| mean_square(a).total_cmp(&mean_square(b)));
+        let path = order.get(order.len() / 2).map_or_else(ResidualPath::default, |path| (*path).clone());
+        let measured: Vec<f64> = column(&path.measured, n, i).collect();
+        let fitted: Vec<f64> = measured.iter().zip(column(&path.residuals, n, i)).map(|(y, r)| y - r).collect();
+        let lines = [("measured", &measured), ("fitted", &fitted)];
+        let lines = lines.map(|(name, values)| Series::new(name, &path.times, values));
+        let [measured, fitted] = lines;
+        plot(["", "t [s]", &format!("value [{unit}]")], vec![measured, fitted.over()])
+    }
+
+    fn residuals(&self, i: usize, unit: &str) -> LinePlot {
+        let n = self.names.len();
+        let samples: usize = self.paths.iter().map(|path| path.times.len()).sum();
+        let stride = samples.div_ceil(POINTS).max(1);
+        let mut points = Vec::new();
+        for path in self.paths {
+            points.extend(path.times.iter().copied().zip(column(&path.residuals, n, i)).step_by(stride));
+            // Stretches are not joined.
+            points.push((f64::NAN, f64::NAN));
+        }
+        let level = Some(Level { value: 0.0, name: String::new() });
+        let series = vec![Series { name: String::new(), points, over: false }];
+        LinePlot { level, ..plot(["", "t [s]", &format!("residual [{unit}]")], series) }
+    }
+
+    fn lags(&self, i: usize, what: &str) -> LinePlot {
+        let n = self.names.len();
+        let (mut sums, mut counts) = (vec![0.0; LAGS + 1], vec![0.0; LAGS + 1]);
+        for path in self.paths {
+            let values: Vec<f64> = column(&path.residuals, n, i).collect();
+            for lag in 0..=LAGS.min(values.len().saturating_sub(1)) {
+                for (a, b) in values.iter().zip(&values[lag..]).filter(|(a, b)| a.is_finite() && b.is_finite()) {
+                    sums[lag] += a * b;
+                    counts[lag] += 1.0;
+                }
+            }
+        }
+        let variance = sums[0] / f64::max(counts[0], 1.0);
+        let seen: Vec<usize> = (1..=LAGS).filter(|&lag| counts[lag] > 1.0).collect();
+        let over_lags = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&lag| (lag as f64, of(lag))).collect::<Vec<_>>();
+        let points = over_lags(&|lag| sums[lag] / counts[lag] / variance);
+        let own = Series { name: what.to_string(), points, over: false };
+        let bound = |sign: f64| over_lags(&|lag| sign * 1.96 / counts[lag].sqrt());
+        let points = [bound(1.0), vec![(f64::NAN, f64::NAN)], bound(-1.0)].concat();
+        let bounds = Series { name: "95 % of white noise".to_string(), points, over: false };
+        let level = Some(Level { value: 0.0, name: String::new() });
+        let series = vec![own, bounds];
+        LinePlot { level, ..plot(["", "lag [samples]", "autocorrelation"], series) }
+    }
 }
 
 /// Points of a map along the side of a cell.
@@ -88,57 +182,4 @@ fn mean_square(path: &ResidualPath) -> f64 {
 fn plot([title, x_label, y_label]: [&str; 3], series: Vec<Series>) -> LinePlot {
     let (title, x_label, y_label) = (title.into(), x_label.into(), y_label.into());
     LinePlot { title, x_label, y_label, log_y: false, turn: None, level: None, series }
-}
-
-fn fitted(found: &Identified, i: usize, unit: &str) -> LinePlot {
-    let n = found.residuals.len();
-    let mut order: Vec<&ResidualPath> = found.paths.iter().collect();
-    order.sort_by(|a, b| mean_square(a).total_cmp(&mean_square(b)));
-    let path = order.get(order.len() / 2).map_or_else(ResidualPath::default, |path| (*path).clone());
-    let measured: Vec<f64> = column(&path.measured, n, i).collect();
-    let fitted: Vec<f64> = measured.iter().zip(column(&path.residuals, n, i)).map(|(y, r)| y - r).collect();
-    let lines = [("measured", &measured), ("fitted", &fitted)];
-    let lines = lines.map(|(name, values)| Series::new(name, &path.times, values));
-    let [measured, fitted] = lines;
-    plot(["", "t [s]", &format!("value [{unit}]")], vec![measured, fitted.over()])
-}
-
-fn residuals(found: &Identified, i: usize, unit: &str) -> LinePlot {
-    let n = found.residuals.len();
-    let samples: usize = found.paths.iter().map(|path| path.times.len()).sum();
-    let stride = samples.div_ceil(POINTS).max(1);
-    let mut points = Vec::new();
-    for path in &found.paths {
-        points.extend(path.times.iter().copied().zip(column(&path.residuals, n, i)).step_by(stride));
-        // Stretches are not joined.
-        points.push((f64::NAN, f64::NAN));
-    }
-    let level = Some(Level { value: 0.0, name: String::new() });
-    let series = vec![Series { name: String::new(), points, over: false }];
-    LinePlot { level, ..plot(["", "t [s]", &format!("residual [{unit}]")], series) }
-}
-
-fn lags(found: &Identified, i: usize, what: &str) -> LinePlot {
-    let n = found.residuals.len();
-    let (mut sums, mut counts) = (vec![0.0; LAGS + 1], vec![0.0; LAGS + 1]);
-    for path in &found.paths {
-        let values: Vec<f64> = column(&path.residuals, n, i).collect();
-        for lag in 0..=LAGS.min(values.len().saturating_sub(1)) {
-            for (a, b) in values.iter().zip(&values[lag..]).filter(|(a, b)| a.is_finite() && b.is_finite()) {
-                sums[lag] += a * b;
-                counts[lag] += 1.0;
-            }
-        }
-    }
-    let variance = sums[0] / f64::max(counts[0], 1.0);
-    let seen: Vec<usize> = (1..=LAGS).filter(|&lag| counts[lag] > 1.0).collect();
-    let over_lags = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&lag| (lag as f64, of(lag))).collect::<Vec<_>>();
-    let points = over_lags(&|lag| sums[lag] / counts[lag] / variance);
-    let own = Series { name: what.to_string(), points, over: false };
-    let bound = |sign: f64| over_lags(&|lag| sign * 1.96 / counts[lag].sqrt());
-    let points = [bound(1.0), vec![(f64::NAN, f64::NAN)], bound(-1.0)].concat();
-    let bounds = Series { name: "95 % of white noise".to_string(), points, over: false };
-    let level = Some(Level { value: 0.0, name: String::new() });
-    let series = vec![own, bounds];
-    LinePlot { level, ..plot(["", "lag [samples]", "autocorrelation"], series) }
 }

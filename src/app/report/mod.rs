@@ -15,7 +15,7 @@ pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
 pub use grids::{Fit, GridComparison, grid_figures};
 pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
-pub(crate) use identification::identification_figures;
+pub(crate) use identification::{formula_figures, identification_figures};
 pub use page::{PageError, page};
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,

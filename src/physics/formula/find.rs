@@ -11,7 +11,7 @@ use super::search::{Search, THRESHOLD, covariance, left_over, shorten};
 use super::select::{Choice, Path, eliminate_backward};
 use super::weak::{Windows, is_regular};
 use crate::cancellation::Cancellation;
-use crate::identification::{Between, Segment};
+use crate::identification::{Between, ResidualPath, Segment};
 use crate::names::rounded;
 use crate::random::RngStream;
 use crate::recording::Recording;
@@ -117,6 +117,8 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     stop.check()?;
     let judges = held_out(&data, options.seed);
     let (mut searched, mut refused) = (Vec::new(), None);
+    // A formula of high powers may be the series of a shorter one of other functions.
+    let mut long = false;
     let mut best: Option<FoundFormula> = None;
     let mut least = f64::INFINITY;
     for (families, library) in libraries {
@@ -124,13 +126,17 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
             searched.push(format!("{families} (too many terms)"));
             continue;
         };
+        if long && families.is_polynomial() {
+            continue;
+        }
         searched.push(families.to_string());
         stop.check()?;
         let followed = WeakForm::new(&data, library, &judges, options).and_then(|weak| {
             // A library is fitted to the motion only if it fits accelerations better.
             let (error, before) = (weak.least(), least);
             least = least.min(error);
-            if error > BETTER * before { Ok(None) } else { weak.follow_all(&data, &judges, options).map(Some) }
+            let most = if long { before / BETTER } else { BETTER * before };
+            if error > most { Ok(None) } else { weak.follow_all(&data, &judges, options).map(Some) }
         });
         stop.check()?;
         match followed {
@@ -138,13 +144,20 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
             Ok(None) => {}
             Ok(Some(mut found)) => {
                 let done = found.verdict != Verdict::NotInLibrary;
-                if done || best.as_ref().is_none_or(|best| found.residual < best.residual) {
+                let is_better = match &best {
+                    None => true,
+                    Some(best) if long => found.verdict == Verdict::Found && found.terms.len() < best.terms.len(),
+                    Some(best) => done || found.residual < best.residual,
+                };
+                let is_found = found.verdict == Verdict::Found;
+                if is_better {
                     found.basis = families.to_string();
                     best = Some(found);
                 }
-                if done {
+                if done && !(is_found && families.is_polynomial() && families.polynomial > 2) {
                     break;
                 }
+                long |= is_found;
             }
         }
     }
@@ -345,7 +358,9 @@ impl WeakForm {
         let probability: Vec<f64> = model.terms.iter().map(probability).collect();
         let periodic = &data.recording.periodic;
         let mut found = FoundFormula::new(library, periodic, &model, (&covariance, &probability), options);
-        let judged = Judged { search: &search, model: &model, segments: &judges, square, count };
+        let residuals = search.motion.residuals(&model, &judges);
+        let judged = Judged { search: &search, model: &model, segments: &judges, residuals: &residuals, square, count };
+        found.paths = judged.paths();
         found.forced.clone_from(&data.forced);
         found.draw(library, &model, &resampled.coefficients);
         found.residual = judged.residual();
@@ -387,6 +402,8 @@ struct Judged<'a> {
     search: &'a Search<'a>,
     model: &'a Model,
     segments: &'a [Segment],
+    /// Residuals of the segments in units of the noise, `(samples, n)` each.
+    residuals: &'a [Vec<f64>],
     square: f64,
     count: f64,
 }
@@ -433,12 +450,28 @@ impl Judged<'_> {
         doubts
     }
 
+    /// What was measured, and what is left of it, in SI.
+    fn paths(&self) -> Vec<ResidualPath> {
+        let data = self.search.motion.data;
+        let n = data.n;
+        let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
+            let track = &data.recording.tracks[segment.track];
+            let (samples, sigma) = (segment.first..segment.first + segment.samples, &data.sigma_of[segment.track]);
+            ResidualPath {
+                times: track.times[samples.clone()].to_vec(),
+                measured: track.q[samples.start * n..samples.end * n].to_vec(),
+                residuals: residuals.iter().enumerate().map(|(k, r)| r * sigma[k % n]).collect(),
+            }
+        };
+        self.segments.iter().zip(self.residuals).map(of).collect()
+    }
+
     /// Standard deviation of each coordinate within segments, and of its residual, in units of noise.
     fn motion_and_rest(&self) -> Vec<[f64; 2]> {
         let data = self.search.motion.data;
         let n = data.n;
         let mut sums = vec![[0.0; 4]; n];
-        for (segment, residuals) in self.segments.iter().zip(self.search.motion.residuals(self.model, self.segments)) {
+        for (segment, residuals) in self.segments.iter().zip(self.residuals) {
             let q = &data.recording.tracks[segment.track].q[segment.first * n..][..segment.samples * n];
             for (i, [moved, free, left, rest]) in sums.iter_mut().map(|[a, b, c, d]| [a, b, c, d]).enumerate() {
                 let sigma = data.sigma_of[segment.track][i];

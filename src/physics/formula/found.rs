@@ -6,8 +6,8 @@ use super::function::Notation;
 use super::library::{Library, blocks};
 use super::motion::Model;
 use super::units::{Dimension, Units, of_coefficient};
-use crate::identification::Between;
 use crate::identification::linear::{inverse, part};
+use crate::identification::{Between, ResidualPath};
 use crate::linalg::dot;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -139,6 +139,8 @@ pub struct FoundFormula {
     /// Seed of the random choices.
     pub seed: u64,
     /// Coordinates with known forces.
+    /// Held-out motion, measured and followed; empty for the formula of a model.
+    pub paths: Vec<ResidualPath>,
     pub(super) forced: Vec<bool>,
     pub(super) bounds: Vec<[f64; 2]>,
     pub(super) speeds: Vec<f64>,
@@ -237,6 +239,7 @@ impl FoundFormula {
             of_model: false,
             friction: options.friction,
             seed: options.seed,
+            paths: Vec::new(),
             forced: vec![false; library.n()],
             bounds: Vec::new(),
             speeds: Vec::new(),

@@ -34,6 +34,13 @@ impl Default for Families {
     }
 }
 
+impl Families {
+    /// `true` without powers of distances and reciprocals.
+    pub(super) fn is_polynomial(&self) -> bool {
+        self.radial == 0 && self.reciprocal == 0
+    }
+}
+
 impl std::fmt::Display for Families {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { polynomial, trigonometric, radial, reciprocal } = *self;

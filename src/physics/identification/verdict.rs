@@ -79,7 +79,7 @@ impl Display for Verdict {
         }
         match self {
             Self::Explained => f.write_str("The model fits: the residuals are consistent with the noise."),
-            Self::Exact => f.write_str("The model fits: the residuals are exact to the precision of the integration."),
+            Self::Exact => f.write_str("The model fits: the residuals are exact to the precision of the integration, which the standard errors do not include."),
             Self::NotConverged => f.write_str("the search has not converged."),
             Self::Uninformative { coordinate, share } => write!(
                 f,

@@ -234,6 +234,10 @@ impl QuadraticSummary {
     }
 }
 
+/// Relative distance of motions up to which they agree, and of Lagrangians from which these do not.
+const SAME: f64 = 1e-6;
+const OTHER: f64 = 1e-3;
+
 /// A comparison of two Lagrangians by name, at states drawn by a seed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ComparisonSummary {
@@ -265,6 +269,11 @@ impl ComparisonSummary {
         let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
         findings
             .table(&["quantity", "relative distance"], rows.iter().map(|(name, x)| [name.to_string(), distance(*x)]));
+        if found.motion < SAME && found.lagrangian > OTHER {
+            findings.line(
+                "The motions agree, but the Lagrangians do not: F may be a function that the basis lacks (--basis).",
+            );
+        }
         findings
     }
 

@@ -17,6 +17,13 @@ pub struct Angle {
     pub because: String,
 }
 
+impl Angle {
+    /// An angle in radians.
+    pub fn radians(because: &str) -> Self {
+        Self { degrees: false, because: because.to_string() }
+    }
+}
+
 /// Whether a coordinate is an angle: it jumps by a turn, or its name says so. `restarts` are rows at which a trajectory begins.
 pub fn angle(name: &str, values: &[f64], restarts: &[usize]) -> Option<Angle> {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
@@ -28,7 +35,7 @@ pub fn angle(name: &str, values: &[f64], restarts: &[usize]) -> Option<Angle> {
     // A few long steps among many short ones.
     let few = |count: usize| count > 0 && count * 4 <= values.len();
     if few(jumps(TAU)) {
-        return Some(Angle { degrees: false, because: "it jumps by a full turn".to_string() });
+        return Some(Angle::radians("it jumps by a full turn"));
     }
     if few(jumps(360.0)) {
         return Some(Angle { degrees: true, because: "it jumps by 360".to_string() });

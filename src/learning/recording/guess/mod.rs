@@ -15,7 +15,7 @@ use std::path::Path;
 /// What a column is taken as.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ColumnGuess {
-    /// Its name, or its number in a file without a header.
+    /// Its name, `c` and its number in a file without a header.
     pub column: String,
     /// Its meaning in a word or two, such as `time` or `velocity of x`; `left out` of a column that is not used.
     pub meaning: String,
@@ -46,7 +46,14 @@ pub fn guess<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, Data
         );
     }
     let Some(file) = files.first().map(AsRef::as_ref) else { return Err(DataError::NoFiles) };
-    roles::guess(file, &RawTable::read(file, given.names.as_deref())?, given)
+    let mut table = RawTable::read(file, given.names.as_deref())?;
+    let mut given = given.clone();
+    if table.is_unnamed() {
+        // Numbers cannot be names in formulas.
+        table.names.iter_mut().for_each(|name| name.insert(0, 'c'));
+        given.names = Some(table.names.clone());
+    }
+    roles::guess(file, &table, &given)
 }
 
 #[cfg(test)]

@@ -63,6 +63,12 @@ pub fn is_force(name: &str) -> bool {
     is(name, &words) || ["tau_", "torque_", "force_", "effort_", "f_", "u_"].iter().any(|start| stem.starts_with(start))
 }
 
+/// A name of a torque.
+pub fn is_torque(name: &str) -> bool {
+    let stem = stem(name);
+    is(name, &["tau", "torque", "drehmoment"]) || ["tau_", "torque_"].iter().any(|start| stem.starts_with(start))
+}
+
 /// A name of an acceleration.
 pub fn is_acceleration(name: &str) -> bool {
     let stem = stem(name);

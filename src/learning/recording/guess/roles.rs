@@ -1,7 +1,7 @@
 //! The meaning of all columns of a table together.
 
 use super::angles::{Angle, angle};
-use super::names::{is_acceleration, is_force, is_index, is_position, is_trajectory, is_velocity};
+use super::names::{is_acceleration, is_force, is_index, is_position, is_torque, is_trajectory, is_velocity};
 use super::time::{self, Time, counts};
 use super::{ColumnGuess, Guess};
 use crate::recording::read::{RawTable, read_recording};
@@ -19,6 +19,10 @@ const NAMED: f64 = 0.8;
 const UNNAMED: f64 = 0.995;
 /// Largest relative difference from that derivative, for a column that no name tells.
 const LIKE: f64 = 0.03;
+
+/// Largest range of a fixed point, over the widest range of a coordinate and over its own distance from 0.
+const FIXED: f64 = 0.03;
+const OF_DISTANCE: f64 = 0.05;
 
 /// What a column is.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +56,7 @@ pub fn guess(file: &Path, table: &RawTable, given: &Columns) -> Result<Guess, Da
     roles.find_forces();
     roles.find_derivatives();
     roles.find_coordinates();
+    roles.leave_out_fixed();
     let (angles, columns) = roles.columns();
     if columns.coords.is_empty() {
         let names = table.names.clone();
@@ -295,6 +300,34 @@ impl Roles<'_> {
         }
     }
 
+    /// Leaves out places that hardly move, such as the pivot in a film, unless their names say that they are positions.
+    fn leave_out_fixed(&mut self) {
+        let extent = |k: usize| {
+            let values = self.table.numbers[k].as_deref().unwrap_or_default();
+            let (low, high) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            (high - low, low.abs().min(high.abs()))
+        };
+        let coordinates = self.of(&Role::Coordinate);
+        let Some(widest) = coordinates.iter().copied().max_by(|a, b| extent(*a).0.total_cmp(&extent(*b).0)) else {
+            return;
+        };
+        let fixed = |k: &usize| {
+            let (spread, distance) = extent(*k);
+            let measured =
+                (0..self.roles.len()).any(|j| matches!(&self.roles[j], Some((Role::Derivative(_, of), _)) if of == k));
+            !measured
+                && !is_position(&self.table.names[*k])
+                && spread < FIXED * extent(widest).0
+                && spread < OF_DISTANCE * distance
+        };
+        let fixed: Vec<usize> = coordinates.into_iter().filter(fixed).collect();
+        for k in fixed {
+            let because = format!("it hardly moves beside {}, like a fixed point", self.table.names[widest]);
+            self.set(k, Role::Unused, because);
+        }
+    }
+
     /// The angles among the coordinates, and everything as it is read.
     fn columns(&self) -> (Vec<(usize, Angle)>, Columns) {
         let names = |places: Vec<usize>| places.into_iter().map(|k| self.table.names[k].clone()).collect::<Vec<_>>();
@@ -305,9 +338,15 @@ impl Roles<'_> {
         };
         let units = &self.given.units;
         let known = |name: &String| units.iter().any(|(column, _)| column == name);
-        let found =
-            |&k: &usize| Some((k, angle(&self.table.names[k], self.table.numbers[k].as_ref().ok()?, self.restarts())?));
-        let angles: Vec<(usize, Angle)> = coordinates.iter().filter_map(found).collect();
+        // Of joints under torques.
+        let forces = self.of(&Role::Force);
+        let turned = |place: usize| forces.get(place).is_some_and(|&k| is_torque(&self.table.names[k]));
+        let found = |(place, &k): (usize, &usize)| {
+            let (name, values) = (&self.table.names[k], self.table.numbers[k].as_ref().ok()?);
+            let by_force = || turned(place).then(|| Angle::radians("its force is a torque"));
+            Some((k, angle(name, values, self.restarts()).or_else(by_force)?))
+        };
+        let angles: Vec<(usize, Angle)> = coordinates.iter().enumerate().filter_map(found).collect();
         let mut guessed: Vec<(String, String)> = Vec::new();
         for (k, Angle { degrees, .. }) in &angles {
             let derivatives =

@@ -104,3 +104,27 @@ fn files_without_motion_are_refused() {
     assert!(of("", &Columns::default()).is_err());
     assert!(guess::<&str>(&[], &Columns::default()).is_err());
 }
+
+#[test]
+fn columns_without_names_get_some_and_fixed_points_are_left_out() {
+    let text = rows("", 400, |t| {
+        let angle = 2.0 * (3.0 * t).sin();
+        vec![t, 1200.0 + 3.0 * (9.0 * t).sin(), 1200.0 + 500.0 * angle.sin(), 900.0 - 500.0 * angle.cos()]
+    });
+    let Guess { columns, table } = of(&text, &Columns::default()).unwrap();
+    assert_eq!(columns.names, Some(list(&["c1", "c2", "c3", "c4"])));
+    assert_eq!((columns.time.as_deref(), columns.coords), (Some("c1"), list(&["c3", "c4"])));
+    assert_eq!(table[1].meaning, "left out");
+    // A name that says position is believed, and so are measured velocities.
+    let named = of(&format!("t,x,c,d{text}"), &Columns::default()).unwrap();
+    assert_eq!(named.columns.coords, list(&["x", "c", "d"]));
+}
+
+#[test]
+fn a_joint_under_a_torque_turns() {
+    let row = |t: f64| vec![t, (2.0 * t).sin(), (3.0 * t).cos(), t.sin(), 2.0 * t.cos()];
+    let periodic = |header: &str| of(&rows(header, 300, row), &Columns::default()).unwrap().columns.periodic;
+    assert_eq!(periodic("t,q1,q2,tau1,tau2"), list(&["q1", "q2"]));
+    assert_eq!(periodic("t,q1,q2,force1,force2"), list(&[]));
+    assert_eq!(periodic("t,slide,position,f,torque"), list(&["position"]));
+}

@@ -38,7 +38,7 @@ pub struct Text<'a> {
 /// The first line that is neither blank nor a comment, which begins with `#`, is a header if none of its fields is a number,
 /// and says how fields are separated: by commas, semicolons, tabs, bars or blanks. Without a header the last comment above
 /// names the columns if it has as many names. Spaces around fields, double quotes, a byte order mark, blank lines, the line
-/// ends of Windows and of old Macs, decimal commas and Excel's line `sep=;` are accepted.
+/// ends of Windows and of old Macs, decimal commas, Excel's line `sep=;` and a title above the header are accepted.
 pub fn read<'a>(
     mut input: impl BufRead,
     columns: &'a Columns,
@@ -74,6 +74,7 @@ pub fn read<'a>(
         match &mut begun {
             Some(known) => known.take(whole, text, row)?,
             None if text.strip_prefix(b"sep=").is_some_and(|mark| mark.len() <= 1) => {}
+            None if is_title(text, input.fill_buf()?) => {}
             None => {
                 let (first, header) = Text::begin(whole, row, columns, remark.take(), known)?;
                 let first = begun.insert(first);
@@ -87,6 +88,18 @@ pub fn read<'a>(
     std::mem::take(&mut text.faults).end()?;
     let builders = std::mem::take(&mut text.lanes).into_iter().map(|lane| lane.builder).collect();
     Ok((text, builders))
+}
+
+/// `true` for a line of one field above a line of several, none of which is a number: a title above the header, such as the name of a track.
+fn is_title(line: &[u8], rest: &[u8]) -> bool {
+    let next = rest.split(|byte| matches!(byte, b'\n' | b'\r')).find(|line| !line.trim_ascii().is_empty());
+    let (Some((title, _)), Some((next, _))) = (decode(line), next.and_then(decode)) else { return false };
+    let separator = Separator::of(&next);
+    let names = |text: &str| {
+        let fields = split(text.trim(), separator);
+        fields.iter().all(|field| field.parse::<f64>().is_err() && with_point(field).is_none()).then_some(fields.len())
+    };
+    names(&title) == Some(1) && names(&next).is_some_and(|count| count > 1)
 }
 
 impl<'a> Text<'a> {

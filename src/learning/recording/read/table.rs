@@ -16,9 +16,15 @@ pub struct RawTable {
     /// Numbers of each column in SI as far as the header states units, `(rows)`; the problem of a column that does not hold a number in
     /// every row.
     pub numbers: Vec<Result<Vec<f64>, String>>,
+    has_names: bool,
 }
 
 impl RawTable {
+    /// `true` of a file without names of columns.
+    pub fn is_unnamed(&self) -> bool {
+        !self.has_names && !self.names.is_empty()
+    }
+
     /// Reads every column of a file; `named` are the names of a file without a header.
     ///
     /// # Errors
@@ -41,6 +47,8 @@ impl RawTable {
             Err(problem) => return Err(problem),
             Ok(_) => Vec::new(),
         };
+        // No header is a row of numbers.
+        let has_names = names.iter().any(|name| name.parse::<f64>().is_err());
         let twice = names.iter().enumerate().any(|(k, name)| names[..k].contains(name));
         let names = if twice { (1..=names.len()).map(|k| k.to_string()).collect() } else { names };
         let numbers = match rows(path, &asked(&names)) {
@@ -51,7 +59,7 @@ impl RawTable {
                 .map(|name| rows(path, &asked(std::slice::from_ref(name))).map_err(|problem| problem.to_string()))
                 .collect(),
         };
-        Ok(Self { names, numbers })
+        Ok(Self { names, numbers, has_names })
     }
 }
 

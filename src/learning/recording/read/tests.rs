@@ -77,6 +77,11 @@ fn separators_and_comments_are_read() {
     let remarks = format!("# measured by hand\n# {}", text.replacen("0.3,", "  # a pause\n0.3,", 1));
     let reading = read(&remarks, &coordinates("q2,q1")).unwrap();
     assert_eq!((reading.recording.tracks[0].q.clone(), reading.rows[0].row(3)), (expected.q.clone(), 7));
+    // A title of a track above the header.
+    for (title, separator) in [("mass A\n", "\t"), ("mass_A\n\n", ","), ("\u{feff}# x\nball\r\n", " ")] {
+        let track = read(format!("{title}{}", text.replace(',', separator)), &coordinates("q2,q1")).unwrap();
+        assert_eq!(track.recording.tracks[0].q, expected.q, "{title:?}");
+    }
     // A comment that names nothing leaves numbers of columns.
     let numbered = Columns { time: Some("1".into()), ..coordinates("3,2") };
     let remarked = format!("# by hand\n{}", &text[8..]);

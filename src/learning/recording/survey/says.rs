@@ -56,6 +56,8 @@ impl Survey {
     /// A sentence about how well a fit can learn.
     pub fn headline(&self) -> String {
         let worst = self.worst();
+        let lost = self.coordinates.iter().filter(|c| c.acceleration_error_relative >= 1.0);
+        let lost: Vec<&str> = lost.map(|c| c.name.as_str()).collect();
         let looked = match (self.warnings.len(), self.suspicious_count) {
             (0, 0) => "no problem was found".to_string(),
             (0, places) => format!("look at {} first", pluralize(places, "suspicious place", "suspicious places")),
@@ -63,6 +65,9 @@ impl Survey {
         };
         let good = match self.targets {
             Targets::Measured => "the accelerations are measured".to_string(),
+            _ if !lost.is_empty() && lost.len() < self.coordinates.len() => {
+                format!("but noise hides the accelerations of {}", lost.join(", "))
+            }
             _ if worst.is_finite() => format!("smoothing gives the accelerations to {}", percent(worst)),
             _ => "smoothing gives no accelerations".to_string(),
         };
