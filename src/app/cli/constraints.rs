@@ -13,6 +13,7 @@ use crate::constraints::{
 };
 use crate::lagrangian::{EulerLagrange, FormulaConstraints};
 use crate::recording::smooth::SmoothOptions;
+use crate::report::found_constraint_figures;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -84,11 +85,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         ConstraintSearchError::Cancelled(_) => CliError::nothing_written(),
         error => CliError::data(error),
     })?;
-    drop(samples);
     if let Some(out) = &out {
         write_table(out, &found)?;
     }
-    result_page::write(page, "Constraints of recorded motion", &found.findings(), &[])?;
+    result_page::write(
+        page,
+        "Constraints of recorded motion",
+        &found.findings(),
+        &found_constraint_figures(&found, &samples),
+    )?;
     OutputFile::print(out, &output::shown(&found, args.json, FoundConstraints::findings)?)
 }
 

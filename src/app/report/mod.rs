@@ -1,5 +1,6 @@
 //! Plots, tables and the HTML report.
 
+mod constraints;
 mod evaluation;
 mod experiment;
 mod grids;
@@ -9,6 +10,7 @@ mod page;
 mod plot;
 mod table;
 
+pub(crate) use constraints::found_constraint_figures;
 pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units, with_unit};
 pub use experiment::groups;
 pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};

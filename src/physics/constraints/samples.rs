@@ -171,14 +171,14 @@ impl MotionSamples {
     pub(super) fn stride(&self) -> usize {
         self.stride
     }
-    pub(super) fn names(&self) -> &[String] {
+    pub(crate) fn names(&self) -> &[String] {
         &self.names
     }
     pub(super) fn periodic(&self) -> &[bool] {
         &self.periodic
     }
     /// Coordinates, then velocities.
-    pub(super) fn state(&self, at: usize) -> &[f64] {
+    pub(crate) fn state(&self, at: usize) -> &[f64] {
         let n = self.n();
         &self.states[2 * n * at..2 * n * (at + 1)]
     }
@@ -193,7 +193,7 @@ impl MotionSamples {
         self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
     }
     /// At most so many samples, evenly spaced.
-    pub(super) fn places(&self, most: usize) -> Vec<usize> {
+    pub(crate) fn places(&self, most: usize) -> Vec<usize> {
         (0..self.len()).step_by(self.len().div_ceil(most).max(1)).collect()
     }
     /// Noise of each coordinate over its root mean square.

@@ -63,8 +63,8 @@ fn a_table_of_a_german_spreadsheet_becomes_a_formula() {
 #[test]
 fn a_bob_in_a_tracker_s_table_is_learned_under_its_rod() {
     let folder = Folder::new();
-    // A byte order mark, tabs, two runs that a text tells apart.
-    let mut text = "\u{feff}trial\ttime\tx\ty\n".to_string();
+    // A byte order mark, the name of the track, tabs, two runs that a text tells apart.
+    let mut text = "\u{feff}bob A\ntrial\ttime\tx\ty\n".to_string();
     for (k, start) in [1.2, 0.7].into_iter().enumerate() {
         for (t, angle) in swing(start, 500) {
             writeln!(text, "swing{k}\t{t:.2}\t{:.4}\t{:.4}", 0.62 * angle.sin(), -0.62 * angle.cos()).unwrap();
@@ -78,6 +78,10 @@ fn a_bob_in_a_tracker_s_table_is_learned_under_its_rod() {
         check.stdout
     );
     assert!(serde_json::from_str::<serde_json::Value>(&fit.stdout).is_ok());
+    let page = folder.path("rod.html").display().to_string();
+    let found = lnn(&["constraints", &file, "--html", &page]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    assert_eq!(std::fs::read_to_string(&page).unwrap().matches("<figure").count(), 1);
 }
 
 #[test]

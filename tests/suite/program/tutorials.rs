@@ -166,6 +166,9 @@ fn a_film_becomes_a_law_with_its_constants() {
     ] {
         states(&law, term, truth);
     }
+    // Three pictures of each coordinate.
+    let page = fs::read_to_string(film.folder.path("law.html")).unwrap();
+    assert_eq!(page.matches("<figure").count(), 6);
     let constants = film.step("constants.html").json();
     assert_eq!(constants["explained"], true);
     for (name, truth) in [("g", 9.81), ("k", 10.0), ("l0", 0.25), ("c", 0.004)] {
