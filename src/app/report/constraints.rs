@@ -1,0 +1,45 @@
+//! A picture of constraints that were found: how far recorded motion is from them.
+
+use super::{Figure, LinePlot, Series, figure, line_plot};
+use crate::constraints::{FoundConstraints, MotionSamples};
+use crate::lagrangian::{FormulaConstraints, Manifold, ManifoldRows};
+
+/// Constraints that are shown.
+const MOST: usize = 7;
+/// Samples that are shown.
+const SAMPLES: usize = 2000;
+
+/// Distance of the motion from every constraint: `|phi|` over the length of its gradient, of a row that is linear in the velocities
+/// `|A v - b|` over its length. Nothing where none was found.
+pub fn found_constraint_figures(found: &FoundConstraints, samples: &MotionSamples) -> Vec<Figure> {
+    let Ok(constraints) = FormulaConstraints::new(samples.names(), found.formulas()) else { return Vec::new() };
+    let Ok(manifold) = constraints.manifold::<f64>() else { return Vec::new() };
+    let names = &manifold.names()[..manifold.names().len().min(MOST)];
+    let n = samples.n();
+    let (mut distances, mut rows) = (vec![Vec::new(); names.len()], ManifoldRows::default());
+    let places = samples.places(SAMPLES);
+    for &at in &places {
+        let (q, v) = samples.state(at).split_at(n);
+        manifold.rows(q, v, &mut rows);
+        for (c, distances) in distances.iter_mut().enumerate() {
+            let size = rows.matrix[c * n..(c + 1) * n].iter().fold(0.0, |size: f64, x| size.hypot(*x));
+            let off = if manifold.is_holonomic(c) { rows.values[c] } else { rows.rates[c] };
+            distances.push(off / size);
+        }
+    }
+    let places: Vec<f64> = places.into_iter().map(|at| at as f64).collect();
+    let plot = LinePlot {
+        title: String::new(),
+        x_label: "sample".to_string(),
+        y_label: "distance".to_string(),
+        log_y: false,
+        series: names.iter().zip(&distances).map(|(name, values)| Series::new(name, &places, values)).collect(),
+        turn: None,
+        level: None,
+    };
+    let caption = "phi over the length of its gradient at the recorded states, of a row that is linear in the velocities A v - b over its \
+                   length: noise about 0, if the constraint holds.";
+    figure("found_constraints.svg", "Distance of the motion from the constraints", line_plot(&plot), caption)
+        .into_iter()
+        .collect()
+}
