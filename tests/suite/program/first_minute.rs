@@ -21,11 +21,11 @@ fn swing(start: f64, rows: usize) -> Vec<(f64, f64)> {
     (0..rows).map(&mut row).collect()
 }
 
-/// `lnn check` with these arguments, and then the command that it prints, made small by `more`.
+/// `lnn check` with these arguments, and then the first command that it prints, made small by `more`.
 fn first_run(folder: &Folder, arguments: &[&str], more: &[&str]) -> (Run, Run) {
     let check = lnn(&[&["check"], arguments].concat());
     assert_eq!((check.code, check.stderr.as_str()), (Some(0), ""), "{}", check.stdout);
-    let next = check.stdout.lines().last().unwrap().trim().to_string();
+    let next = check.stdout.lines().skip_while(|line| *line != "next:").nth(1).unwrap_or_default().trim().to_string();
     let words = next.strip_prefix("lnn ").unwrap_or_else(|| panic!("no command: {}", check.stdout));
     assert!(!words.contains('\''), "quoted words need a shell: {words}");
     let out = folder.path("fitted").display().to_string();
