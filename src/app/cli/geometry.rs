@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
     /// One JSON object per line with every component and digit; or the nonzero components, without those that follow by symmetry, as a
-    /// table or as LaTeX [default: table with --at, otherwise json].
+    /// table or as LaTeX [default: json with --points, otherwise table].
     #[arg(long, value_enum, value_name = "FORMAT")]
     format: Option<Format>,
     /// The same as --format json.
@@ -97,7 +97,7 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
         Some(text) => list("--velocity", text, names)?,
         None => vec![<S as Real>::zero(); n],
     };
-    let usual = if args.at.is_some() { Format::Table } else { Format::Json };
+    let usual = if args.points.is_some() { Format::Json } else { Format::Table };
     let format = if args.json { Format::Json } else { args.format.unwrap_or(usual) };
     if let (Some(from), Some(to)) = (&args.from, &args.to) {
         if format == Format::Latex {

@@ -171,7 +171,7 @@ fn models_have_a_geometry_and_mistakes_are_named() {
 
 /// Values of a coordinate at the surfaces on a line, with what the determinant does there.
 fn surfaces(arguments: &[&str], coordinate: &str) -> Vec<(f64, String)> {
-    let run = lnn(&[&["geometry"], arguments].concat());
+    let run = lnn(&[&["geometry", "--json"], arguments].concat());
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{}", run.stdout);
     let found: Value = serde_json::from_str(&run.stdout).unwrap();
     let all = found["surfaces"].as_array().unwrap().iter();
@@ -208,7 +208,7 @@ fn horizons_and_ergosurfaces_are_those_of_closed_forms() {
 fn a_line_without_a_surface_and_mistakes() {
     let line = ["geometry", "--system", "ads4-geodesic", "--from", "0,0,0,1", "--to", "0,0,0,5"];
     let surface = |block: &str| lnn(&[&line[..], &["--surface", block]].concat());
-    let found = surface("t");
+    let found = lnn(&[&line[..], &["--surface", "t", "--json"]].concat());
     assert_eq!((found.code, found.stdout.as_str()), (Some(0), "{\"block\":[\"t\"],\"surfaces\":[]}\n"));
     surface("t,w").refused(2, &["--surface", "unknown coordinate \"w\""]);
     surface("t,t").refused(2, &["--surface", "t is given twice"]);
@@ -217,7 +217,7 @@ fn a_line_without_a_surface_and_mistakes() {
     for steps in ["0", "1000001", "4294967296", "18446744073709551615"] {
         lnn(&[&line[..], &["--surface", "t", "--steps", steps]].concat()).refused(2, &["--steps", "from 1 to 1000000"]);
     }
-    let hole = ["geometry", "--system", "schwarzschild-geodesic", "--surface", "t", "--format", "table"];
+    let hole = ["geometry", "--system", "schwarzschild-geodesic", "--surface", "t"];
     let told = lnn(&[&hole[..], &["--from", "0,1,1.2,0", "--to", "0,6,1.2,0"]].concat()).stdout;
     assert!(told.starts_with("determinant of the metric's block t: 1 change of sign on the line\n"), "{told}");
     assert!(told.contains("zero") && told.lines().all(|line| line.chars().count() <= 120), "{told}");
