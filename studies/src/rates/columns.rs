@@ -65,16 +65,22 @@ fn is_right(name: &str, written: Written, draw: &mut Draw) -> Outcome<Option<boo
     std::fs::write(&file, text)?;
     let guessed = guess(&[&file], &Columns::default());
     std::fs::remove_file(&file)?;
-    let numbers = |range: std::ops::Range<usize>| range.map(|k| (k + 2).to_string()).collect::<Vec<String>>();
+    let numbers = |range: std::ops::Range<usize>| range.map(|k| format!("c{}", k + 2)).collect::<Vec<String>>();
     let (coordinates, velocities) = match written {
         Written::Positions => (columns[..n].to_vec(), Vec::new()),
         Written::Velocities => (columns[..n].to_vec(), columns[n..].to_vec()),
         Written::Unnamed => (numbers(0..n), numbers(n..2 * n)),
     };
-    let same = |Guess { columns, .. }: Guess| {
+    let same = |Guess { columns, .. }: &Guess| {
         columns.coords == coordinates && columns.velocity == velocities && columns.force.is_empty()
     };
-    Ok(Some(guessed.is_ok_and(same)))
+    let right = guessed.as_ref().is_ok_and(same);
+    if !right {
+        let taken = guessed.map(|guess| guess.table).unwrap_or_default();
+        let taken: Vec<String> = taken.iter().map(|g| format!("{} as {}", g.column, g.meaning)).collect();
+        eprintln!("{name}: {}", taken.join(", "));
+    }
+    Ok(Some(right))
 }
 
 /// Rates over the systems of the catalogue, `seeds` states of each.

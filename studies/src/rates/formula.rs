@@ -20,7 +20,7 @@ impl Draw {
     }
 
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0.random_range(low..high)
+        self.0.random_range(low..=high)
     }
 
     pub(super) fn normal(&mut self) -> f64 {
