@@ -71,13 +71,11 @@ impl Section {
             last.points.extend([low - room, high + room].map(|x| (x, f64::NAN)));
         }
         let plot = LinePlot {
-            title: title.into(),
             x_label: format!("log10 of {x}"),
             y_label: y.into(),
             log_y: true,
             series: curves,
-            turn: None,
-            level: None,
+            ..LinePlot::default()
         };
         match line_plot(&plot) {
             Ok(picture) => {
@@ -140,7 +138,7 @@ pub fn write(section: &Section, out: &Path, machine: &str, report: Report) -> Re
         report = report.paragraph("Failed or left out:").table(&section.failures.header, &section.failures.rows);
     }
     for figure in &section.figures {
-        save(&out.join(&figure.file), figure.picture.to_svg().as_bytes())?;
+        save(&out.join(&figure.file), figure.to_svg().as_bytes())?;
     }
     Ok(report.figures(&section.figures))
 }

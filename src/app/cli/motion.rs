@@ -2,17 +2,18 @@
 
 use crate::cli::charges::Charges;
 use crate::cli::files::cannot_write;
-use crate::cli::tube::{MotionTube, TubeFacts};
+use crate::cli::tube::TubeFacts;
 use crate::cli::{CliError, input, output};
 use crate::lagrangian::EulerLagrange;
 use crate::names::{pluralize, rounded};
-use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
 use crate::rollout::{Domain, Trajectory};
-use crate::storage::{AtomicWriter, Disk, remove_leftovers, write_atomically};
+use crate::storage::{AtomicWriter, Disk, remove_leftovers};
 use crate::symmetry::Invariant;
 use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
+
+pub mod pictures;
 
 /// Points of a curve beyond which every second one is left out.
 const MOST_POINTS: usize = 4000;
@@ -109,78 +110,6 @@ impl Watch {
         let (q, v): (Vec<f64>, Vec<f64>) = (part(0..n).collect(), part(n..2 * n).collect());
         Invariant::of(model, &q, &v).ok().filter(|found| *found != Invariant::Nothing)
     }
-
-    /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, by the end of the
-    /// file's name; with the ends of a tube around the coordinates.
-    ///
-    /// # Errors
-    /// A data error for a motion that has no finite sample, or a file that cannot be written.
-    pub fn plot(
-        &self,
-        path: &Path,
-        (title, parameter, energy): (&str, &str, &str),
-        tube: Option<&MotionTube>,
-    ) -> Result<(), CliError> {
-        let n = self.columns.len() / 2;
-        let (mut names, mut positions) = (self.columns[..n].to_vec(), self.values[..n].to_vec());
-        if let Some(tube) = tube {
-            names.extend(tube.names());
-            positions.extend(self.ends(tube));
-        }
-        let bytes = if is_page(path) {
-            let mut report = Report::new(title);
-            if let Some(leaving) = &self.leaving {
-                report = report.paragraph(&format!("The motion {}.", leaving.text()));
-            }
-            let (capital, energy) = (capitalized(energy), [energy.to_string()]);
-            let parts = [
-                ("Coordinates", &names[..], &positions[..]),
-                ("Velocities", &self.columns[n..], &self.values[n..2 * n]),
-                (&*format!("{capital} of the model"), &energy[..], &self.values[2 * n..]),
-            ];
-            for (what, names, values) in parts {
-                let picture = self.picture(what, names, values, parameter)?;
-                let heading = format!("{what} against {}", parameter.split(" [").next().unwrap_or_default());
-                report = report.figures(&[Figure { file: String::new(), heading, picture, caption: String::new() }]);
-            }
-            report.to_html().into_bytes()
-        } else {
-            self.picture(title, &names, &positions, parameter)?.to_svg().into_bytes()
-        };
-        write_atomically(path, &bytes).map_err(|e| cannot_write(path, e))
-    }
-
-    /// Lower and upper ends of a tube around every coordinate, at the times that are kept.
-    fn ends(&self, tube: &MotionTube) -> Vec<Vec<f64>> {
-        let n = self.columns.len() / 2;
-        let mut ends = vec![Vec::with_capacity(self.times.len()); 2 * n];
-        for (k, t) in self.times.iter().enumerate() {
-            let q: Vec<f64> = self.values[..n].iter().map(|values| values[k]).collect();
-            ends.iter_mut().zip(tube.ends(*t, &q).flatten()).for_each(|(ends, x)| ends.push(x));
-        }
-        ends
-    }
-
-    fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], label: &str) -> Result<Picture, CliError> {
-        let plot = LinePlot {
-            title: title.to_string(),
-            x_label: label.to_string(),
-            y_label: names.join(", "),
-            log_y: false,
-            series: names.iter().zip(values).map(|(name, y)| Series::new(name, &self.times, y)).collect(),
-            turn: None,
-            level: None,
-        };
-        line_plot(&plot).map_err(CliError::data)
-    }
-}
-
-/// A text whose first letter is a capital, unless it is a formula.
-fn capitalized(text: &str) -> String {
-    if text.contains(|c: char| !c.is_alphabetic()) {
-        return text.to_string();
-    }
-    text.chars().take(1).flat_map(char::to_uppercase).chain(text.chars().skip(1)).collect()
 }
 
 fn thin(values: &mut Vec<f64>) {
@@ -189,18 +118,6 @@ fn thin(values: &mut Vec<f64>) {
         k += 1;
         k % 2 == 1
     });
-}
-
-/// `true` if a picture's file is to be a page.
-fn is_page(path: &Path) -> bool {
-    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("html") || end.eq_ignore_ascii_case("htm"))
-}
-
-/// A file for a picture: SVG or HTML.
-pub fn picture_file(text: &str) -> Result<std::path::PathBuf, String> {
-    let path = std::path::PathBuf::from(text);
-    let known = is_page(&path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("svg"));
-    if known { Ok(path) } else { Err("expected a file that ends in .svg or .html".to_string()) }
 }
 
 /// Facts about a roll-out, as one JSON object.
@@ -366,6 +283,7 @@ pub fn place(out: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::pictures::Texts;
     use super::*;
 
     #[test]
@@ -386,13 +304,15 @@ mod tests {
         assert_eq!((leaving.t, leaving.column.as_str(), leaving.trained_on), (5001.0, "x", [-1.0, 5000.0]));
         let directory = tempfile::tempdir().unwrap();
         let [svg, page] = ["a.svg", "a.html"].map(|name| directory.path().join(name));
-        watch.plot(&svg, ("Motion", "time [s]", "energy"), None).unwrap();
-        watch.plot(&page, ("Motion", "affine parameter", "g(v, v)/2"), None).unwrap();
+        let units = ["m", "m/s"].map(String::from);
+        let texts = |parameter, energy| Texts { title: "Motion", parameter, energy, units: &units };
+        watch.plot(&svg, &texts("time [s]", "energy"), None).unwrap();
+        watch.plot(&page, &texts("affine parameter", "g(v, v)/2"), None).unwrap();
         assert!(std::fs::read(&svg).unwrap().starts_with(b"<svg"));
         let page = std::fs::read_to_string(&page).unwrap();
         assert!(page.contains("g(v, v)/2 of the model against affine parameter") && !page.contains("nergy"), "{page}");
-        assert_eq!((watch.energy, capitalized("energy")), ((0.5, 0.0), "Energy".to_string()));
+        assert_eq!(watch.energy, (0.5, 0.0));
         assert!(page.matches("<figure").count() == 3 && page.contains("left the training range at t = 5001"));
-        assert!(picture_file("a.SVG").is_ok() && picture_file("a.png").is_err() && picture_file("a").is_err());
+        assert!(page.contains(">x [m]</text>") && page.contains(">x_dot [m/s]</text>"));
     }
 }

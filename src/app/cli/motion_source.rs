@@ -17,6 +17,8 @@ pub struct MotionSource {
     pub model: Box<dyn EulerLagrange<f64>>,
     /// Coordinates, then velocities.
     pub columns: Vec<String>,
+    /// Their units; of a system that was only recorded `rad` of angles, `SI` of others.
+    pub units: Vec<String>,
     /// Names of the external forces, one per coordinate.
     pub forces: Vec<String>,
     /// The states a model was trained on.
@@ -37,11 +39,21 @@ impl MotionSource {
     pub fn model(path: &Path) -> Result<Self, CliError> {
         let learned = Learned::<f64>::load(path)?;
         let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
-        let time_unit = learned_system(&learned.header).ok().map(|system| system.time_unit.to_string());
+        let system = learned_system(&learned.header).ok();
+        let time_unit = system.as_ref().map(|system| system.time_unit.to_string());
+        let periodic = learned.header.architecture.periodic.iter();
+        let units = match system {
+            Some(system) => system.units(periodic.len()),
+            None => {
+                let unit =
+                    |of: [&'static str; 2]| periodic.clone().map(move |angle| of[usize::from(*angle)].to_string());
+                unit(["SI", "rad"]).chain(unit(["SI", "rad/s"])).collect()
+            }
+        };
         let time_like = learned.header.architecture.time_like.is_some();
         let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        Ok(Self { name, model, columns, forces, domain, time_unit, time_like, file })
+        Ok(Self { name, model, columns, units, forces, domain, time_unit, time_like, file })
     }
 
     /// A system by name or by file.
@@ -53,8 +65,8 @@ impl MotionSource {
         let Source { model, columns, forces } = Source::configured(system.clone(), given)?;
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
-        let time_like = system.time_like.is_some();
-        Ok(Self { name, model, columns, forces, domain: None, time_unit, time_like, file })
+        let (time_like, units) = (system.time_like.is_some(), system.units(columns.len() / 2));
+        Ok(Self { name, model, columns, units, forces, domain: None, time_unit, time_like, file })
     }
 
     /// Label of the parameter of the motion: a time, or the affine parameter of geodesics, which is the proper time of matter.

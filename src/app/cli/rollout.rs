@@ -4,7 +4,8 @@ use crate::cli::charges::Charges;
 use crate::cli::constraints::constrained;
 use crate::cli::files::{OutputFile, require_free};
 use crate::cli::forces::ForceArgs;
-use crate::cli::motion::{Facts, Kept, Target, Watch, picture_file, place};
+use crate::cli::motion::pictures::{Texts, picture_file};
+use crate::cli::motion::{Facts, Kept, Target, Watch, place};
 use crate::cli::motion_source::MotionSource;
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::probe::Probe;
@@ -75,7 +76,8 @@ pub struct Args {
     /// unless --overwrite is given, the model always.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
-    /// Plot of the coordinates against time, or a page that also shows velocities and energy.
+    /// Plot of the coordinates against time, a panel for each unit, with the path in the plane of polar ones, or a page that
+    /// also shows velocities and energy.
     #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
     /// Report the charges of the model's symmetries along the motion, with the parts of their drift due to the model and to
@@ -234,7 +236,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(plot) = &args.plot {
         let (title, parameter) = (format!("{}: roll-out", source.name), source.parameter());
         let energy = watch.invariant(network).map_or("energy", Invariant::charge);
-        watch.plot(plot, (&title, &parameter, energy), tube.as_ref())?;
+        let texts = Texts { title: &title, parameter: &parameter, energy, units: &source.units };
+        watch.plot(plot, &texts, tube.as_ref())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));

@@ -1,7 +1,7 @@
 //! Pictures of a motion under constraints: on its surface, what holds it there, how far it strays.
 
 use crate::lagrangian::{EulerLagrange, ManifoldRows, Request, Terms};
-use crate::report::{Figure, LinePlot, Series, Trace, figure, file_part, line_plot, trace_plot};
+use crate::report::{Figure, LinePlot, Series, Trace, figure, file_part, line_plot, trace_plot, with_unit};
 use crate::rollout::{Options, Trajectory, rollout};
 
 /// Samples of a motion.
@@ -42,18 +42,18 @@ pub(crate) fn constraint_figures(
     let lines = |values: &[Vec<f64>]| -> Vec<Series> {
         names.iter().zip(values).map(|(name, values)| Series::new(name, &motion.t, values)).collect()
     };
-    let plot = |title: &str, y_label: &str, log_y: bool, values: &[Vec<f64>]| {
-        let (title, x_label, y_label) = (title.to_string(), format!("t [{time}]"), y_label.to_string());
-        line_plot(&LinePlot { title, x_label, y_label, log_y, series: lines(values), turn: None, level: None })
+    let plot = |y_label: &str, log_y: bool, values: &[Vec<f64>]| {
+        let (x_label, y_label) = (with_unit("t", time), y_label.to_string());
+        line_plot(&LinePlot { x_label, y_label, log_y, series: lines(values), ..LinePlot::default() })
     };
     let caption = "The force by which each constraint acts along its gradient, in the unit of the learned L over length; of a rod its tension \
                    (negative) or thrust, of a surface its contact force. The motion is the predicted one.";
     let heading = "What holds the motion on its constraints";
-    let drawn = plot("Forces of constraint", "force", false, &loads);
+    let drawn = plot("force", false, &loads);
     figures.extend(figure("constraint_forces.svg", heading, drawn, caption));
     let caption = "Distance of the predicted motion from every constraint: |phi| over the length of its gradient, of a row that is linear in the \
                    velocities |A v - b| over its length.";
-    let drawn = plot("Drift off the constraints", "distance", true, &strays);
+    let drawn = plot("distance", true, &strays);
     figures.extend(figure("constraint_drift.svg", "Whether the motion stays on its constraints", drawn, caption));
     figures
 }
@@ -69,7 +69,6 @@ fn paths(motion: &Trajectory<f64>, names: &[String], time: &str) -> Vec<Figure> 
         let (x, y): (Vec<f64>, Vec<f64>) = motion.q.chunks_exact(n).map(|q| (q[i], q[j])).unzip();
         let (a, b) = (&names[i], &names[j]);
         let trace = Trace {
-            title: "Motion on its constraints".into(),
             x_label: a.clone(),
             y_label: b.clone(),
             paths: vec![Series::new("predicted", &x, &y)],

@@ -170,6 +170,35 @@ impl Determined {
         found.is_none().then(|| "the data determine no mass".to_string())
     }
 
+    /// Why the motion leaves an element of the mass matrix open; none if it determines it.
+    pub(crate) fn open_mass(&self, [a, b]: [&str; 2]) -> Option<String> {
+        self.open(&mass_name(a, b)).or_else(|| {
+            let apart = self.groups.iter().filter(|group| !group.unit_known);
+            let mut apart = apart.filter(|group| [a, b].iter().any(|name| group.coordinates.iter().any(|c| c == name)));
+            apart.next().and_then(|_| self.apart())
+        })
+    }
+
+    /// Why the motion leaves the potential open; none if it determines it, with the energy.
+    pub(crate) fn open_potential(&self) -> Option<String> {
+        self.open(ENERGY).or_else(|| self.apart())
+    }
+
+    /// Why a quantity is open.
+    fn open(&self, name: &str) -> Option<String> {
+        if let Some(reason) = &self.withheld {
+            return Some(format!("Whether the motion determines it is unknown: {reason}."));
+        }
+        let quantity = self.determination.iter().find(|quantity| quantity.name == name)?;
+        let range = match [quantity.low, quantity.high] {
+            ends if ends.iter().all(|end| end.is_finite()) => {
+                format!("the range of {name} is {}", ends.map(number).join(" to "))
+            }
+            _ => format!("{name} has no bounds"),
+        };
+        (quantity.determined == NOT).then(|| format!("The motion does not determine it: {range}."))
+    }
+
     /// Share of the held-out states that the learned ones do not surround, if it is most of them.
     pub(crate) fn mostly_outside(&self) -> Option<f64> {
         self.outside.filter(|share| *share > MOSTLY)
@@ -293,13 +322,18 @@ fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) 
     fails.then(|| format!("the model predicts {motion} no better than constant velocity"))
 }
 
+/// Name of an element of the mass matrix in the table.
+fn mass_name(a: &str, b: &str) -> String {
+    format!("mean M[{a},{b}]")
+}
+
 fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
     let n = names.len();
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
     let diagonal: Vec<f64> =
         pairs.iter().zip(&found.mass_matrix).filter(|((i, j), _)| i == j).map(|(_, estimate)| estimate.value).collect();
     let mass = pairs.iter().zip(&found.mass_matrix).map(|(&(i, j), estimate)| {
-        let name = format!("mean M[{},{}]", names[i], names[j]);
+        let name = mass_name(&names[i], &names[j]);
         let size = (diagonal[i] * diagonal[j]).abs().sqrt();
         Quantity { mass: i == j, ..Quantity::new(name, estimate, size, i == j && estimate.value > 0.0) }
     });
@@ -313,4 +347,33 @@ fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
     }
     let energy = Quantity::new(ENERGY.to_string(), &found.energy, found.energy.value, true);
     mass.into_iter().chain(friction).chain([energy]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_open_is_said_with_its_reason() {
+        let estimate = |value: f64, half: f64| Estimate { value, low: value - half, high: value + half };
+        let quantity = |name: &str, half: f64| Quantity::new(name.to_string(), &estimate(1.0, half), 1.0, false);
+        let group = |name: &str, unit_known: bool| Group { coordinates: vec![name.to_string()], unit_known };
+        let found = Determined {
+            determination: vec![quantity(&mass_name("x", "x"), 0.1), quantity(&mass_name("x", "y"), 9.0)],
+            withheld: None,
+            ..Determined::under_constraints()
+        };
+        assert_eq!(found.open_mass(["x", "x"]), None);
+        assert!(found.open_mass(["x", "y"]).is_some_and(|why| why.contains("-8.00 to 10.0")));
+        assert_eq!((found.open_mass(["y", "y"]), found.open_potential()), (None, None));
+        // A part with a factor of its own.
+        let apart = Determined { groups: vec![group("x", true), group("y", false)], ..found.clone() };
+        assert_eq!(apart.open_mass(["x", "x"]), None);
+        assert!(apart.open_mass(["y", "y"]).is_some() && apart.open_potential().is_some());
+        // An energy that is open, and a model of which nothing is known.
+        let energy = Determined { determination: vec![quantity(ENERGY, 2.0)], ..found };
+        assert!(energy.open_potential().is_some());
+        let nothing = Determined::under_constraints();
+        assert!(nothing.open_mass(["x", "x"]).is_some() && nothing.open_potential().is_some());
+    }
 }

@@ -2,7 +2,8 @@
 
 use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::report::{Figure, LinePlot, Series, figure, line_plot};
+use crate::recording::{RecordedTrajectory, Smoothed};
+use crate::report::{Figure, LinePlot, Series, figure, line_plot, median_of};
 use crate::rollout::{Driven, Trajectory};
 use serde::Serialize;
 
@@ -32,60 +33,85 @@ pub struct Balance {
     pub forced: bool,
 }
 
-/// Energy along the longest held-out trajectory: that of the model, its kinetic and potential parts, and what it should be by friction and
-/// known forces, over the mean kinetic energy. None where the model gives no finite energy.
+/// Energy along a trajectory over its mean kinetic energy.
+struct EnergyPath {
+    times: Vec<f64>,
+    energy: Vec<f64>,
+    kinetic: Vec<f64>,
+    /// What the energy should be by friction and known forces.
+    expected: Vec<f64>,
+    /// `true` if friction or a force did work.
+    driven: bool,
+}
+
+impl EnergyPath {
+    /// At the estimated states with full windows; none where the model gives no finite energy.
+    fn new(model: &dyn EulerLagrange<f64>, track: &RecordedTrajectory, states: &Smoothed) -> Option<Self> {
+        let n = model.coordinates();
+        let rows = states.interior();
+        let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
+        let (times, q, v) = (&states.times[rows.clone()], of(&states.q), of(&states.v));
+        let force = if track.force.is_empty() { vec![0.0; q.len()] } else { of(&track.force) };
+        let (mut energy, mut kinetic, mut power, mut terms) = (Vec::new(), Vec::new(), Vec::new(), Terms::default());
+        let size = CHUNK * n;
+        for ((q, v), force) in q.chunks(size).zip(v.chunks(size)).zip(force.chunks(size)) {
+            model.terms(q, v, Request::ENERGY | Request::FORCE, &mut terms).ok()?;
+            energy.extend_from_slice(&terms.energy);
+            let dot = |a: &[f64]| -> Vec<f64> {
+                a.chunks(n).zip(v.chunks(n)).map(|(a, v)| a.iter().zip(v).map(|(a, v)| a * v).sum()).collect()
+            };
+            kinetic.extend(dot(&terms.momentum).iter().map(|p| 0.5 * p));
+            terms.dissipation.resize(q.len() / n, 0.0);
+            power.extend(dot(force).iter().zip(&terms.dissipation).map(|(gained, lost)| gained - lost));
+        }
+        let mean = kinetic.iter().sum::<f64>() / kinetic.len() as f64;
+        let scaled = |values: Vec<f64>| values.into_iter().map(|x| x / mean).collect::<Vec<f64>>();
+        let driven = power.iter().any(|power| *power != 0.0);
+        let (energy, kinetic, power) = (scaled(energy), scaled(kinetic), scaled(power));
+        // By the trapezoidal rule, which is enough for a picture.
+        let mut expected = vec![*energy.first()?];
+        for k in 1..times.len() {
+            expected.push(expected[k - 1] + 0.5 * (power[k] + power[k - 1]) * (times[k] - times[k - 1]));
+        }
+        Some(Self { times: times.iter().map(|t| t - times[0]).collect(), energy, kinetic, expected, driven })
+    }
+
+    /// Root mean square distance of the energy from the expected one.
+    fn error(&self) -> f64 {
+        let squares = self.energy.iter().zip(&self.expected).map(|(a, b)| (a - b).powi(2));
+        (squares.sum::<f64>() / self.energy.len() as f64).sqrt()
+    }
+}
+
+/// Energy along the held-out trajectory whose energy has the median error: that of the model, its kinetic and potential parts, and what it
+/// should be by friction and known forces, over the mean kinetic energy. None where the model gives no finite energy.
 pub fn energy_figure(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Figure> {
-    let n = model.coordinates();
     let pairs = part.recording.tracks.iter().zip(&part.states);
-    let (track, states) = pairs.max_by_key(|(_, states)| states.interior().len())?;
-    let rows = states.interior();
-    let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
-    let (times, q, v) = (&states.times[rows.clone()], of(&states.q), of(&states.v));
-    let force = if track.force.is_empty() { vec![0.0; q.len()] } else { of(&track.force) };
-    let (mut energy, mut kinetic, mut power, mut terms) = (Vec::new(), Vec::new(), Vec::new(), Terms::default());
-    let size = CHUNK * n;
-    for ((q, v), force) in q.chunks(size).zip(v.chunks(size)).zip(force.chunks(size)) {
-        model.terms(q, v, Request::ENERGY | Request::FORCE, &mut terms).ok()?;
-        energy.extend_from_slice(&terms.energy);
-        let dot = |a: &[f64]| -> Vec<f64> {
-            a.chunks(n).zip(v.chunks(n)).map(|(a, v)| a.iter().zip(v).map(|(a, v)| a * v).sum()).collect()
-        };
-        kinetic.extend(dot(&terms.momentum).iter().map(|p| 0.5 * p));
-        terms.dissipation.resize(q.len() / n, 0.0);
-        power.extend(dot(force).iter().zip(&terms.dissipation).map(|(gained, lost)| gained - lost));
-    }
-    let mean = kinetic.iter().sum::<f64>() / kinetic.len() as f64;
-    let potential: Vec<f64> = energy.iter().zip(&kinetic).map(|(e, t)| (e - t) / mean).collect();
+    let paths: Vec<EnergyPath> = pairs.filter_map(|(track, states)| EnergyPath::new(model, track, states)).collect();
+    let path = &paths[median_of(&paths.iter().map(EnergyPath::error).collect::<Vec<_>>())?];
+    let potential: Vec<f64> = path.energy.iter().zip(&path.kinetic).map(|(e, t)| e - t).collect();
     let lowest = potential.iter().copied().fold(f64::INFINITY, f64::min);
-    // By the trapezoidal rule, which is enough for a picture.
-    let mut expected = vec![energy.first()? / mean - lowest];
-    for k in 1..times.len() {
-        let gained = 0.5 * (power[k] + power[k - 1]) * (times[k] - times[k - 1]) / mean;
-        expected.push(expected[k - 1] + gained);
-    }
-    let driven = power.iter().any(|power| *power != 0.0);
-    let seconds: Vec<f64> = times.iter().map(|t| t - times[0]).collect();
-    let line = |name: &str, values: &[f64]| Series::new(name, &seconds, values);
-    let scaled = |values: &[f64], by: f64| values.iter().map(|x| x / mean - by).collect::<Vec<_>>();
-    let name = if driven { "expected energy" } else { "energy at the start" };
-    let series = vec![
-        line("energy", &scaled(&energy, lowest)),
-        line(name, &expected),
-        line("kinetic", &scaled(&kinetic, 0.0)),
-        line("potential", &potential.iter().map(|v| v - lowest).collect::<Vec<_>>()),
-    ];
-    let plot = LinePlot {
-        title: "Energy along held-out motion".into(),
-        x_label: "time [s]".into(),
-        y_label: "energy / mean kinetic energy".into(),
-        log_y: false,
-        series,
-        turn: None,
-        level: None,
+    let line = |name: &str, values: &[f64], by: f64| {
+        Series::new(name, &path.times, &values.iter().map(|x| x - by).collect::<Vec<_>>())
     };
-    let caption = "Energy of the learned Lagrangian along measured motion that it has not seen, and its parts p.v/2 (kinetic) and the rest \
-                   (potential). The nearer the energy to the expected one, the better: that at the start";
-    let caption = format!("{caption}{}.", if driven { ", less friction, plus the work of known forces" } else { "" });
+    let name = if path.driven { "expected energy" } else { "energy at the start" };
+    let series = vec![
+        line("energy", &path.energy, lowest),
+        line(name, &path.expected, lowest),
+        line("kinetic", &path.kinetic, 0.0),
+        line("potential", &potential, lowest),
+    ];
+    let (x_label, y_label) = ("time [s]".to_string(), "energy / mean kinetic energy".to_string());
+    let plot = LinePlot { x_label, y_label, series, ..LinePlot::default() };
+    let which = match paths.len() {
+        1 => String::new(),
+        count => format!(" (of {count} trajectories the one whose energy has the median error)"),
+    };
+    let works = if path.driven { ", less friction, plus the work of known forces" } else { "" };
+    let caption = format!(
+        "Energy of the learned Lagrangian along measured motion that it has not seen{which}, and its parts p.v/2 (kinetic) and the rest \
+         (potential). The nearer the energy to the expected one, the better: that at the start{works}."
+    );
     figure("energy_held_out.svg", "The energy along held-out motion", line_plot(&plot), caption)
 }
 

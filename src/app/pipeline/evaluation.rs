@@ -3,12 +3,12 @@
 use crate::analysis::{
     Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
     ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error,
-    mass_matrix_error_within, statistics, wrong_signatures,
+    mass_matrix_error_within, nearest_factor, statistics, wrong_signatures,
 };
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{EulerLagrange, FormulaConstraints, SystemInstance};
-use crate::names::pluralize;
+use crate::names::{number, pluralize};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::constraint_figures::constraint_figures;
 use crate::pipeline::judging::Judging;
@@ -192,7 +192,7 @@ pub fn evaluate(
             let motion = start.map(|run| run.exact.trajectory.state(0));
             figures.extend(motion.into_iter().flat_map(|at| constraint_figures(learned, at, t_end, (names, unit))));
         } else {
-            match grids(system, exact, learned) {
+            match grids(system, exact, learned, &mass_matrix.factors) {
                 Err(_) if judging.is_interrupted() => {}
                 drawn => figures.extend(drawn?),
             }
@@ -211,6 +211,7 @@ pub fn evaluate(
         labels: system.system.labels(n),
         motion: portraits.first().map(|portrait| &portrait.learned),
         recorded: None,
+        determined: None,
         threads: plan.threads,
     };
     let free = exact.manifold().or(learned.manifold()).is_none();
@@ -273,12 +274,13 @@ fn leaving(trajectory: &Trajectory<f64>, trained: &Domain<f64>, columns: &[Strin
     })
 }
 
-/// `L` and `det M` at rest over the first two coordinates, or over coordinate and velocity if there is only one; with more
+/// `L` and `det M`, this after the `factors` of the coordinates, at rest over the first two coordinates, or over coordinate and velocity if there is only one; with more
 /// than one, `det M` also at velocities close to the upper end of the validation bounds, where wrong signs appear first.
 fn grids(
     system: &SystemInstance<f64>,
     exact: &dyn EulerLagrange<f64>,
     learned: &dyn EulerLagrange<f64>,
+    factors: &[f64],
 ) -> Result<Vec<Figure>, PipelineError> {
     let n = system.coordinates;
     let bounds = system.system.validation(n);
@@ -324,20 +326,30 @@ fn grids(
     }
     let mut figures = Vec::new();
     for ([quantity, file, heading], fixed, exact, learned) in pairs {
+        let (exact, learned) = (exact?, learned?);
+        let fit = match quantity {
+            "L" => Fit::Affine,
+            // On a mass shell f(L) gives det M another factor.
+            _ if system.constrained_coordinate().is_some() => {
+                let factor = nearest_factor(1, &exact.values, &learned.values);
+                Fit::Factor(factor, format!("times its best factor {}", number(factor)))
+            }
+            _ => determinant_factor(factors),
+        };
         let comparison = GridComparison {
             quantity: quantity.to_string(),
             heading: heading.to_string(),
             file: file.to_string(),
             x_label: labels[shown[0]].clone(),
             y_label: labels[shown[1]].clone(),
-            exact: exact?,
-            learned: learned?,
+            exact,
+            learned,
             fixed,
-            fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
+            fit,
             signs: quantity != "L",
         };
         // A model that is nowhere finite on the grid has no picture; the tables report this.
-        figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
+        figures.extend(grid_figures(&comparison).map(|mut figure| {
             figure.caption += match &*system.system.time_unit {
                 "s" => " SI units.",
                 "m" => " Geometric units.",
@@ -347,6 +359,22 @@ fn grids(
         }));
     }
     Ok(figures)
+}
+
+/// The factor of `det M` that follows from those of the coordinates.
+fn determinant_factor(factors: &[f64]) -> Fit {
+    let (product, first) = (factors.iter().product(), factors.first().copied().unwrap_or(1.0));
+    let words = match factors.len() {
+        1 => format!("times {}, the best factor of M", number(first)),
+        n if factors.iter().all(|s| *s == first) => {
+            format!("times {}, the best factor {} of M to the power {n}", number(product), number(first))
+        }
+        _ => {
+            let all: Vec<String> = factors.iter().map(|s| number(*s)).collect();
+            format!("times {}, the product of the best factors of M, {}", number(product), all.join(", "))
+        }
+    };
+    Fit::Factor(product, words)
 }
 
 /// The components of `(q, v)` that a grid leaves fixed, in words, neighbours of equal value together; `imposed` if the
@@ -426,11 +454,23 @@ mod tests {
     }
 
     #[test]
+    fn a_determinant_has_the_factor_of_the_matrix_to_its_power() {
+        let of = |factors: &[f64]| match determinant_factor(factors) {
+            Fit::Factor(factor, words) => (factor, words),
+            Fit::Affine => panic!("no factor"),
+        };
+        assert_eq!(of(&[-3.0; 3]), (-27.0, "times -27.0, the best factor -3.00 of M to the power 3".to_string()));
+        assert_eq!(of(&[2.0]).0, 2.0);
+        let apart = of(&[2.0, 0.5, 0.5]);
+        assert!(apart.0 == 0.5 && apart.1.contains("2.00, 0.500, 0.500"), "{}", apart.1);
+    }
+
+    #[test]
     fn grids_say_where_they_are() {
         let captions = |name: &str| -> Vec<(String, String)> {
             let system = configure::<f64>(name, &[]).unwrap();
             let exact = system.build().unwrap();
-            let figures = grids(&system, exact.as_ref(), exact.as_ref()).unwrap();
+            let figures = grids(&system, exact.as_ref(), exact.as_ref(), &vec![1.0; system.coordinates]).unwrap();
             figures.into_iter().map(|figure| (figure.file, figure.caption)).collect()
         };
         let begins = |captions: &[(String, String)], expected: &[(&str, &str)]| {

@@ -75,7 +75,7 @@ pub(crate) fn conclude(
     let output = store.open_tables()?;
     output.write("table.csv", table.to_csv().as_bytes())?;
     output.write("runs.csv", run_table(&results, store)?.to_csv().as_bytes())?;
-    let mut figures = loss_figures(experiment.title(), &results);
+    let mut figures = loss_figures(&results);
     let more = experiment.additions(&results, store, &output, watch)?;
     figures.extend(more.figures);
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
@@ -96,7 +96,7 @@ pub(crate) fn conclude(
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = with(report, more.below);
     output.write("report.html", report.to_html().as_bytes())?;
-    figures.iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
+    figures.iter().try_for_each(|figure| output.write(&figure.file, figure.to_svg().as_bytes()))?;
     drop(output);
 
     let (energies, others): (Vec<usize>, Vec<usize>) =

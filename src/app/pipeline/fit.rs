@@ -22,7 +22,8 @@ use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
 use crate::pipeline::{Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
-use crate::recording::{Recording, Targets};
+use crate::recording::{LoadedRecording, Targets};
+use crate::report::with_unit;
 use crate::scalar::Scalar;
 use crate::shooting::{self, Fitted, Task};
 use crate::storage::container::checksum;
@@ -304,24 +305,27 @@ impl JudgedFit {
         (threads, watch, was_interrupted): (usize, &Watch, bool),
     ) -> Result<Self, PipelineError> {
         let hold_out = judge(prepared, config, (header, network), threads, watch)?;
+        let determined = match prepared.constraints() {
+            Some(_) => Determined::under_constraints(),
+            None => Determined::new(network, (&prepared.measured, prepared.targets), &hold_out, threads)?,
+        };
         let subject = Subject {
             network,
             trained: &trained_on(header),
             system: None,
             columns: header.columns.clone(),
-            labels: labels(&prepared.reading.recording),
+            labels: labels(prepared.reading),
             motion: None,
             recorded: Some(&prepared.measured.training.recording),
+            determined: Some(&determined),
             threads,
         };
-        if prepared.constraints().is_some() {
-            let (physics, determined) = (Physics::under_constraints(&subject), Determined::under_constraints());
-            return Ok(Self { hold_out, physics, determined });
-        }
         let is_ended = || watch.is_interrupted() && !was_interrupted;
         let check = || if is_ended() { Err(PipelineError::Interrupted) } else { Ok(()) };
-        let physics = Physics::new(&subject, &check)?;
-        let determined = Determined::new(network, (&prepared.measured, prepared.targets), &hold_out, threads)?;
+        let physics = match prepared.constraints() {
+            Some(_) => Physics::under_constraints(&subject),
+            None => Physics::new(&subject, &check)?,
+        };
         Ok(Self { hold_out, physics, determined })
     }
 }
@@ -390,7 +394,7 @@ pub(crate) fn judge(
         known => known.to_vec(),
     };
     let (part, horizon) = (&prepared.measured.test, config.horizon);
-    let held_out = HoldOutOptions { part, horizon, time, forces: &forces, threads };
+    let held_out = HoldOutOptions { part, horizon, time, forces: &forces, units: &units(prepared.reading), threads };
     let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
     let motion = header.constrain(Box::new(network as &dyn EulerLagrange<f64>)).map_err(wrong)?;
     let mut hold_out = evaluate_hold_out(motion.as_ref(), &held_out, watch)?;
@@ -411,18 +415,27 @@ fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(S
     data.checksums().into_iter().chain([recorded]).collect()
 }
 
-/// Labels of axes for coordinates and velocities.
-fn labels(recording: &Recording) -> Vec<String> {
-    let units = |per: &'static str| {
-        let pairs = recording.coordinates.iter().zip(&recording.periodic);
-        pairs.map(move |(name, angle)| match (*angle, per) {
-            (true, "") => format!("{name} [rad]"),
-            (true, _) => format!("{name}_dot [rad/s]"),
-            (false, "") => format!("{name} [SI]"),
-            (false, _) => format!("{name}_dot [SI]"),
-        })
+/// Units of the coordinates in which their numbers are: those of the file in SI, else `rad` of an angle and `SI`.
+fn units(reading: &LoadedRecording) -> Vec<String> {
+    let periodic = reading.recording.periodic.iter();
+    // A recording from memory names no columns.
+    let given = reading.coordinate_units().into_iter().chain(std::iter::repeat(String::new()));
+    let unit = |(given, angle): (String, &bool)| match given.as_str() {
+        "" => if *angle { "rad" } else { "SI" }.to_string(),
+        _ => given,
     };
-    units("").chain(units("/s")).collect()
+    given.zip(periodic).map(unit).collect()
+}
+
+/// Labels of axes for coordinates and velocities.
+fn labels(reading: &LoadedRecording) -> Vec<String> {
+    let (names, units) = (&reading.recording.coordinates, units(reading));
+    let positions = names.iter().zip(&units).map(|(name, unit)| with_unit(name, unit));
+    let velocities = names.iter().zip(&units).map(|(name, unit)| match unit.as_str() {
+        "SI" => format!("{name}_dot [SI]"),
+        unit => format!("{name}_dot [{unit}/s]"),
+    });
+    positions.chain(velocities).collect()
 }
 
 /// Columns of recorded forces as a model remembers them; numbers of columns are not names.

@@ -194,7 +194,7 @@ fn with_failures(sentence: String, failures: &[String]) -> String {
         _ if failures.is_empty() => sentence,
         (Some(rest), _) => format!("limited: {all}; otherwise {rest}"),
         (_, Some(rest)) => format!("limited: {all}; {rest}"),
-        _ => sentence,
+        _ => format!("{sentence} Besides: {all}."),
     }
 }
 
@@ -385,7 +385,7 @@ mod tests {
         let limited = sentence("good", &["no mass", "no energy"]);
         assert!(limited.starts_with("limited: no mass; no energy; ") && !limited.contains("good"), "{limited}");
         assert!(sentence("limited", &["no mass"]).starts_with("limited: no mass; it predicts"));
-        assert!(sentence("bad", &["no mass"]).starts_with("bad: it predicts"));
+        assert_eq!(sentence("bad", &["no mass"]), "bad: it predicts; 3 s ahead. Besides: no mass.");
 
         let nothing = Determined::under_constraints();
         let errors = |model: f64| CoordinatePredictions {

@@ -16,10 +16,13 @@ use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::recording::Smoothed;
-use crate::report::{Figure, LinePlot, Series, Turn, figure, line_plot};
+use crate::report::{
+    Figure, LinePlot, Polar, Series, Turn, figure, line_plot, median_of, trace_plot, with_unit,
+};
 use crate::rollout::SampledForce;
 use serde::Serialize;
 use std::f64::consts::TAU;
+use std::slice;
 
 /// Windows that are predicted at most; of more, evenly spaced ones.
 const WINDOWS: usize = 500;
@@ -42,6 +45,8 @@ pub struct HoldOutOptions<'a> {
     pub time: Option<usize>,
     /// Names of the known forces, if there are any.
     pub forces: &'a [String],
+    /// Units of the coordinates, for pictures.
+    pub units: &'a [String],
     /// Threads.
     pub threads: usize,
 }
@@ -163,25 +168,11 @@ pub fn evaluate_hold_out(
     let mut figures = Vec::new();
     let mut useful_time = None;
     if !windows.is_empty() {
-        for (i, name) in recording.coordinates.iter().enumerate() {
-            let drawn = line_plot(&example(&windows[0], &motion[0], periodic, i, name));
-            let heading = format!("{name} over time: predicted beside measured");
-            figures.extend(figure(&format!("prediction_{}.svg", i + 1), heading, drawn, EXAMPLE_CAPTION));
-        }
+        figures = example_figures(plan, &predicted, (&scales, horizon));
         let curves = [("model", errors(motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
         useful_time = valid_time.as_ref().map(|valid| UsefulTime::new(valid, [&curves[0].1, &curves[1].1]));
         let heading = "How the error of the prediction grows";
         figures.extend(figure("prediction_error.svg", heading, line_plot(&error_plot(&curves, unit)), ERROR_CAPTION));
-        if let Some(force) = &windows[0].force {
-            let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).map(|t| windows[0].lead + t).collect();
-            let drawn = line_plot(&force_plot(force, &times, plan.forces));
-            figures.extend(figure(
-                "prediction_forces.svg",
-                "The known forces that drove the motion",
-                drawn,
-                FORCE_CAPTION,
-            ));
-        }
     }
     figures.extend(energy_figure(model, plan.part));
     if let Some(window) = windows.first() {
@@ -220,9 +211,8 @@ pub fn evaluate_hold_out(
 
 const ERROR_CAPTION: &str = "Median over the held-out windows of the error of the predicted coordinates (root mean square over the coordinates), by \
                              time since the last sample that the start of the prediction has seen, beside going on at constant velocity.";
-const EXAMPLE_CAPTION: &str = "The first held-out window, which the model has not seen: measured (wide), and predicted from a state that has not seen it.";
 const FORCE_CAPTION: &str =
-    "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
+    "Known forces in the same held-out window; the prediction takes them as linear between the samples.";
 
 /// Times over which held-out motion can be predicted: from the shortest of its steps to the longest of its trajectories.
 pub(crate) fn horizons(part: &Split) -> Option<(f64, f64)> {
@@ -276,18 +266,52 @@ fn error_plot(curves: &[(&str, Vec<PredictionError>)], unit: &str) -> LinePlot {
         Series::new(name, &x, &y)
     };
     LinePlot {
-        title: "Prediction of held-out motion".into(),
         x_label: "time ahead [s]".into(),
         y_label: format!("median error [{}]", short(unit)),
         log_y: true,
         series: curves.iter().map(series).collect(),
-        turn: None,
-        level: None,
+        ..LinePlot::default()
     }
 }
 
+/// The window whose error at the end is the median: its coordinates, its path in the plane of polar ones, and the forces in it.
+fn example_figures(
+    plan: &HoldOutOptions<'_>,
+    found: &HeldOutPredictions,
+    (scales, horizon): (&[f64], f64),
+) -> Vec<Figure> {
+    let (windows, motion, recording) = (&found.windows, &found.predictions, &plan.part.recording);
+    let (names, periodic) = (&recording.coordinates, &recording.periodic);
+    let error = |(window, predicted): (&Window, &Vec<f64>)| {
+        prediction_error(slice::from_ref(window), &vec![predicted.clone()], (periodic, scales), horizon).median
+    };
+    let Some(chosen) = median_of(&windows.iter().zip(motion).map(error).collect::<Vec<_>>()) else { return Vec::new() };
+    let (window, predicted) = (&windows[chosen], &motion[chosen]);
+    let which = match windows.len() {
+        1 => "the held-out window".to_string(),
+        count => format!("of {count} held-out windows the one whose error at the end is the median"),
+    };
+    let caption = format!("Measured (wide), and predicted from a state that has not seen it: {which}.");
+    let of = |(i, name): (usize, &String)| {
+        let drawn = line_plot(&example(window, predicted, periodic, i, with_unit(name, &plan.units[i])));
+        let heading = format!("{name} over time: predicted over measured");
+        figure(&format!("prediction_{}.svg", i + 1), heading, drawn, caption.as_str())
+    };
+    let path = Polar::of(names, plan.units).and_then(|polar| {
+        let trace = polar.trace(names.len(), &[("measured", &window.measured), ("predicted", predicted)]);
+        let heading = "The path in the plane: predicted over measured";
+        figure("prediction_path.svg", heading, trace_plot(&trace), caption.as_str())
+    });
+    let forces = window.force.as_ref().and_then(|force| {
+        let times: Vec<f64> = [0.0].iter().chain(&window.times).map(|t| window.lead + t).collect();
+        let drawn = line_plot(&force_plot(force, &times, plan.forces));
+        figure("prediction_forces.svg", "The known forces that drove the motion", drawn, FORCE_CAPTION)
+    });
+    names.iter().enumerate().filter_map(of).chain(path).chain(forces).collect()
+}
+
 /// Coordinate `i` of a window, measured and predicted; an angle in one turn if it leaves it.
-fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, name: &str) -> LinePlot {
+fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, y_label: String) -> LinePlot {
     let column = |values: &[f64]| -> Vec<(f64, f64)> {
         values.iter().skip(i).step_by(periodic.len()).copied().zip(window.times.iter().copied()).collect()
     };
@@ -298,15 +322,8 @@ fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, name
         let path = turn.map_or_else(|| path.clone(), |turn| turn.fold(&path));
         Series { points: path.into_iter().map(|(x, t)| (t, x)).collect(), ..Series::new(label, &[], &[]) }
     };
-    LinePlot {
-        title: format!("Prediction of {name}"),
-        x_label: "time ahead [s]".into(),
-        y_label: format!("{name} [{}]", if periodic[i] { "rad" } else { "SI" }),
-        log_y: false,
-        series: vec![line("measured", measured), line("predicted", predicted).over()],
-        turn,
-        level: None,
-    }
+    let series = vec![line("measured", measured), line("predicted", predicted).over()];
+    LinePlot { x_label: "time ahead [s]".into(), y_label, series, turn, ..LinePlot::default() }
 }
 
 /// Forces over time, one line each.
@@ -317,15 +334,9 @@ fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> Lin
         force.at(t, &mut values);
         columns.iter_mut().zip(&values).for_each(|(column, &value)| column.push(value));
     }
-    LinePlot {
-        title: "Known forces".into(),
-        x_label: "time ahead [s]".into(),
-        y_label: "force [N, N m]".into(),
-        log_y: false,
-        series: names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect(),
-        turn: None,
-        level: None,
-    }
+    let series = names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect();
+    let (x_label, y_label) = ("time ahead [s]".into(), "force [N, N m]".into());
+    LinePlot { x_label, y_label, series, ..LinePlot::default() }
 }
 
 /// States evaluated at once.

@@ -2,8 +2,9 @@
 //! `F_ij = dA_j/dq_i - dA_i/dq_j` of the momenta `A = p(q, 0)`, and the friction force over the velocity. All but the last do not
 //! depend on the gauge; together they are the whole of a Lagrangian that is quadratic in the velocities.
 
-use crate::analysis::{Axis, Grid, MetricComponent, grid_points, metric_grids};
+use crate::analysis::{Axis, Grid, MetricComponent, element_factor, grid_points, metric_grids};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::pipeline::determination::Determined;
 use crate::recording::Recording;
 use crate::report::{Figure, LinePlot, QuantityMap, Series, figure, file_part, line_plot, quantity_figure};
 use std::f64::consts::{PI, TAU};
@@ -20,6 +21,8 @@ const SHOWN: f64 = 0.02;
 const WHOLE_TURN: f64 = 0.9;
 /// Recorded positions that are marked in a map, at most.
 const MARKS: usize = 400;
+/// Share of the range of a coordinate within which a recorded position tells of a place.
+const NEAR: f64 = 0.1;
 
 /// A learned model, with the exact one beside it if that is known.
 #[derive(Clone, Copy)]
@@ -28,10 +31,12 @@ pub(super) struct Pair<'a> {
     pub exact: Option<&'a dyn EulerLagrange<f64>>,
     /// Factor by which the learned Lagrangian is taken.
     pub factor: f64,
+    /// That of every coordinate, where groups of them have one each.
+    pub factors: &'a [f64],
 }
 
 /// Coordinates over which pictures are drawn.
-pub(super) struct Picturing {
+pub(super) struct Picturing<'a> {
     /// Names of the coordinates, and labels of axes for coordinates and velocities.
     pub names: Vec<String>,
     pub labels: Vec<String>,
@@ -43,6 +48,8 @@ pub(super) struct Picturing {
     pub marks: Vec<(f64, f64)>,
     /// Sentence about the unit of the pictures; may be empty.
     pub unit: String,
+    /// What recorded motion determines.
+    pub determined: Option<&'a Determined>,
 }
 
 /// The range of a coordinate over recorded motion, an angle folded into the turn about its mean.
@@ -58,7 +65,7 @@ pub(super) fn recorded_range(recording: &Recording, i: usize) -> ([f64; 2], impl
     (range, folded)
 }
 
-impl Picturing {
+impl Picturing<'_> {
     /// The plane of recorded motion.
     pub fn of_recording(self, recording: &Recording) -> Self {
         let n = recording.n();
@@ -95,13 +102,36 @@ impl Picturing {
         others.map(one).collect::<Vec<_>>().join(", ")
     }
 
-    /// A map of a quantity; `file` is the beginning of the file's name.
-    pub fn map(&self, [quantity, about, file]: [String; 3], learned: Grid, exact: Option<Grid>) -> Option<Figure> {
+    /// A map of a quantity; `file` is the beginning of the file's name, `open` why the motion does not determine it.
+    pub fn map(
+        &self,
+        [quantity, about, file]: [String; 3],
+        learned: Grid,
+        exact: Option<Grid>,
+        open: Option<String>,
+    ) -> Option<Figure> {
         let (labels, fixed) = (self.shown.map(|i| self.labels[i].clone()), self.fixed(&self.shown));
         let dots = if self.marks.is_empty() { "" } else { "Dots: recorded positions." };
-        let remark = [dots, &self.unit].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(" ");
+        let (open, why) = match open {
+            Some(why) => (vec![true; learned.values.len()], format!("Greyed out: {why}")),
+            None => self.unseen(&learned),
+        };
+        let remark = sentences(&[dots, &why, &self.unit]);
         let marks = self.marks.clone();
-        quantity_figure(&QuantityMap { quantity, about, file, labels, learned, exact, fixed, remark, marks })
+        quantity_figure(&QuantityMap { quantity, about, file, labels, learned, exact, fixed, remark, marks, open })
+    }
+
+    /// Places of a map that no recorded position is near, and what they are in words; nothing without recorded motion.
+    fn unseen(&self, grid: &Grid) -> (Vec<bool>, String) {
+        if self.marks.is_empty() {
+            return (Vec::new(), String::new());
+        }
+        let [near_x, near_y] = self.shown.map(|i| NEAR * (self.ranges[i][1] - self.ranges[i][0]));
+        let near = |(x, y): (f64, f64), (u, w): &(f64, f64)| ((x - u) / near_x).hypot((y - w) / near_y) <= 1.0;
+        let place = |k: usize| !self.marks.iter().any(|mark| near(grid.point(k), mark));
+        let open: Vec<bool> = (0..grid.values.len()).map(place).collect();
+        let why = if open.contains(&true) { "Greyed out: no recorded position is near." } else { "" };
+        (open, why.to_string())
     }
 
     /// Grid over the plane of the values that `of` gives for points `(points, n)`.
@@ -111,7 +141,13 @@ impl Picturing {
     }
 
     /// A curve of a quantity over coordinate `i`, the others in the middle of their ranges.
-    fn curve(&self, i: usize, [quantity, about, file]: [&str; 3], pair: Pair<'_>, of: Value<'_>) -> Option<Figure> {
+    fn curve(
+        &self,
+        i: usize,
+        [quantity, about, file]: [&str; 3],
+        (pair, of): (Pair<'_>, Value<'_>),
+        open: Option<String>,
+    ) -> Option<Figure> {
         let [from, to] = self.ranges[i];
         let x = Axis { component: i, from, to, points: CURVE }.values();
         let middle = self.middle();
@@ -126,14 +162,16 @@ impl Picturing {
         };
         let fixed = self.fixed(&[i]);
         let fixed = if fixed.is_empty() { fixed } else { format!("At {fixed}.") };
-        let caption = [fixed.as_str(), &self.unit].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>();
-        let plot = lines_over(quantity, &self.labels[i], quantity, lines);
-        figure(&format!("{}.svg", file_part(file)), about, line_plot(&plot), caption.join(" "))
+        let why = open.as_ref().map_or(String::new(), |why| format!("Grey: {why}"));
+        let plot = LinePlot { open: open.is_some(), ..lines_over(&self.labels[i], quantity, lines) };
+        let caption = sentences(&[&fixed, &why, &self.unit]);
+        figure(&format!("{}.svg", file_part(file)), about, line_plot(&plot), caption)
     }
 
     /// The potential; none for a model that is constant at rest.
     pub fn potential(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
         let n = self.names.len();
+        let open = self.determined.and_then(Determined::open_potential);
         let mut figures = Vec::new();
         if n > 1 {
             let learned = self.grid(side, |q| potential(pair.learned, q)).map(|v| pair.factor * v);
@@ -144,12 +182,13 @@ impl Picturing {
             }
             let exact = exact.map(|values| Grid { values, ..learned.clone() });
             let texts = ["V", "The potential V over the coordinates", "potential"].map(String::from);
-            figures.extend(self.map(texts, Grid { values, ..learned }, exact));
+            figures.extend(self.map(texts, Grid { values, ..learned }, exact, open.clone()));
         }
         for i in (0..n).filter(|i| n == 1 || !self.shown.contains(i)) {
             let name = &self.names[i];
             let file = if n == 1 { "potential".to_string() } else { format!("potential_{name}") };
-            figures.extend(self.curve(i, ["V", &format!("The potential V over {name}"), &file], pair, &potential));
+            let texts = ["V", &format!("The potential V over {name}"), &file];
+            figures.extend(self.curve(i, texts, (pair, &potential), open.clone()));
         }
         figures
     }
@@ -166,7 +205,8 @@ impl Picturing {
         if let [name] = &self.names[..] {
             let of = |model: &dyn EulerLagrange<f64>, q: &[f64]| at_rest(model, q, Request::MASS_MATRIX).mass_matrix;
             let texts = [symbol, &format!("The mass M over {name}"), file];
-            return (self.curve(0, texts, pair, &of).into_iter().collect(), 0);
+            let open = self.determined.and_then(|determined| determined.open_mass([name, name]));
+            return (self.curve(0, texts, (pair, &of), open).into_iter().collect(), 0);
         }
         let size = |component: &MetricComponent| component.exact.unwrap_or(0.0).max(component.learned);
         let diagonal = |i: usize| components.iter().find(|c| c.indices == [i; 2]).map_or(0.0, size);
@@ -181,15 +221,20 @@ impl Picturing {
             let exact = exact.as_mut().and_then(Iterator::next);
             if matters(component) {
                 let [a, b] = component.indices.map(|i| self.names[i].as_str());
+                let [row, column] = component.indices.map(|i| pair.factors[i]);
+                let open = self.determined.and_then(|determined| determined.open_mass([a, b]));
                 let what = if symbol == "g" { "metric" } else { "mass matrix" };
                 let quantity = format!("{symbol}[{a},{b}]");
                 let about = format!("Component {quantity} of the {what} over the coordinates");
                 let texts = [quantity, about, format!("{file}_{a}_{b}")];
-                maps.push((texts, learned.map(|m| pair.factor * m), exact));
+                maps.push((texts, learned.map(|m| element_factor(row, column) * m), exact, open));
             }
         }
         let more = maps.len().saturating_sub(MAPS);
-        let drawn = maps.into_iter().take(MAPS).filter_map(|(texts, learned, exact)| self.map(texts, learned, exact));
+        let drawn = maps
+            .into_iter()
+            .take(MAPS)
+            .filter_map(|(texts, learned, exact, open)| self.map(texts, learned, exact, open));
         (drawn.collect(), more)
     }
 
@@ -200,14 +245,10 @@ impl Picturing {
         let drawn = pairs.filter_map(|[i, j]| {
             let grid = |model| self.grid(side, |q| self.field(model, q, [i, j]));
             let (learned, exact) = (grid(pair.learned).map(|f| pair.factor * f), pair.exact.map(grid));
-            let vanishes = |grid: &Grid| grid.values.iter().all(|f| *f == 0.0 || !f.is_finite());
-            if vanishes(&learned) && exact.as_ref().is_none_or(vanishes) {
-                return None;
-            }
             let [a, b] = [i, j].map(|i| self.names[i].as_str());
             let quantity = format!("F[{a},{b}]");
             let about = format!("The gyroscopic (magnetic) field {quantity} over the coordinates");
-            self.map([quantity, about, format!("gyroscopic_{a}_{b}")], learned, exact)
+            self.map([quantity, about, format!("gyroscopic_{a}_{b}")], learned, exact, None)
         });
         drawn.collect()
     }
@@ -254,9 +295,9 @@ impl Picturing {
             };
             let name = &self.names[i];
             let about = format!("The friction of {name}: force \u{2212}dD/dv over the velocity");
-            let caption = ["The other velocities are 0, the coordinates in the middle.", self.unit.as_str()].join(" ");
-            let plot = lines_over(&format!("Friction of {name}"), &self.labels[n + i], "force", lines);
-            figure(&format!("friction_{}.svg", file_part(name)), about, line_plot(&plot), caption.trim_end())
+            let caption = sentences(&["The other velocities are 0, the coordinates in the middle.", &self.unit]);
+            let plot = lines_over(&self.labels[n + i], "force", lines);
+            figure(&format!("friction_{}.svg", file_part(name)), about, line_plot(&plot), caption)
         });
         drawn.collect()
     }
@@ -265,9 +306,13 @@ impl Picturing {
 /// Values of a quantity of a model at points `(points, n)`.
 type Value<'a> = &'a dyn Fn(&dyn EulerLagrange<f64>, &[f64]) -> Vec<f64>;
 
-fn lines_over(title: &str, x_label: &str, y_label: &str, series: Vec<Series>) -> LinePlot {
-    let (title, x_label, y_label) = (title.to_string(), x_label.to_string(), y_label.to_string());
-    LinePlot { title, x_label, y_label, log_y: false, series, turn: None, level: None }
+fn lines_over(x_label: &str, y_label: &str, series: Vec<Series>) -> LinePlot {
+    LinePlot { x_label: x_label.to_string(), y_label: y_label.to_string(), series, ..LinePlot::default() }
+}
+
+/// Sentences in a line, without empty ones.
+fn sentences(all: &[&str]) -> String {
+    all.iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>().join(" ")
 }
 
 /// Terms at rest at points `(points, n)`.
@@ -297,4 +342,40 @@ fn aligned(learned: Vec<f64>, exact: Option<Vec<f64>>) -> (Vec<f64>, Option<Vec<
 /// `true` for values that are one number but for rounding.
 fn is_flat(values: &[f64]) -> bool {
     values.iter().filter(|x| x.is_finite()).all(|x| x.abs() <= 1e-12)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_greyed_where_nothing_was_recorded_or_nothing_is_determined() {
+        let places: Vec<f64> = (0..=20).map(|k| 0.05 * f64::from(k)).collect();
+        let values = places.iter().flat_map(|y| places.iter().map(move |x| x + y)).collect();
+        let grid = Grid { x: places.clone(), y: places.clone(), values };
+        let picturing = |marks: Vec<(f64, f64)>| Picturing {
+            names: ["x", "y"].map(String::from).to_vec(),
+            labels: ["x [m]", "y [m]"].map(String::from).to_vec(),
+            ranges: vec![[0.0, 1.0]; 2],
+            shown: [0, 1],
+            marks,
+            unit: String::new(),
+            determined: None,
+        };
+        let drawn = |marks: &[(f64, f64)], open: Option<&str>| {
+            let texts = ["V", "The potential", "potential"].map(String::from);
+            let figure = picturing(marks.to_vec()).map(texts, grid.clone(), None, open.map(String::from)).unwrap();
+            (figure.caption, figure.picture)
+        };
+        let all: Vec<(f64, f64)> = places.iter().flat_map(|x| places.iter().map(|y| (*x, *y))).collect();
+        let left: Vec<(f64, f64)> = all.iter().copied().filter(|(x, _)| *x < 0.4).collect();
+        let count =
+            |marks: &[(f64, f64)]| picturing(marks.to_vec()).unseen(&grid).0.iter().filter(|open| **open).count();
+        // Eleven of 21 columns are farther from the left than a tenth of the range.
+        assert_eq!([count(&all), count(&left), count(&[])], [0, 11 * 21, 0]);
+        assert!(!drawn(&all, None).0.contains("Greyed out"));
+        assert!(drawn(&left, None).0.contains("Greyed out: no recorded position is near."));
+        let (caption, picture) = drawn(&all, Some("Nothing moved."));
+        assert!(caption.contains("Greyed out: Nothing moved.") && picture != drawn(&all, None).1);
+    }
 }

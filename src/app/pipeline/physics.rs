@@ -10,8 +10,10 @@ use crate::certificate::{Options, Signature, certify_network};
 use crate::geometry::MOST_COORDINATES;
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
+use crate::names::number;
 use crate::network::{NetworkLagrangian, Structure};
 use crate::pipeline::PipelineError;
+use crate::pipeline::determination::Determined;
 use crate::pipeline::equivalence::{Equivalence, gauge_functions};
 use crate::pipeline::learned_functions::{MAPS, Pair, Picturing};
 use crate::recording::Recording;
@@ -151,8 +153,9 @@ pub(crate) struct Subject<'a> {
     /// Names of coordinates and velocities, with units as labels of axes.
     pub columns: Vec<String>,
     pub labels: Vec<String>,
-    /// The recorded motion it was learned from, if it was.
+    /// The recorded motion it was learned from, if it was, and what that determines.
     pub recorded: Option<&'a Recording>,
+    pub determined: Option<&'a Determined>,
     /// Learned motion along which charges are followed.
     pub motion: Option<&'a Trajectory<f64>>,
     pub threads: usize,
@@ -249,9 +252,10 @@ impl Physics {
             let masses = matrices_at_rest(network, looked_at);
             masses.iter().step_by(n * n).sum::<f64>() * n as f64 / looked_at.len() as f64
         };
-        let (factor, unit) = match exact {
+        let at_rest = exact.map(|exact| mass_matrix_error(exact, network, &q));
+        let (factor, unit) = match &at_rest {
             // Of a black box on a mass shell only a comparison at rest knows the factor there.
-            Some(exact) => (found.unwrap_or_else(|| mass_matrix_error(exact, network, &q).factor), String::new()),
+            Some(at_rest) => (found.unwrap_or(at_rest.factor), String::new()),
             None if metric => (1.0, String::new()),
             None if subject.is_forced() => (1.0, "In SI units, which the known forces fix.".to_string()),
             None => {
@@ -260,9 +264,12 @@ impl Physics {
                 (Some(mean_mass().recip()).filter(|factor| factor.is_finite()).unwrap_or(1.0), unit)
             }
         };
+        let apart = at_rest.filter(|at_rest| at_rest.groups > 1);
+        let factors = apart.map_or_else(|| vec![factor; n], |at_rest| at_rest.factors);
+        let unit = if exact.is_some() { taken(&self.coordinates, &factors) } else { unit };
         let components = metric_components(exact, network, looked_at, factor);
         let picturing = self.picturing(subject, region, unit);
-        let pair = Pair { learned: network, exact, factor };
+        let pair = Pair { learned: network, exact, factor, factors: &factors };
         let points = METRIC_WORK / (network.weights().len() * n).max(1);
         let side = points.isqrt().min(METRIC_POINTS);
         let time = subject.time_like();
@@ -295,21 +302,22 @@ impl Physics {
 
     /// Where pictures are drawn: over the recorded motion, or over the region; maps over the first two coordinates, those of space if there
     /// are two.
-    fn picturing(&self, subject: &Subject<'_>, region: &Region, unit: String) -> Picturing {
+    fn picturing<'a>(&self, subject: &Subject<'a>, region: &Region, unit: String) -> Picturing<'a> {
         let n = self.coordinates.len();
         let shown = if n > 2 && subject.time_like() == Some(0) { [1, n - 1] } else { [0, (n - 1).min(1)] };
         let (names, labels) = (self.coordinates.clone(), subject.labels.clone());
-        let of_region = Picturing { names, labels, ranges: region.position.clone(), shown, marks: Vec::new(), unit };
+        let (ranges, marks, determined) = (region.position.clone(), Vec::new(), subject.determined);
+        let of_region = Picturing { names, labels, ranges, shown, marks, unit, determined };
         match subject.recorded {
             Some(recording) => of_region.of_recording(recording),
             None => of_region,
         }
     }
 
-    fn find_curvature(&mut self, pair: Pair<'_>, q: &[f64], most: usize, picturing: &Picturing) {
+    fn find_curvature(&mut self, pair: Pair<'_>, q: &[f64], most: usize, picturing: &Picturing<'_>) {
         let n = self.coordinates.len();
         let q = &q[..n * most.min(q.len() / n)];
-        let Pair { learned, exact, factor } = pair;
+        let Pair { learned, exact, factor, .. } = pair;
         // R of `s g` is `R/s`.
         let scaled = |values: Vec<f64>| values.iter().map(|r| r / factor).collect::<Vec<f64>>();
         self.curvature_scalar = Some(CurvatureScalar {
@@ -325,7 +333,7 @@ impl Physics {
         let grid = |model: &dyn EulerLagrange<f64>| curvature_grid(model, &picturing.middle(), picturing.axes(side));
         let texts =
             ["R", "Curvature scalar R of the metric over the coordinates", "curvature_scalar"].map(String::from);
-        self.figures.extend(picturing.map(texts, grid(learned).map(|r| r / factor), exact.map(grid)));
+        self.figures.extend(picturing.map(texts, grid(learned).map(|r| r / factor), exact.map(grid), None));
     }
 
     fn find_symmetries(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
@@ -410,6 +418,15 @@ impl Physics {
             Err(problem) => self.left_out.push(format!("certificate of the signature: {problem}")),
         }
     }
+}
+
+/// The factors by which a learned Lagrangian is taken beside the exact one, those of its coordinates, in words.
+fn taken(names: &[String], factors: &[f64]) -> String {
+    if factors.iter().all(|factor| *factor == factors[0]) {
+        return format!("The learned Lagrangian is taken times {}, its best factor.", number(factors[0]));
+    }
+    let each: Vec<String> = names.iter().zip(factors).map(|(name, s)| format!("{} ({name})", number(*s))).collect();
+    format!("Coordinates that do not act on each other are taken times their best factors, {}.", each.join(", "))
 }
 
 impl Subject<'_> {

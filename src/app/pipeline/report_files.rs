@@ -32,7 +32,7 @@ pub(crate) fn write_report_and_figures<'a>(
     let captions: BTreeMap<&str, Caption> = figures.clone().map(|f| (f.file.as_str(), caption(f))).collect();
     output.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(PipelineError::format)?.as_bytes())?;
     output.write("report.html", report.to_html().as_bytes())?;
-    figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))
+    figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.to_svg().as_bytes()))
 }
 
 /// Writes the interactive page of a model, and adds a link to it; of a model that has none the report says why.

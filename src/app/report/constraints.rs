@@ -28,15 +28,8 @@ pub fn found_constraint_figures(found: &FoundConstraints, samples: &MotionSample
         }
     }
     let places: Vec<f64> = places.into_iter().map(|at| at as f64).collect();
-    let plot = LinePlot {
-        title: String::new(),
-        x_label: "sample".to_string(),
-        y_label: "distance".to_string(),
-        log_y: false,
-        series: names.iter().zip(&distances).map(|(name, values)| Series::new(name, &places, values)).collect(),
-        turn: None,
-        level: None,
-    };
+    let series = names.iter().zip(&distances).map(|(name, values)| Series::new(name, &places, values)).collect();
+    let plot = LinePlot { x_label: "sample".into(), y_label: "distance".into(), series, ..LinePlot::default() };
     let caption = "phi over the length of its gradient at the recorded states, of a row that is linear in the velocities A v - b over its \
                    length: noise about 0, if the constraint holds.";
     figure("found_constraints.svg", "Distance of the motion from the constraints", line_plot(&plot), caption)

@@ -1,9 +1,12 @@
 //! Pictures of a training, and of the motions of an evaluation.
 
-use super::{Figure, Level, LinePlot, Series, Trace, Turn, figure, file_part, line_plot, trace_plot};
+use super::{
+    Figure, Level, LinePlot, Polar, Series, Trace, Turn, by_unit, figure, file_part, line_plot, median_of, trace_plot,
+    with_unit,
+};
 use crate::analysis::{Portrait, TrajectoryRun, VALID, ValidTimes};
 use crate::lagrangian::SystemInstance;
-use crate::names::rounded;
+use crate::names::{number, rounded};
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
@@ -45,7 +48,6 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
         (
             "training_loss.svg",
             "How the loss falls from epoch to epoch",
-            "Training",
             "loss",
             vec![series("training", |r| r.training_loss), series("validation", |r| r.validation_loss)],
             loss,
@@ -53,7 +55,6 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
         (
             "learning_rate.svg",
             "The learning rate",
-            "Learning rate",
             "learning rate",
             vec![series("", |r| r.learning_rate)],
             String::new(),
@@ -61,7 +62,6 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
         (
             "gradient_norm.svg",
             "The size of the gradient",
-            "Gradient norm",
             "gradient norm",
             vec![series("", |r| r.gradient_norm)],
             "Norm before clipping, mean per epoch.".into(),
@@ -69,15 +69,14 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
         (
             "penalty.svg",
             "How much the mass matrix violates its signature",
-            "Stability penalty",
             "penalty",
             vec![series("", |r| r.penalty)],
             "Penalty on the mass matrix, mean per epoch; epochs without a violation leave gaps.".into(),
         ),
     ];
-    let drawn = |(file, heading, title, y_label, series, caption): (&str, &str, &str, &str, Vec<Series>, String)| {
-        let (title, y_label) = (title.to_string(), y_label.to_string());
-        let plot = LinePlot { title, x_label: "epoch".into(), y_label, log_y: true, series, turn: None, level: None };
+    let drawn = |(file, heading, y_label, series, caption): (&str, &str, &str, Vec<Series>, String)| {
+        let y_label = y_label.to_string();
+        let plot = LinePlot { x_label: "epoch".into(), y_label, log_y: true, series, ..LinePlot::default() };
         figure(file, heading, line_plot(&plot), caption)
     };
     pictures.into_iter().filter_map(drawn).collect()
@@ -93,9 +92,9 @@ const BEYOND_VALID: f64 = 4.0;
 /// Times and values of one quantity of a run.
 type Part<'a, S> = &'a dyn Fn(&TrajectoryRun<S>) -> (&[f64], Vec<f64>);
 
-/// Pictures of trajectory tests, in the order of a report: coordinates of the first start over time, and velocities if the
-/// system has a time-like coordinate; every portrayed start in the plane of the system; the first start in the planes of
-/// coordinate and velocity; relative prediction error up to beyond the time of valid prediction; coordinate error, energy
+/// Pictures of trajectory tests, in the order of a report: coordinates over time of the start that is the median by the time of valid
+/// prediction, and velocities if the system has a time-like coordinate; every portrayed start in the plane of the system; the median one in
+/// the planes of coordinate and velocity; relative prediction error up to beyond the time of valid prediction; coordinate error, energy
 /// error, drift of the learned energy over the whole test, one line per start.
 ///
 /// `portraits` are the first starts in dense samples, `system` describes what moved: names, units, angles (folded into one
@@ -106,11 +105,17 @@ pub fn evaluation_figures<S: Scalar>(
     system: &SystemInstance<S>,
 ) -> Vec<Figure> {
     let mut figures = Vec::new();
-    if let Some(Portrait { exact, learned }) = portraits.first() {
+    let valid: Vec<f64> = runs.iter().take(portraits.len()).map(|run| run.valid.time).collect();
+    if let Some(start) = median_of(&valid) {
+        let Portrait { exact, learned } = &portraits[start];
         let pair = [("exact", exact), ("learned", learned)];
-        first_over_time(&mut figures, pair, system);
+        let name = match portraits.len() {
+            1 => "start 1".to_string(),
+            count => format!("start {}, the median of {count} by the time of valid prediction", start + 1),
+        };
+        over_time_of(&mut figures, pair, &name, system);
         traces(&mut figures, portraits, system);
-        phases(&mut figures, pair, system);
+        phases(&mut figures, pair, &name, system);
     }
     errors_over_time(&mut figures, runs, system);
     figures
@@ -119,11 +124,6 @@ pub fn evaluation_figures<S: Scalar>(
 /// Exact and learned motion with their names.
 type Pair<'a, S> = [(&'static str, &'a Trajectory<S>); 2];
 
-/// A quantity with its unit, if it has one.
-pub(crate) fn with_unit(quantity: &str, unit: &str) -> String {
-    if ["", "1"].contains(&unit) { quantity.to_string() } else { format!("{quantity} [{unit}]") }
-}
-
 /// Label of the evolution parameter.
 fn time_label<S>(system: &SystemInstance<S>) -> String {
     let parameter = if system.system.time_like.is_some() { "proper time" } else { "t" };
@@ -131,9 +131,8 @@ fn time_label<S>(system: &SystemInstance<S>) -> String {
 }
 
 /// Lines over the evolution parameter.
-fn over_time<S>(system: &SystemInstance<S>, title: &str, y_label: &str, log_y: bool, series: Vec<Series>) -> LinePlot {
-    let x_label = time_label(system);
-    LinePlot { title: title.into(), x_label, y_label: y_label.into(), log_y, series, turn: None, level: None }
+fn over_time<S>(system: &SystemInstance<S>, y_label: &str, log_y: bool, series: Vec<Series>) -> LinePlot {
+    LinePlot { x_label: time_label(system), y_label: y_label.into(), log_y, series, ..LinePlot::default() }
 }
 
 fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<S>], system: &SystemInstance<S>) {
@@ -143,7 +142,7 @@ fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<
     };
     let valid = ValidTimes::of(&runs.iter().map(|run| (run.valid, None)).collect::<Vec<_>>());
     let valid = valid.map_or(0.0, |valid| valid.median);
-    let mut add = |file: &str, [title, label, heading, caption]: [&str; 4], until: Option<f64>, part: Part<'_, S>| {
+    let mut add = |file: &str, [label, heading, caption]: [&str; 3], until: Option<f64>, part: Part<'_, S>| {
         let line = |(k, run): (usize, &TrajectoryRun<S>)| {
             let (t, y) = part(run);
             let shown = until.map_or(t.len(), |until| t.partition_point(|t| *t <= until));
@@ -151,11 +150,10 @@ fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<
         };
         let lines = runs.iter().take(LINES).enumerate().map(line).collect();
         let level = until.map(|_| Level { value: VALID, name: format!("valid up to {VALID}") });
-        let plot = LinePlot { level, ..over_time(system, title, label, true, lines) };
+        let plot = LinePlot { level, ..over_time(system, label, true, lines) };
         figures.extend(figure(file, heading, line_plot(&plot), format!("{caption}{some}")));
     };
     let texts = [
-        "Prediction error",
         "error / spread of the motion",
         "How long the prediction holds",
         "Error of the learned coordinates relative to the spread of the exact motion, one line per start. The prediction is \
@@ -173,32 +171,25 @@ fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<
         let heading = format!("Error of the predicted coordinates in {unit}");
         let caption =
             "Largest |q learned \u{2212} q exact| of these coordinates over the whole test, angles modulo 2\u{3c0}.";
-        let texts = ["Coordinate error", &label, &heading, caption];
+        let texts = [&*label, &heading, caption];
         add(&file, texts, None, &|run| (&run.coordinates.t, run.coordinates.largest(coordinates)));
     }
     let label = "|E(t) \u{2212} E(0)| / |E(0)|";
     let caption = "Relative error of the exact energy along the learned motion.";
-    let texts = ["Energy error", label, "Whether the predicted motion keeps the true energy", caption];
+    let texts = [label, "Whether the predicted motion keeps the true energy", caption];
     add("energy_error.svg", texts, None, &|run| (&run.energy.t, run.energy.error.clone()));
     let caption = "Relative drift of the learned energy along the learned motion: what the integrator loses.";
-    let texts = ["Drift of the learned energy", label, "Whether the integrator keeps the learned energy", caption];
+    let texts = [label, "Whether the integrator keeps the learned energy", caption];
     add("energy_drift.svg", texts, None, &|run| (&run.drift.t, run.drift.error.clone()));
 }
 
 /// Units of the coordinates, each with the coordinates that have it, in their order.
 pub(crate) fn units<S>(system: &SystemInstance<S>) -> Vec<(String, Vec<usize>)> {
-    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
-    for (i, coordinate) in system.system.coordinates(system.coordinates).iter().enumerate() {
-        match groups.iter_mut().find(|(unit, _)| *unit == coordinate.unit) {
-            Some((_, members)) => members.push(i),
-            None => groups.push((coordinate.unit.to_string(), vec![i])),
-        }
-    }
-    groups
+    by_unit(&system.system.units(system.coordinates)[..system.coordinates])
 }
 
-/// Coordinates of the first start, and velocities if there is a time-like coordinate: rates of clocks.
-fn first_over_time<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &SystemInstance<S>) {
+/// Coordinates of a start, and velocities if there is a time-like coordinate: rates of clocks.
+fn over_time_of<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: &str, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (coordinates, columns) = (system.system.coordinates(n), system.system.columns(n));
     let labels = system.system.labels(n);
@@ -215,43 +206,54 @@ fn first_over_time<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, syst
             Series { points, ..Series::new(label, &[], &[]) }
         };
         let [exact, learned] = [line((pair[0], &values[0])), line((pair[1], &values[1])).over()];
-        let plot = over_time(system, &format!("{column} of start 1"), &labels[k], false, vec![exact, learned]);
+        let plot = over_time(system, &labels[k], false, vec![exact, learned]);
         let kind = if k < n { "trajectory" } else { "velocity" };
         let file = format!("{kind}_{}.svg", file_part(&coordinate.name));
         let folded = if turn.is_some() { ", folded into one turn" } else { "" };
-        let heading = format!("{column} over time: predicted beside exact");
-        let caption = format!("{column} of start 1, exact (wide) and learned{folded}.");
+        let heading = format!("{column} over time: predicted over exact");
+        let caption = format!("{column} of {start}, exact (wide) and learned{folded}.");
         figures.extend(figure(&file, heading, line_plot(&LinePlot { turn, ..plot }), caption));
     }
 }
 
-/// Meaning of a path's colours.
-fn from_dark_to_bright<S: Scalar>(trajectory: &Trajectory<S>, unit: &str) -> String {
+/// Ends of a path.
+fn from_the_dot<S: Scalar>(trajectory: &Trajectory<S>, unit: &str) -> String {
     let end = trajectory.t.last().map_or(0.0, |t| t.to_f64());
-    format!("from dark (0 {unit}, dot) to bright ({end:.3} {unit})").replace(".000", "")
+    format!("from the dot (0 {unit}) to {} {unit}", number(end))
 }
 
 /// Every portrayed start in the plane of the system.
 fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], system: &SystemInstance<S>) {
-    let Some(plane) = system.system.plane else { return };
-    let path = |label: &str, trajectory: &Trajectory<S>| {
-        let places = (0..trajectory.len()).filter_map(|k| system.position_in_plane(trajectory.state(k).0));
-        Series { points: places.collect(), ..Series::new(label, &[], &[]) }
+    let n = system.coordinates;
+    let polar = Polar::of(&system.system.columns(n)[..n], &system.system.units(n));
+    let drawn = |pair: Pair<'_, S>| match (system.system.plane, &polar) {
+        (Some(plane), _) => {
+            let [x_label, y_label] = plane.labels.map(String::from);
+            let path = |(label, trajectory): (&str, &Trajectory<S>)| {
+                let places = (0..trajectory.len()).filter_map(|k| system.position_in_plane(trajectory.state(k).0));
+                Series { points: places.collect(), ..Series::new(label, &[], &[]) }
+            };
+            Some(Trace { x_label, y_label, paths: pair.map(path).to_vec(), equal: true, turn: None })
+        }
+        (None, Some(polar)) => {
+            let [exact, learned]: [Vec<f64>; 2] =
+                pair.map(|(_, trajectory)| trajectory.q.iter().map(|x| x.to_f64()).collect());
+            Some(polar.trace(n, &[("exact", &exact), ("learned", &learned)]))
+        }
+        (None, None) => None,
     };
     for (k, Portrait { exact, learned }) in portraits.iter().enumerate() {
         let start = k + 1;
-        let [x_label, y_label] = plane.labels.map(String::from);
-        let time = from_dark_to_bright(exact, &system.system.time_unit);
-        let heading = format!("The path of start {start}: predicted beside exact");
-        let caption = format!("Path in the plane, exact and learned, {time}.");
-        let paths = vec![path("exact", exact), path("learned", learned)];
-        let trace = Trace { title: format!("Start {start}"), x_label, y_label, paths, equal: true, turn: None };
+        let Some(trace) = drawn([("exact", exact), ("learned", learned)]) else { return };
+        let time = from_the_dot(exact, &system.system.time_unit);
+        let heading = format!("The path of start {start}: predicted over exact");
+        let caption = format!("Path in the plane, exact (wide) and learned, {time}.");
         figures.extend(figure(&format!("trace_start{start}.svg"), heading, trace_plot(&trace), caption));
     }
 }
 
-/// The first start in the planes of coordinate and velocity.
-fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &SystemInstance<S>) {
+/// A start in the planes of coordinate and velocity.
+fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: &str, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (columns, labels) = (system.system.columns(n), system.system.labels(n));
     for (i, coordinate) in system.system.coordinates(n).iter().enumerate().take(COORDINATES) {
@@ -263,7 +265,6 @@ fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Syst
         let folded = |points: &Vec<(f64, f64)>| turn.map_or_else(|| points.clone(), |turn| turn.fold(points));
         let path = |k: usize| Series { points: folded(&points[k]), ..Series::new(pair[k].0, &[], &[]) };
         let trace = Trace {
-            title: "Phase space of start 1".into(),
             x_label: labels[i].clone(),
             y_label: labels[n + i].clone(),
             paths: vec![path(0), path(1)],
@@ -271,9 +272,9 @@ fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Syst
             turn,
         };
         let (q, v) = (&columns[i], &columns[n + i]);
-        let time = from_dark_to_bright(pair[0].1, &system.system.time_unit);
-        let heading = format!("Phase space of {q}: predicted beside exact");
-        let caption = format!("Start 1 in the plane of {q} and {v}, exact and learned, {time}.");
+        let time = from_the_dot(pair[0].1, &system.system.time_unit);
+        let heading = format!("Phase space of {q}: predicted over exact");
+        let caption = format!("The plane of {q} and {v} of {start}, exact (wide) and learned, {time}.");
         figures.extend(figure(&format!("phase_{}.svg", file_part(q)), heading, trace_plot(&trace), caption));
     }
 }
@@ -376,6 +377,9 @@ mod tests {
         let motions = ["trajectory_t.svg", "trajectory_z.svg", "velocity_t.svg", "velocity_z.svg", "trace_start1.svg"];
         assert_eq!(files(&figures)[..5], motions);
         assert!(figures[2].caption.starts_with("t_dot of start 1"));
+        // Exact and learned paths share a plot.
+        assert!(figures.iter().all(|figure| figure.picture.panels() == 1));
+        assert!(figures[4].to_svg().contains(">exact</text>") && figures[4].to_svg().contains(">learned</text>"));
         assert!(figures.iter().all(|figure| !figure.heading.is_empty()));
         let states = &runs[0].exact.trajectory;
         assert_eq!((component(states, 1)[3], component(states, 2)[3]), (states.state(3).0[1], states.state(3).1[0]));

@@ -111,16 +111,14 @@ pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
 }
 
 /// Loss curves of an experiment from its finished runs; what has nothing to show is left out.
-pub fn loss_figures(title: &str, results: &[(Run, Option<Record>)]) -> Vec<Figure> {
+pub fn loss_figures(results: &[(Run, Option<Record>)]) -> Vec<Figure> {
     let of = |(part, word): (usize, &str)| {
         let plot = LinePlot {
-            title: format!("{title}: {word} loss"),
             x_label: "epoch".into(),
             y_label: "loss".into(),
             log_y: true,
             series: loss_curves(results, part),
-            turn: None,
-            level: None,
+            ..LinePlot::default()
         };
         let heading = format!("How the {word} loss falls from epoch to epoch");
         let caption = format!("Geometric mean of the {word} losses of each group of runs, paper convention.");

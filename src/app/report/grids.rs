@@ -1,18 +1,16 @@
 //! Pictures of functions on a grid: learned and exact ones, one quantity over two coordinates, angles over one turn.
 
-use super::{Figure, HeatMap, PlotError, figure, file_part, heat_maps};
-use crate::analysis::{AffineFit, Grid, Spread, affine_fit, factor_fit};
-use crate::names::rounded;
+use super::{Figure, HeatMap, figure, file_part, heat_maps};
+use crate::analysis::{Grid, Spread, affine_fit};
+use crate::names::{number, rounded};
 use std::f64::consts::{PI, TAU};
 
-/// Transformation up to which a learned quantity is determined.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How a learned quantity is brought to the exact one.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Fit {
-    /// Nothing: as it is.
-    None,
-    /// A factor (`det M`).
-    Factor,
-    /// A factor and a summand (`L`).
+    /// By a factor that is known, and what it is in words.
+    Factor(f64, String),
+    /// By the best factor and summand (`L`).
     Affine,
 }
 
@@ -37,40 +35,36 @@ pub struct GridComparison {
     pub fixed: String,
     /// Up to what the two are compared.
     pub fit: Fit,
-    /// `true` to count and mark points where the learned value has the wrong sign, before any fit.
+    /// `true` to count and mark points where the learned value has the wrong sign.
     pub signs: bool,
 }
 
-/// Exact, learned and difference side by side, the first two with one range of colours, and the fit if one was made.
+/// Exact, learned and difference side by side, the first two with one range of colours; none if a grid has no finite value or the grids
+/// differ in size.
 ///
 /// The range is that of the exact values; if learned values of the wrong sign are marked, it reaches their change of sign
 /// too.
-///
-/// # Errors
-/// [`PlotError`] if a grid has no finite value or the grids differ in size.
-pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<AffineFit>), PlotError> {
-    let quantity = &comparison.quantity;
-    let empty = || PlotError::Empty(quantity.clone());
-    let values = (&comparison.learned.values, &comparison.exact.values);
-    let fit = match comparison.fit {
-        Fit::None => None,
-        Fit::Factor => factor_fit(values.0, values.1),
-        Fit::Affine => affine_fit(values.0, values.1),
+pub fn grid_figures(comparison: &GridComparison) -> Option<Figure> {
+    let GridComparison { quantity, exact, .. } = comparison;
+    let (learned, how) = match &comparison.fit {
+        Fit::Factor(factor, words) => (comparison.learned.map(|z| factor * z), format!("learned {words}")),
+        Fit::Affine => {
+            let fit = affine_fit(&comparison.learned.values, &exact.values)?;
+            let numbers = [fit.a, fit.b.abs()].map(number);
+            let sign = if fit.b < 0.0 { '\u{2212}' } else { '+' };
+            let how = format!(
+                "learned as {} {quantity} {sign} {}, the best fit (R\u{b2} = {:.6})",
+                numbers[0], numbers[1], fit.r2
+            );
+            (comparison.learned.fitted(&fit), how)
+        }
     };
-    let learned = fit.map_or_else(|| comparison.learned.clone(), |fit| comparison.learned.fitted(&fit));
-    let difference = learned.minus(&comparison.exact).ok_or_else(empty)?;
-    let signs = if comparison.signs { comparison.learned.wrong_signs(&comparison.exact) } else { None };
-    let wrong = |sign: &Option<bool>| *sign == Some(true);
-    let marks: Vec<(f64, f64)> = signs
-        .iter()
-        .flatten()
-        .enumerate()
-        .filter(|(_, sign)| wrong(sign))
-        .map(|(k, _)| comparison.exact.point(k))
-        .collect();
-    // Where the learned value before the fit is 0.
-    let zero = if marks.is_empty() { None } else { Some(fit.map_or(0.0, |fit| fit.b)) };
-    let finite = comparison.exact.values.iter().copied().chain(zero).filter(|z| z.is_finite());
+    let difference = learned.minus(exact)?;
+    let signs = if comparison.signs { learned.wrong_signs(exact) } else { None };
+    let wrong = signs.iter().flatten().enumerate().filter(|(_, sign)| **sign == Some(true));
+    let marks: Vec<(f64, f64)> = wrong.map(|(k, _)| exact.point(k)).collect();
+    let zero = (!marks.is_empty()).then_some(0.0);
+    let finite = exact.values.iter().copied().chain(zero).filter(|z| z.is_finite());
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
     let share = signs.map(|signs| 100.0 * marks.len() as f64 / signs.iter().flatten().count().max(1) as f64);
     let of_wrong_sign = share.filter(|&share| share > 0.0);
@@ -80,29 +74,19 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
     };
     let labels = [comparison.x_label.clone(), comparison.y_label.clone()];
     let range = Some((low, high));
-    let exact = panel(format!("{quantity} exact"), &labels, &comparison.exact);
-    let picture = heat_maps(&[
-        HeatMap { range, ..exact },
+    let drawn = heat_maps(&[
+        HeatMap { range, ..panel(format!("{quantity} exact"), &labels, exact) },
         HeatMap { range, marks, ..panel(learned_title, &labels, &learned) },
         difference_panel(&labels, &difference),
-    ])?;
+    ]);
     let fixed = if comparison.fixed.is_empty() { String::new() } else { format!(" at {}", comparison.fixed) };
-    let learned = match fit {
-        Some(fit) => {
-            format!("learned after the best fit (a = {:.6e}, b = {:.6e}, R\u{b2} = {:.6})", fit.a, fit.b, fit.r2)
-        }
-        None => "learned with the same colours".to_string(),
-    };
     let signs = match (share, of_wrong_sign) {
-        (_, Some(share)) => {
-            format!(" The learned value, before any fit, has the wrong sign at {share:.2} % of the points (dots).")
-        }
-        (Some(_), None) => " The learned value, before any fit, has the right sign at every point.".to_string(),
+        (_, Some(share)) => format!(" The learned value has the wrong sign at {share:.2} % of the points (dots)."),
+        (Some(_), None) => " The learned value has the right sign at every point.".to_string(),
         (None, _) => String::new(),
     };
-    let caption = format!("{quantity}{fixed}: exact, {learned}, and the difference.{signs}");
-    let (file, heading) = (format!("{}.svg", comparison.file), comparison.heading.clone());
-    Ok((Figure { file, heading, picture, caption }, fit))
+    let caption = format!("{quantity}{fixed}: exact, {how}, and the difference.{signs}");
+    figure(&format!("{}.svg", comparison.file), comparison.heading.as_str(), drawn, caption)
 }
 
 /// A quantity over two coordinates.
@@ -126,6 +110,8 @@ pub(crate) struct QuantityMap {
     pub remark: String,
     /// Points to mark in the learned map.
     pub marks: Vec<(f64, f64)>,
+    /// `true` for every value of the learned map that is not determined; empty if all are.
+    pub open: Vec<bool>,
 }
 
 /// One panel of a picture, without marks and with the colours of its own extremes.
@@ -138,6 +124,7 @@ pub(super) fn panel(title: impl Into<String>, [x_label, y_label]: &[String; 2], 
         range: None,
         diverging: false,
         marks: Vec::new(),
+        open: Vec::new(),
     }
 }
 
@@ -160,7 +147,8 @@ pub(crate) fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
         range: Some((low, high)),
         ..panel(format!("{} {what}", map.quantity), &map.labels, grid)
     };
-    let mut panels = vec![HeatMap { marks: map.marks.clone(), ..same("learned", &map.learned) }];
+    let mut panels =
+        vec![HeatMap { marks: map.marks.clone(), open: map.open.clone(), ..same("learned", &map.learned) }];
     if let Some(exact) = &map.exact {
         if constant.is_none() {
             panels.insert(0, same("exact", exact));
@@ -265,39 +253,45 @@ mod tests {
             fit: Fit::Affine,
             signs: false,
         };
-        let (_, fit) = grid_figures(&comparison).unwrap();
-        let fit = fit.unwrap();
-        assert!((fit.a - 1.0 / 3.0).abs() < 1e-12 && (fit.b - 7.0 / 3.0).abs() < 1e-12 && fit.r2 > 1.0 - 1e-12);
+        let figure = grid_figures(&comparison).unwrap();
+        assert!(
+            figure.caption.contains("learned as 0.333 L + 2.33, the best fit (R\u{b2} = 1.000000)"),
+            "{}",
+            figure.caption
+        );
         comparison.learned = grid(&OSCILLATOR);
-        let (figure, _) = grid_figures(&comparison).unwrap();
-        save_pictures(&[figure]);
+        save_pictures(&[grid_figures(&comparison).unwrap()]);
         let det = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], axes, |_, _| {}).unwrap();
         comparison = GridComparison {
             quantity: "det M".into(),
             file: "det_m".into(),
             fixed: "g = 1".into(),
-            learned: det.clone(),
+            learned: det.map(|z| -0.5 * z),
             exact: det,
-            fit: Fit::None,
+            fit: Fit::Factor(-2.0, "times \u{2212}2".into()),
             signs: true,
             ..comparison
         };
-        let (figure, fit) = grid_figures(&comparison).unwrap();
-        assert!(fit.is_none());
-        assert!(figure.caption.starts_with("det M at g = 1: exact") && figure.caption.contains("right sign at every"));
-        // A quarter of the columns turns its sign, whatever the fit does to the values.
+        // The factor is that of the Lagrangian: the sign of all values together is free.
+        let figure = grid_figures(&comparison).unwrap();
+        assert!(
+            figure.caption.starts_with("det M at g = 1: exact, learned times \u{2212}2, and"),
+            "{}",
+            figure.caption
+        );
+        assert!(figure.caption.contains("right sign at every"));
+        // A quarter of the columns turns its sign.
         let columns = comparison.exact.x.len();
         for (k, z) in comparison.learned.values.iter_mut().enumerate() {
             if k % columns < 15 {
                 *z = -*z;
             }
         }
-        for fit in [Fit::Affine, Fit::Factor, Fit::None] {
-            comparison.fit = fit;
-            let (figure, _) = grid_figures(&comparison).unwrap();
-            assert!(figure.caption.contains("wrong sign at 24.59 %"), "{}", figure.caption);
-            save_pictures(&[figure]);
-        }
+        let figure = grid_figures(&comparison).unwrap();
+        assert!(figure.caption.contains("wrong sign at 24.59 %"), "{}", figure.caption);
+        save_pictures(&[figure]);
+        comparison.learned.x.pop();
+        assert!(grid_figures(&comparison).is_none());
     }
 
     #[test]
@@ -315,6 +309,7 @@ mod tests {
             fixed: "r = 4".into(),
             remark: String::new(),
             marks: Vec::new(),
+            open: Vec::new(),
         };
         let panels = |exact| {
             let figure = quantity_figure(&map(exact)).unwrap();

@@ -243,13 +243,10 @@ mod tests {
     fn everything_is_escaped_and_nothing_external() {
         let evil = "<script>alert('1' & \"2\")</script>\u{0}";
         let plot = LinePlot {
-            title: evil.into(),
             x_label: evil.into(),
             y_label: evil.into(),
-            log_y: false,
             series: vec![Series::new(evil, &[0.0, 1.0], &[0.0, 1.0])],
-            turn: None,
-            level: None,
+            ..LinePlot::default()
         };
         let (file, picture) = (String::new(), line_plot(&plot).unwrap());
         let figure = Figure { file, heading: evil.into(), picture, caption: evil.into() };
@@ -265,8 +262,8 @@ mod tests {
             .to_html();
         assert!(!html.contains("<script") && !html.contains("http") && !html.contains('\u{0}'));
         // Title, header of the page, heading, paragraph, link and its text, preformatted, two cells; sentence and two cells; three of the image; the
-        // figure: heading, description, caption, title, two labels.
-        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 21);
+        // figure: heading, description, caption, two labels.
+        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 20);
         assert!(html.contains("data:image/svg+xml;base64,AQID\""));
         assert!(html.contains("<td class=\"number\">1.5e-3</td>"));
         assert!(html.contains("prefers-color-scheme:dark"));

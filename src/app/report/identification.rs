@@ -1,6 +1,6 @@
 //! Pictures of an identification and of a formula: what was measured and fitted, the residuals, their autocorrelation.
 
-use super::{Figure, HeatMap, Level, LinePlot, Series, figure, file_part, heat_maps, line_plot};
+use super::{Figure, HeatMap, Level, LinePlot, Series, figure, file_part, heat_maps, line_plot, median_of, with_unit};
 use crate::analysis::Grid;
 use crate::formula::FoundFormula;
 use crate::identification::{Identified, ResidualPath};
@@ -72,7 +72,7 @@ impl Fit<'_> {
             figure(
                 &file("fitted"),
                 format!("Measured and fitted {what}"),
-                line_plot(&self.fitted(i, unit)),
+                line_plot(&self.fitted(i, &with_unit(&what, unit))),
                 "The stretch whose residual is the median of all stretches.",
             ),
             figure(
@@ -91,17 +91,16 @@ impl Fit<'_> {
         ]
     }
 
-    fn fitted(&self, i: usize, unit: &str) -> LinePlot {
+    fn fitted(&self, i: usize, label: &str) -> LinePlot {
         let n = self.names.len();
-        let mut order: Vec<&ResidualPath> = self.paths.iter().collect();
-        order.sort_by(|a, b| mean_square(a).total_cmp(&mean_square(b)));
-        let path = order.get(order.len() / 2).map_or_else(ResidualPath::default, |path| (*path).clone());
+        let errors: Vec<f64> = self.paths.iter().map(mean_square).collect();
+        let path = median_of(&errors).map_or_else(ResidualPath::default, |k| self.paths[k].clone());
         let measured: Vec<f64> = column(&path.measured, n, i).collect();
         let fitted: Vec<f64> = measured.iter().zip(column(&path.residuals, n, i)).map(|(y, r)| y - r).collect();
         let lines = [("measured", &measured), ("fitted", &fitted)];
         let lines = lines.map(|(name, values)| Series::new(name, &path.times, values));
         let [measured, fitted] = lines;
-        plot(["", "t [s]", &format!("value [{unit}]")], vec![measured, fitted.over()])
+        plot(["t [s]", label], vec![measured, fitted.over()])
     }
 
     fn residuals(&self, i: usize, unit: &str) -> LinePlot {
@@ -116,7 +115,7 @@ impl Fit<'_> {
         }
         let level = Some(Level { value: 0.0, name: String::new() });
         let series = vec![Series { name: String::new(), points, over: false }];
-        LinePlot { level, ..plot(["", "t [s]", &format!("residual [{unit}]")], series) }
+        LinePlot { level, ..plot(["t [s]", &format!("residual [{unit}]")], series) }
     }
 
     fn lags(&self, i: usize, what: &str) -> LinePlot {
@@ -141,7 +140,7 @@ impl Fit<'_> {
         let bounds = Series { name: "95 % of white noise".to_string(), points, over: false };
         let level = Some(Level { value: 0.0, name: String::new() });
         let series = vec![own, bounds];
-        LinePlot { level, ..plot(["", "lag [samples]", "autocorrelation"], series) }
+        LinePlot { level, ..plot(["lag [samples]", "autocorrelation"], series) }
     }
 }
 
@@ -164,6 +163,7 @@ fn correlations(found: &Identified) -> Option<Figure> {
         range: Some((-1.0, 1.0)),
         diverging: true,
         marks: Vec::new(),
+        open: Vec::new(),
     };
     let names: Vec<String> = names.iter().enumerate().map(|(k, name)| format!("{}: {name}", k + 1)).collect();
     figure("correlations.svg", "Correlations of the constants", heat_maps(&[map]), names.join(", "))
@@ -179,7 +179,6 @@ fn mean_square(path: &ResidualPath) -> f64 {
     path.residuals.iter().filter(|r| r.is_finite()).map(|r| r * r).sum::<f64>() / path.times.len().max(1) as f64
 }
 
-fn plot([title, x_label, y_label]: [&str; 3], series: Vec<Series>) -> LinePlot {
-    let (title, x_label, y_label) = (title.into(), x_label.into(), y_label.into());
-    LinePlot { title, x_label, y_label, log_y: false, turn: None, level: None, series }
+fn plot([x_label, y_label]: [&str; 2], series: Vec<Series>) -> LinePlot {
+    LinePlot { x_label: x_label.into(), y_label: y_label.into(), series, ..LinePlot::default() }
 }

@@ -7,11 +7,12 @@ mod grids;
 mod html;
 mod identification;
 mod page;
+mod plane;
 mod plot;
 mod table;
 
 pub(crate) use constraints::found_constraint_figures;
-pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units, with_unit};
+pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};
 pub use experiment::groups;
 pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
 pub use grids::{Fit, GridComparison, grid_figures};
@@ -19,6 +20,7 @@ pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
 pub(crate) use identification::{formula_figures, identification_figures};
 pub use page::{PageError, page};
+pub(crate) use plane::Polar;
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,
@@ -38,15 +40,46 @@ pub struct Figure {
     pub caption: String,
 }
 
-/// A figure of what was drawn, under a heading; none where there was nothing to show.
+impl Figure {
+    /// The picture as a file, under its heading.
+    pub fn to_svg(&self) -> String {
+        self.picture.to_svg(&self.heading)
+    }
+}
+
+/// A figure of what was drawn, under a heading; none where there was nothing to show, or zeros alone.
 pub fn figure(
     file: &str,
     heading: impl Into<String>,
     drawn: Result<Picture, PlotError>,
     caption: impl Into<String>,
 ) -> Option<Figure> {
-    let picture = drawn.ok()?;
+    let picture = drawn.ok().filter(|picture| !picture.is_blank())?;
     Some(Figure { file: file.to_string(), heading: heading.into(), picture, caption: caption.into() })
+}
+
+/// A quantity with its unit, if it has one.
+pub(crate) fn with_unit(quantity: &str, unit: &str) -> String {
+    if ["", "1"].contains(&unit) { quantity.to_string() } else { format!("{quantity} [{unit}]") }
+}
+
+/// Units, each with the places that have it, in their order.
+pub(crate) fn by_unit(units: &[String]) -> Vec<(String, Vec<usize>)> {
+    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+    for (i, unit) in units.iter().enumerate() {
+        match groups.iter_mut().find(|(known, _)| known == unit) {
+            Some((_, members)) => members.push(i),
+            None => groups.push((unit.clone(), vec![i])),
+        }
+    }
+    groups
+}
+
+/// The place of the median of errors; one that is no number is the largest. None without errors.
+pub(crate) fn median_of(errors: &[f64]) -> Option<usize> {
+    let mut order: Vec<usize> = (0..errors.len()).collect();
+    order.sort_by(|&a, &b| errors[a].total_cmp(&errors[b]));
+    order.get(errors.len().saturating_sub(1) / 2).copied()
 }
 
 /// A name as part of a file name.
@@ -59,7 +92,19 @@ pub(crate) fn file_part(name: &str) -> String {
 pub(crate) fn save_pictures(figures: &[Figure]) {
     if let Ok(directory) = std::env::var("LNN_TEST_PICTURES") {
         for figure in figures {
-            std::fs::write(std::path::Path::new(&directory).join(&figure.file), figure.picture.to_svg()).unwrap();
+            std::fs::write(std::path::Path::new(&directory).join(&figure.file), figure.to_svg()).unwrap();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_in_the_middle_of_what_is_a_number() {
+        assert_eq!(median_of(&[3.0, 1.0, 2.0]), Some(2));
+        assert_eq!(median_of(&[f64::NAN, 5.0, f64::INFINITY, 1.0]), Some(1));
+        assert_eq!((median_of(&[7.0]), median_of(&[])), (Some(0), None));
     }
 }

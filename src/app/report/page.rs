@@ -2,6 +2,7 @@
 //! evaluates them.
 
 use super::html::{base64, escape};
+use crate::analysis::{mass_matrix_error, mass_matrix_error_within};
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{
     Constraints, EulerLagrange, ExpressionConstraints, Lagrangian, LagrangianVisitor, SystemError, SystemInstance,
@@ -23,8 +24,9 @@ const PLAY: &str = include_str!("page/play.js");
 const MOST_BYTES: usize = 500_000;
 /// Seconds in which a system without seconds crosses what the model knows of it.
 const SECONDS: f64 = 20.0;
-/// States from which a start on the constraints is looked for.
+/// States from which a start on the constraints is looked for, and at which mass matrices are compared.
 const STARTS: usize = 24;
+const COMPARED: usize = 200;
 
 /// Why a model has no page.
 #[derive(Debug, Error)]
@@ -73,9 +75,10 @@ pub fn page(
     };
     let single: Vec<u8> = weights.iter().flat_map(|weight| (*weight as f32).to_le_bytes()).collect();
     let exact = system.map(exact).transpose()?.flatten();
+    let angle = |unit: &'static str| architecture.periodic.iter().map(move |angle| if *angle { unit } else { "" });
     let units = system.map_or_else(
-        || vec![String::new(); n],
-        |system| system.system.coordinates(n).into_iter().map(|c| c.unit.into_owned()).collect(),
+        || angle("rad").chain(angle("rad/s")).map(String::from).collect(),
+        |system| system.system.units(n),
     );
     let time_unit = system.map_or("s", |system| &system.system.time_unit);
     let start = start(header, system, motion.as_ref());
@@ -96,7 +99,7 @@ pub fn page(
         "ranges": { "position": header.position, "velocity": header.velocity },
         "learned": {
             "lagrangian": operations(&lagrangian), "dissipation": dissipation, "weights": base64(&single),
-            "held": held,
+            "held": held, "factors": system.map(|system| factors(header, (network, motion.as_ref()), system)).transpose()?,
         },
         "constraints": header.held_by(),
         "exact": exact,
@@ -159,21 +162,49 @@ fn rows(
     .collect()
 }
 
+/// Pairs of bounds.
+fn pairs(ranges: &[[f64; 2]]) -> Vec<(f64, f64)> {
+    ranges.iter().map(|&[low, high]| (low, high)).collect()
+}
+
+/// A place between sides: shares of them, other ones for every try and, beyond the first, for every coordinate.
+fn inside(sides: &[(f64, f64)], share: f64, k: usize) -> Vec<f64> {
+    let share = |i: usize| (share + (k * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract();
+    sides.iter().enumerate().map(|(i, (low, high))| low + share(i) * (high - low)).collect()
+}
+
+/// Factors of the coordinates by which the mass matrix of a network, and of its motion under constraints, is nearest to the exact one over
+/// what the model knows; none where the two cannot be compared.
+fn factors(
+    header: &Header,
+    (network, motion): (&NetworkLagrangian<f64>, &dyn EulerLagrange<f64>),
+    system: &SystemInstance<f64>,
+) -> Result<Option<Vec<f64>>, PageError> {
+    let exact = system.build()?;
+    let (positions, velocities) = (pairs(&header.position), pairs(&header.velocity));
+    let states = (1..=COMPARED).filter_map(|k| {
+        let (mut q, mut v) = (inside(&positions, 0.3, k), inside(&velocities, 0.75, k));
+        motion.manifold().map_or(Ok(()), |manifold| project(manifold, &mut q, &mut v).map(drop)).ok()?;
+        system.check_domain(&q).is_ok().then_some((q, v))
+    });
+    let (q, v): (Vec<Vec<f64>>, Vec<Vec<f64>>) = states.unzip();
+    let (q, v) = (q.concat(), v.concat());
+    let found = match motion.manifold() {
+        None => mass_matrix_error(exact.as_ref(), network, &q),
+        Some(manifold) => mass_matrix_error_within(manifold, (exact.as_ref(), network), (&q, &v)),
+    };
+    Ok(Some(found.factors).filter(|factors| factors.iter().all(|factor| factor.is_finite())))
+}
+
 /// A moving start within what the model knows, of a system among those of its trajectory test, on its mass shell and its constraints.
 fn start(
     header: &Header,
     system: Option<&SystemInstance<f64>>,
     motion: &dyn EulerLagrange<f64>,
 ) -> (Vec<f64>, Vec<f64>) {
-    let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
     let Bounds { positions, velocities } = match system {
         Some(system) => system.system.trajectory(system.coordinates).start,
         None => Bounds { positions: pairs(&header.position), velocities: pairs(&header.velocity) },
-    };
-    // Shares of the sides, other ones for every try and, beyond the first, for every coordinate.
-    let inside = |sides: &[(f64, f64)], share: f64, k: usize| -> Vec<f64> {
-        let share = |i: usize| (share + (k * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract();
-        sides.iter().enumerate().map(|(i, (low, high))| low + share(i) * (high - low)).collect()
     };
     let (q, mut v) = (inside(&positions, 0.3, 0), inside(&velocities, 0.75, 0));
     if let Some(system) = system {

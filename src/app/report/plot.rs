@@ -16,6 +16,7 @@ pub use png::png;
 use super::grids::Turn;
 use crate::analysis::Grid;
 use crate::report::html::escape;
+use axes::TITLE_HEIGHT;
 use std::fmt::Write as _;
 use svg::{Panel, short};
 
@@ -65,10 +66,8 @@ pub struct Level {
 }
 
 /// Lines over a common axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinePlot {
-    /// Title.
-    pub title: String,
     /// Label of the horizontal axis, with unit.
     pub x_label: String,
     /// Label of the vertical axis, with unit.
@@ -79,21 +78,21 @@ pub struct LinePlot {
     pub turn: Option<Turn>,
     /// A value to be marked.
     pub level: Option<Level>,
+    /// `true` if to draw the lines grey: what they show is not determined.
+    pub open: bool,
     /// Lines.
     pub series: Vec<Series>,
 }
 
-/// A path in a plane, coloured by time.
-#[derive(Clone, Debug, PartialEq)]
+/// Paths in a plane.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// Title.
-    pub title: String,
     /// Label of the horizontal axis, with unit.
     pub x_label: String,
     /// Label of the vertical axis, with unit.
     pub y_label: String,
-    /// Paths with a name each, drawn side by side with the same axes; points at equal places in the lists have equal
-    /// colours. The first is shown whole, the others as far as they keep within its extent of it.
+    /// Paths with a name each. One alone is coloured by time. The first of several is wide, the others are thin over it, and shown as far as
+    /// they keep within its extent of it.
     pub paths: Vec<Series>,
     /// `true` if both axes have one scale (a plane of space).
     pub equal: bool,
@@ -104,7 +103,7 @@ pub struct Trace {
 /// A grid as colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// Title.
+    /// What the colours mean.
     pub title: String,
     /// Label of the horizontal axis, with unit.
     pub x_label: String,
@@ -118,6 +117,8 @@ pub struct HeatMap {
     pub diverging: bool,
     /// Points to mark by a dot.
     pub marks: Vec<(f64, f64)>,
+    /// `true` for every value that is not determined, which is greyed out; empty if all are.
+    pub open: Vec<bool>,
 }
 
 fn fine(x: f64) -> bool {
@@ -170,6 +171,7 @@ const GAP: f64 = 8.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     panels: Vec<Panel>,
+    blank: bool,
 }
 
 impl Picture {
@@ -178,15 +180,38 @@ impl Picture {
         self.panels.len()
     }
 
-    /// An SVG file.
-    pub fn to_svg(&self) -> String {
-        let height = self.panels.iter().map(|panel| panel.height).fold(0.0, f64::max);
+    /// `true` if it shows nothing but zeros, or a path that stays where it is.
+    pub fn is_blank(&self) -> bool {
+        self.blank
+    }
+
+    /// The panels of several pictures.
+    pub fn beside(pictures: impl IntoIterator<Item = Self>) -> Self {
+        let start = Self { panels: Vec::new(), blank: true };
+        pictures.into_iter().fold(start, |all, next| Self {
+            panels: [all.panels, next.panels].concat(),
+            blank: all.blank && next.blank,
+        })
+    }
+
+    /// An SVG file with a title, which may be empty.
+    pub fn to_svg(&self, title: &str) -> String {
+        let top = if title.is_empty() { 0.0 } else { TITLE_HEIGHT };
+        let height = top + self.panels.iter().map(|panel| panel.height).fold(0.0, f64::max);
         let (mut body, mut x) = (String::new(), 0.0);
         for panel in &self.panels {
-            let (width, height) = (short(panel.width), short(panel.height));
-            let _ =
-                writeln!(body, "<svg x=\"{}\" width=\"{width}\" height=\"{height}\">{}</svg>", short(x), panel.body());
+            let (place, width, height) = (short(x), short(panel.width), short(panel.height));
+            let _ = writeln!(
+                body,
+                "<svg x=\"{place}\" y=\"{top}\" width=\"{width}\" height=\"{height}\">{}</svg>",
+                panel.body()
+            );
             x += panel.width + GAP;
+        }
+        if !title.is_empty() {
+            let mut line = Panel::new(x - GAP, top);
+            line.title(8.0, title);
+            body += &line.body();
         }
         let (width, height) = (short((x - GAP).max(0.0)), short(height));
         format!(
@@ -216,13 +241,13 @@ mod tests {
 
     fn plot(points: &[(f64, f64)], log_y: bool) -> Result<Picture, PlotError> {
         let series = vec![Series { name: "a".into(), points: points.to_vec(), over: false }];
-        let [title, x_label, y_label] = ["T", "t [s]", "y [m]"].map(String::from);
-        line_plot(&LinePlot { title, x_label, y_label, log_y, series, turn: None, level: None })
+        let [x_label, y_label] = ["t [s]", "y [m]"].map(String::from);
+        line_plot(&LinePlot { x_label, y_label, log_y, series, ..LinePlot::default() })
     }
 
     /// `true` if it is drawn and all its numbers are finite.
     fn is_sound(picture: &Picture) -> bool {
-        let svg = picture.to_svg();
+        let svg = picture.to_svg("T");
         svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf")
     }
 
@@ -231,7 +256,7 @@ mod tests {
         let (nan, inf) = (f64::NAN, f64::INFINITY);
         for log in [false, true] {
             for empty in [&[][..], &[(0.0, nan)], &[(nan, 1.0)], &[(0.0, inf), (1.0, -inf)]] {
-                assert_eq!(plot(empty, log), Err(PlotError::Empty("T".into())));
+                assert_eq!(plot(empty, log), Err(PlotError::Empty("y [m]".into())));
             }
             for good in [
                 &[(0.0, 1.0)][..],
@@ -249,10 +274,26 @@ mod tests {
 
     #[test]
     fn labels_are_drawn_once() {
-        let svg = plot(&[(0.0, 1.0), (1.0, 2.0)], false).unwrap().to_svg();
+        let svg = plot(&[(0.0, 1.0), (1.0, 2.0)], false).unwrap().to_svg("T");
         for label in ["T", "t [s]", "y [m]"] {
             assert_eq!(svg.matches(&format!(">{label}</text>")).count(), 1, "{label}");
         }
+    }
+
+    #[test]
+    fn zeros_and_paths_that_stay_are_blank() {
+        assert!(plot(&[(0.0, 0.0), (1.0, 0.0), (2.0, f64::NAN)], false).unwrap().is_blank());
+        assert!(!plot(&[(0.0, 0.0), (1.0, 1e-9)], false).unwrap().is_blank());
+        assert!(!plot(&[(0.0, 2.0), (1.0, 2.0)], false).unwrap().is_blank());
+        let path = |points: &[(f64, f64)]| {
+            let paths = vec![Series { name: String::new(), points: points.to_vec(), over: false }];
+            trace_plot(&Trace { paths, ..Trace::default() }).unwrap().is_blank()
+        };
+        assert!(path(&[(1.0, 0.0), (1.0, 0.0)]) && !path(&[(1.0, 0.0), (1.0, 0.5)]));
+        let [blank, seen] = [0.0, 1.0].map(|y| plot(&[(0.0, y)], false).unwrap());
+        let both = Picture::beside([blank.clone(), seen]);
+        assert!(both.panels() == 2 && !both.is_blank() && Picture::beside([blank]).is_blank());
+        assert!(crate::report::figure("a.svg", "A", plot(&[(0.0, 0.0)], false), "").is_none());
     }
 
     #[test]
@@ -265,12 +306,18 @@ mod tests {
             range: None,
             diverging: false,
             marks: vec![(0.0, 1.0)],
+            open: Vec::new(),
         };
         for values in [vec![1.0; 4], vec![f64::NAN, 1.0, 2.0, f64::INFINITY], vec![0.0; 4]] {
+            let blank = values.iter().all(|z| *z == 0.0);
             let both = [map(values.clone()), HeatMap { diverging: true, ..map(values) }];
             let picture = heat_maps(&both).unwrap();
-            assert!(is_sound(&picture) && picture.panels() == 2);
+            assert!(is_sound(&picture) && picture.panels() == 2 && picture.is_blank() == blank);
         }
+        let values = vec![1.0, 2.0, 3.0, 4.0];
+        let greyed = HeatMap { open: vec![false, true, false, true], ..map(values.clone()) };
+        assert!(is_sound(&heat_maps(std::slice::from_ref(&greyed)).unwrap()));
+        assert_ne!(heat_maps(&[greyed]).unwrap(), heat_maps(&[map(values)]).unwrap());
         assert!(heat_maps(&[map(vec![f64::NAN; 4])]).is_err());
         assert!(heat_maps(&[map(vec![1.0; 3])]).is_err());
         assert!(heat_maps(&[]).is_err());
@@ -280,21 +327,20 @@ mod tests {
     fn traces() {
         let circle: Vec<_> = (0..500).map(|k| ((0.05 * f64::from(k)).cos(), (0.05 * f64::from(k)).sin())).collect();
         let path = |points| Series { name: "p".into(), points, over: false };
-        let labels = ["T", "x", "y"].map(String::from);
         let trace = |paths| {
-            let [title, x_label, y_label] = labels.clone();
-            trace_plot(&Trace { title, x_label, y_label, paths, equal: true, turn: None })
+            let [x_label, y_label] = ["x", "y"].map(String::from);
+            trace_plot(&Trace { x_label, y_label, paths, equal: true, turn: None })
         };
         assert!(is_sound(&trace(vec![path(circle), path(vec![])]).unwrap()));
         assert!(is_sound(&trace(vec![path(vec![(0.0, 0.0)])]).unwrap()));
         assert!(trace(vec![]).is_err());
-        // A path that runs away does not shrink the first one; one that never comes near leaves its panel out.
+        // A path that runs away does not shrink the first one.
         let line = |from: f64, to: f64| path(vec![(0.0, from), (1.0, to)]);
         let of = |paths: &[Series]| window(paths, |p| p.1).unwrap();
         assert_eq!(of(&[line(0.0, 2.0), line(1.0, 1e100)]), (0.0, 4.0));
         assert_eq!(of(&[line(0.0, 2.0), line(-1.0, 1.0)]), (-1.0, 2.0));
         assert_eq!(of(&[path(vec![]), line(-1.0, 7.0)]), (-1.0, 7.0));
-        assert_eq!(trace(vec![line(0.0, 2.0), line(1e9, 1e10)]).unwrap().panels(), 1);
+        assert_eq!(trace(vec![line(0.0, 2.0), line(0.0, 2.1)]).unwrap().panels(), 1);
     }
 
     #[test]
@@ -303,7 +349,7 @@ mod tests {
         let wave = |turns: f64| -> Vec<(f64, f64)> {
             (0..100_000).map(|k| (f64::from(k), (turns * f64::from(k) / 1e5 * std::f64::consts::TAU).sin())).collect()
         };
-        let size = |points: &[(f64, f64)]| plot(points, false).unwrap().to_svg().len();
+        let size = |points: &[(f64, f64)]| plot(points, false).unwrap().to_svg("").len();
         assert!(size(&wave(3.0)) < 10_000, "{}", size(&wave(3.0)));
         assert!(size(&wave(40_000.0)) < 60_000, "{}", size(&wave(40_000.0)));
     }

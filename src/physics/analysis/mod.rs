@@ -59,7 +59,7 @@ pub(crate) use statistics::training_instability;
 #[doc(hidden)]
 pub use statistics::{ErrorDistribution, Statistics, statistics, stretches};
 pub(crate) use terms::wrong_signatures;
-pub(crate) use terms::{AffineFit, affine_fit, factor_fit, matrices_at_rest, nearest_factor};
+pub(crate) use terms::{AffineFit, affine_fit, element_factor, matrices_at_rest, nearest_factor};
 pub use terms::{MassMatrixError, mass_matrix_error};
 #[doc(hidden)]
 pub use terms::{acceleration_errors, mass_matrix_error_within};

@@ -47,15 +47,23 @@ pub fn acceleration_errors<S: Scalar>(
 /// A Lagrangian is free up to a factor. Where coordinates do not act on each other by the exact equations, each group of those that do has a
 /// factor of its own: the elements between the groups `a` and `b` are taken times `sqrt |s_a s_b|`. That of a geodesic is free up to any function, `L -> f(L)`: `M` becomes
 /// `f' g + f'' (g v)(g v)^T`, and only at rest the metric `g` is left, up to the one factor `f'(0)`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MassMatrixError {
     /// The factor `s` of the smallest mean square, that of the first group.
     pub factor: f64,
     /// Number of groups of coordinates that do not act on each other.
     pub groups: usize,
+    /// The factor of every coordinate, that of its group.
+    #[serde(skip)]
+    pub factors: Vec<f64>,
     /// The relative errors.
     #[serde(flatten)]
     pub error: ErrorDistribution,
+}
+
+/// Factor of the element of a mass matrix between two coordinates that have a factor each.
+pub(crate) fn element_factor(a: f64, b: f64) -> f64 {
+    a.signum() * (a * b).abs().sqrt()
 }
 
 /// Mass matrices at rest at the positions `q`, `(states, n)`: `(states, n, n)`.
@@ -95,19 +103,18 @@ pub fn mass_matrix_error<S: Scalar>(
     let v: Vec<S> = (0..q.len()).map(|k| S::of_f64(0.3 * (1.0 + 2.4 * k as f64).cos())).collect();
     let groups = groups(exact, (q, &v));
     if groups.len() < 2 {
-        return compare(n * n, &of_exact, &of_learned);
+        return compare(n, n * n, &of_exact, &of_learned);
     }
     let factors = group_factors(n, &groups, &of_learned, &of_exact);
     let mut of_coordinate = vec![1.0; n];
     groups.iter().zip(&factors).for_each(|(group, s)| group.iter().for_each(|&i| of_coordinate[i] = *s));
     for matrix in of_learned.chunks_exact_mut(n * n) {
         for (at, m) in matrix.iter_mut().enumerate() {
-            let (row, column) = (of_coordinate[at / n], of_coordinate[at % n]);
-            *m *= row.signum() * (row * column).abs().sqrt();
+            *m *= element_factor(of_coordinate[at / n], of_coordinate[at % n]);
         }
     }
     let found = compare_scaled(n * n, &of_exact, &of_learned, 1.0);
-    MassMatrixError { factor: factors[0], groups: groups.len(), ..found }
+    MassMatrixError { factor: factors[0], groups: groups.len(), factors: of_coordinate, ..found }
 }
 
 /// Compares the matrices within the directions that the constraints leave, at states `q`, `v`, `(states, n)`.
@@ -138,12 +145,13 @@ pub fn mass_matrix_error_within(
             matrices.extend(found.unwrap_or_else(|| vec![f64::NAN; size]));
         }
     }
-    compare(size.max(1), &within[0], &within[1])
+    compare(n, size.max(1), &within[0], &within[1])
 }
 
-/// Compares matrices of `size` numbers.
-fn compare(size: usize, exact: &[f64], learned: &[f64]) -> MassMatrixError {
-    compare_scaled(size, exact, learned, nearest_factor(size, exact, learned))
+/// Compares matrices of `size` numbers for `n` coordinates, which have one factor.
+fn compare(n: usize, size: usize, exact: &[f64], learned: &[f64]) -> MassMatrixError {
+    let factor = nearest_factor(size, exact, learned);
+    MassMatrixError { factors: vec![factor; n], ..compare_scaled(size, exact, learned, factor) }
 }
 
 /// The same with a given factor.
@@ -155,7 +163,7 @@ fn compare_scaled(size: usize, exact: &[f64], learned: &[f64], factor: f64) -> M
     };
     let errors: Vec<f64> = pairs(size, exact, learned).map(error).collect();
     let failed = states - errors.len();
-    MassMatrixError { factor, groups: 1, error: ErrorDistribution::of(errors, failed) }
+    MassMatrixError { factor, groups: 1, factors: Vec::new(), error: ErrorDistribution::of(errors, failed) }
 }
 
 /// Fraction of the states `q`, `v`, both `(states, n)`, whose learned mass matrix has not the inertia (numbers of
@@ -229,24 +237,13 @@ impl AffineFit {
 /// common offset costs no digits. The remaining freedom of a Lagrangian, a total derivative `dF(q)/dt`, is odd in the
 /// velocity for the usual systems: compare on grids at rest or over coordinates to be free of it.
 pub fn affine_fit(source: &[f64], target: &[f64]) -> Option<AffineFit> {
-    fit(source, target, true)
-}
-
-/// As [`affine_fit`] with `b = 0`: `det M` of a learned Lagrangian is known up to a factor alone. `r2` is then the share
-/// of the mean square of the target.
-pub fn factor_fit(source: &[f64], target: &[f64]) -> Option<AffineFit> {
-    fit(source, target, false)
-}
-
-fn fit(source: &[f64], target: &[f64], summand: bool) -> Option<AffineFit> {
     let pairs = || source.iter().zip(target).map(|(&x, &y)| (x, y)).filter(|(x, y)| x.is_finite() && y.is_finite());
     let count = pairs().count();
     if count < 2 {
         return None;
     }
     let per = 1.0 / count as f64;
-    let means = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x * per, b + y * per));
-    let (mean_x, mean_y) = if summand { means } else { (0.0, 0.0) };
+    let (mean_x, mean_y) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x * per, b + y * per));
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for (x, y) in pairs() {
         let (x, y) = (x - mean_x, y - mean_y);
@@ -317,6 +314,7 @@ mod tests {
         // A difference that vanishes at rest does not count.
         let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);
         assert_eq!((same.factor, same.error.max, same.error.count, same.error.failed), (-0.25, 0.0, 3, 0));
+        assert_eq!(same.factors, [-0.25; 2]);
         let other = mass_matrix_error(&exact, &model(1.0, 0.0, 0.0), &q);
         // M_exact = diag(1 + q/2, 1) against s times the unit matrix.
         let squares = [2.0, 1.5f64.powi(2) + 1.0, 2.5f64.powi(2) + 1.0];
@@ -350,6 +348,8 @@ mod tests {
         let q = [1.0, 0.3, -0.4, 0.8, 0.2, -1.1, 0.7, 0.5];
         let found = mass_matrix_error(&model(1.0, 1.0, 0.0), &model(2.0, -1e-7, 0.0), &q);
         assert!((found.factor - 0.5).abs() < 1e-12 && found.groups == 2 && found.error.max < 1e-12, "{found:?}");
+        assert!((found.factors[1] / -1e7 - 1.0).abs() < 1e-12 && found.factors.len() == 2, "{found:?}");
+        assert_eq!((element_factor(4.0, 9.0), element_factor(-2.0, -2.0)), (6.0, -2.0));
         let joined = mass_matrix_error(&model(1.0, 1.0, 0.1), &model(2.0, 0.2, 0.1), &q);
         assert!(joined.groups == 1 && joined.error.median > 0.3, "{joined:?}");
     }
@@ -403,14 +403,5 @@ mod tests {
         assert_eq!((fit.a, fit.b), (0.0, 2.0));
         assert_eq!(affine_fit(&[0.0, 1.0], &[5.0, 5.0]).unwrap().r2, 1.0);
         assert!(affine_fit(&[1.0], &[1.0]).is_none());
-    }
-
-    #[test]
-    fn a_factor_alone_has_no_summand() {
-        // A constant target gives no information about a slope, but a factor it has.
-        let fit = factor_fit(&[2.0, 2.0, 4.0], &[-1.0, -1.0, -2.0]).unwrap();
-        assert_eq!((fit.a, fit.b, fit.r2, fit.rms), (-0.5, 0.0, 1.0, 0.0));
-        let fit = factor_fit(&[1.0, 3.0], &[2.0, 2.0]).unwrap();
-        assert!((fit.a - 0.8).abs() < 1e-15 && fit.b == 0.0 && (fit.r2 - 0.8).abs() < 1e-14);
     }
 }

@@ -53,13 +53,11 @@ pub fn figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curve
                     "Lowest validation loss of each run against {abscissa}; runs without {abscissa} as a level line."
                 ),
                 LinePlot {
-                    title: format!("{}: lowest loss", experiment.title),
                     x_label: format!("log10 {abscissa}"),
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: scan(results),
-                    turn: None,
-                    level: None,
+                    ..LinePlot::default()
                 },
             ),
             Picture::Gain { abscissa } => add(
@@ -69,13 +67,12 @@ pub fn figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curve
                     "Lowest validation loss without the penalty over that with it, medians over seeds, against {abscissa}, 1 in the paper."
                 ),
                 LinePlot {
-                    title: "Loss without the penalty over loss with it".into(),
                     x_label: format!("log2 of {abscissa} over the paper's"),
                     y_label: "ratio of the lowest losses".into(),
                     log_y: true,
                     series: gain(results),
-                    turn: None,
                     level: Some(Level { value: 1.0, name: "penalty without effect".into() }),
+                    ..LinePlot::default()
                 },
             ),
             Picture::TradeOff => add(
@@ -83,13 +80,11 @@ pub fn figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curve
                 "Accuracy against stability of the training",
                 "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
                 LinePlot {
-                    title: format!("{}: loss against instability", experiment.title),
                     x_label: "log10 instability".into(),
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: trade_off(results),
-                    turn: None,
-                    level: None,
+                    ..LinePlot::default()
                 },
             ),
             Picture::Clock => add(
@@ -97,13 +92,11 @@ pub fn figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curve
                 "Which accuracy is reached after which time",
                 "Lowest validation loss so far against seconds of training, paper convention.".into(),
                 LinePlot {
-                    title: experiment.title.into(),
                     x_label: "log10 of the time of training [s]".into(),
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: reached(curves),
-                    turn: None,
-                    level: None,
+                    ..LinePlot::default()
                 },
             ),
             Picture::Evaluation(_) | Picture::BlackHole => {}

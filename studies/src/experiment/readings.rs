@@ -122,7 +122,7 @@ pub fn read_hole(
         Ok((readings, orbits, sky))
     })?;
     output.write(READINGS, (serde_json::to_string_pretty(&readings).map_err(format)? + "\n").as_bytes())?;
-    orbits.map_or(Ok(()), |picture| output.write(ORBITS, picture.to_svg().as_bytes()))?;
+    orbits.map_or(Ok(()), |picture| output.write(ORBITS, picture.to_svg("").as_bytes()))?;
     sky.map_or(Ok(()), |png| output.write(SKY, &png))
 }
 

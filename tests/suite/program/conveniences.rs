@@ -200,6 +200,22 @@ fn a_motion_may_leave_the_training_range() {
 }
 
 #[test]
+fn unlike_units_are_not_drawn_on_one_axis() {
+    let folder = Folder::new();
+    let [csv, svg] = ["motion.csv", "motion.svg"].map(|name| text(&folder.path(name)));
+    let motion = ["rollout", "--system", "spring-pendulum", "--state", "1.2,0.5,0,0", "--t-end", "1", "--dt", "0.1"];
+    lnn(&[&motion[..], &["--out", &csv, "--plot", &svg]].concat()).succeeded();
+    let drawn = fs::read_to_string(&svg).unwrap();
+    for label in [">r [m]<", ">theta [rad]<", ">r cos theta [m]<"] {
+        assert_eq!(drawn.matches(label).count(), 1, "{label}");
+    }
+    // Pendula share a unit, and a panel.
+    let motion = ["rollout", "--system", "double-pendulum", "--state", "1,0.5,0,0", "--t-end", "1", "--dt", "0.1"];
+    lnn(&[&motion[..], &["--out", &csv, "--plot", &svg, "--overwrite"]].concat()).succeeded();
+    assert!(fs::read_to_string(&svg).unwrap().contains(">theta1, theta2 [rad]<"));
+}
+
+#[test]
 fn shells_and_manuals_know_the_program() {
     let folder = Folder::new();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {

@@ -83,6 +83,30 @@ fn errors(summary: &Value) -> (f64, f64) {
 }
 
 #[test]
+fn polar_coordinates_are_drawn_as_a_path_in_the_plane() {
+    let folder = Folder::new();
+    // Ellipses of x'' = -x.
+    let mut csv = "run,t,r [m],phi [deg]\n".to_string();
+    for run in 0..4 {
+        for k in 0..150 {
+            let t = 0.05 * f64::from(k);
+            let (x, y) = ((1.0 + 0.1 * f64::from(run)) * t.cos(), (0.6 + 0.05 * f64::from(run)) * t.sin());
+            writeln!(csv, "{run},{t},{},{}", x.hypot(y), y.atan2(x).to_degrees()).unwrap();
+        }
+    }
+    let (data, out) = (folder.file("orbits.csv", csv), text(&folder.path("out")));
+    let columns = ["fit", &data, "--coords", "r,phi", "--trajectory", "run", "--periodic", "phi", "--out", &out];
+    lnn(&[&columns[..], &["--hidden", "8,8", "--epochs", "4"]].concat()).succeeded();
+    let picture = |file: &str| fs::read_to_string(folder.path("out").join(file)).unwrap();
+    let path = picture("prediction_path.svg");
+    for label in [">r cos phi [m]<", ">r sin phi [m]<", ">measured<", ">predicted<"] {
+        assert!(path.contains(label), "{label}");
+    }
+    // Numbers are in SI, and so are their units.
+    assert!(picture("prediction_1.svg").contains(">r [m]<") && picture("prediction_2.svg").contains(">phi [rad]<"));
+}
+
+#[test]
 fn recorded_positions_become_a_model_that_predicts() {
     let folder = Folder::new();
     let data = folder.file("swings.csv", pendulum(12, false, 0.0));

@@ -13,13 +13,14 @@ const html = require('fs').readFileSync(process.argv[1], 'utf8');
 const parts = [...html.matchAll(/<script([^>]*)>([^]*?)<\\/script>/g)].map((match) => match[2]);
 const shell = { module: { exports: {} } };
 new Function('module', parts[1])(shell.module);
-const { load, Flight } = shell.module.exports;
-const { learned, exact } = load(JSON.parse(parts[0]));
+const { load, Flight, aligned } = shell.module.exports;
+const data = JSON.parse(parts[0]), { learned, exact } = load(data);
 const states = JSON.parse(process.argv[2]);
 const of = (motion) => motion && states.map(({ q, v }) => motion.terms(q, v));
+const { factors } = data.learned, matrices = factors && of(learned).map((terms) => aligned(terms, factors, learned.held.length));
 const flight = exact && new Flight(exact, states[0].q, states[0].v, 0.01);
 if (flight) flight.advance(1);
-console.log(JSON.stringify({ learned: of(learned), exact: of(exact), motion: flight && flight.y, ended: flight && flight.ended }));
+console.log(JSON.stringify({ learned: of(learned), exact: of(exact), factors, matrices, motion: flight && flight.y, ended: flight && flight.ended }));
 ";
 
 fn node() -> bool {
@@ -28,6 +29,47 @@ fn node() -> bool {
         eprintln!("skipped: there is no node");
     }
     found
+}
+
+/// Opens a page without a browser: prints what it writes on its canvases, and how often it asked for another picture.
+const OPENED: &str = "
+const html = require('fs').readFileSync(process.argv[1], 'utf8'), reduced = process.argv[2] === 'reduced';
+const parts = [...html.matchAll(/<script([^>]*)>([^]*?)<\\/script>/g)].map((match) => match[2]);
+const written = [], elements = {};
+let pictures = 0;
+const pen = new Proxy({}, { get: (pen, name) => pen[name] || ((text) => {
+  if (name === 'fillText') written.push(text);
+  return { width: 10 };
+}) });
+const element = (textContent) => ({ textContent, clientWidth: 400, clientHeight: 400, classList: { add() {} }, append() {},
+  replaceChildren() {}, addEventListener() {}, getContext: () => pen });
+const document = { getElementById: (id) => (elements[id] = elements[id] || element(id === 'data' ? parts[0] : '')),
+  createElement: element, addEventListener() {}, documentElement: null, body: null };
+const outside = { document, module: undefined, window: { addEventListener() {} },
+  getComputedStyle: () => ({ getPropertyValue: () => '#000' }), requestAnimationFrame: () => pictures++,
+  matchMedia: (query) => ({ matches: reduced && query.includes('reduced-motion'), addEventListener() {} }) };
+new Function(...Object.keys(outside), parts[1] + parts[2])(...Object.values(outside));
+console.log(JSON.stringify({ written, pictures }));
+";
+
+#[test]
+fn a_page_has_axes_and_plays_at_once_unless_its_reader_wants_no_motion() {
+    let folder = Folder::new();
+    let model = text(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors"));
+    let page = text(&folder.path("play.html"));
+    lnn(&["page", &model, "--out", &page]).succeeded();
+    if !node() {
+        return;
+    }
+    for (wish, pictures) in [("any", 1), ("reduced", 0)] {
+        let output = Command::new("node").args(["-e", OPENED, &page, wish]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(found["pictures"], pictures, "{wish}: {found}");
+        for text in ["x [m]", "y [m]", "0", "1"] {
+            assert!(found["written"].as_array().unwrap().contains(&text.into()), "{wish}, {text}: {found}");
+        }
+    }
 }
 
 /// What the script of a page says of states.
@@ -118,6 +160,14 @@ fn the_exact_motion_runs_beside_the_learned_one() {
     {
         let ours = lnn(&[&["inspect"], &whose[..], &["--states", &table]].concat());
         agree(&result[kind], &ours.objects(), tolerance, kind);
+    }
+    // One factor brings the learned mass matrix to the exact one, and its square the determinant.
+    let [one, two] = numbers(&result["factors"])[..] else { panic!("{result}") };
+    assert!(one == two && (one / 37.0 - 1.0).abs() < 0.1, "{one}");
+    for (learned, exact) in result["matrices"].as_array().unwrap().iter().zip(result["exact"].as_array().unwrap()) {
+        let [theirs, ours] = [learned, exact].map(|terms| terms["determinant"].as_f64().unwrap());
+        assert!((theirs / ours - 1.0).abs() < 0.15, "{theirs} {ours}");
+        assert!((learned["diagonal"][0].as_f64().unwrap() / 2.0 - 1.0).abs() < 0.15, "{learned}");
     }
     let motion = folder.path("motion.csv");
     let exact = ["rollout", "--system", "double-pendulum", "--state", "0.6,0.9,0,0", "--t-end", "1", "--dt", "0.5"];

@@ -142,8 +142,16 @@ fn coordinates_that_move_by_themselves_are_named_and_give_no_good_model() {
         "{told}"
     );
     assert!(told.contains("y is decoupled"), "{told}");
+    // The map of what has a factor of its own is greyed out, and says why.
+    let greyed = |file: &str| {
+        let captions = fs::read(folder.path("out").join("captions.json")).unwrap();
+        let captions: Value = serde_json::from_slice(&captions).unwrap();
+        captions[file]["caption"].as_str().unwrap().contains("Greyed out: y is decoupled")
+    };
+    let maps = ["mass_matrix_x_x.svg", "mass_matrix_y_y.svg", "potential.svg"];
+    assert_eq!(maps.map(greyed), [false, true, true]);
     let (_, found) = fitted(&folder, oscillators(3.0, 12.0), &["--epochs", "200"]);
-    assert!(found.get("groups").is_none(), "{found}");
+    assert!(found.get("groups").is_none() && !maps.iter().any(|map| greyed(map)), "{found}");
 }
 
 #[test]

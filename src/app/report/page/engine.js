@@ -369,6 +369,12 @@ class Motion {
   }
 }
 
+// Determinant and diagonal of a mass matrix after the factors of its coordinates, under so many constraints; those have one factor.
+function aligned({ determinant, mass }, factors, constraints) {
+  const of = factors || mass.map(() => 1), within = of.slice(0, of.length - constraints);
+  return { determinant: within.reduce((product, factor) => product * factor, determinant), diagonal: mass.map((row, i) => of[i] * row[i]) };
+}
+
 // Dormand and Prince, order 5(4).
 const STAGES = [
   [], [1 / 5], [3 / 40, 9 / 40], [44 / 45, -56 / 15, 32 / 9], [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
@@ -428,4 +434,4 @@ function load(data) {
   return { learned, exact };
 }
 
-if (typeof module !== "undefined") module.exports = { load, Flight, Motion, Recorded };
+if (typeof module !== "undefined") module.exports = { load, Flight, Motion, Recorded, aligned };

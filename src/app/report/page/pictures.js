@@ -16,7 +16,9 @@ function pictureOf(data, learned) {
       let [x, y] = [0, 0];
       return [[0, 0]].concat(rods(values).map((l, i) => [(x += l * Math.sin(q[i])), (y -= l * Math.cos(q[i]))]));
     };
+    const known = constant("l1") || constant("l"), unit = known ? known.unit : "lengths of a rod";
     return {
+      axes: [`x [${unit}]`, `y [${unit}]`],
       reach: (values) => 1.1 * rods(values).reduce((a, b) => a + b, 0),
       joints,
       lines: true,
@@ -51,7 +53,9 @@ function pictureOf(data, learned) {
     const angle = place("phi") >= 0 ? place("phi") : turn, hangs = names[angle] === "theta" || names[angle] === "angle";
     const far = data.ranges.position[r][1];
     const hole = (values) => (data.time_like !== null && values.M > 0 ? values.M + Math.sqrt(Math.max(0, values.M ** 2 - (values.a || 0) ** 2)) : 0);
+    const turned = hangs ? ["r sin", "\u2212r cos"] : ["r cos", "r sin"], unit = data.units[r];
     return {
+      axes: angle < 0 ? [withUnit("r", unit), null] : turned.map((of) => withUnit(`${of} ${names[angle]}`, unit)),
       reach: () => 1.15 * far,
       hole: (values) => (hole(values) > 0 ? [hole(values), hole(values)] : null),
       centre: () => [0, 0],
@@ -74,6 +78,7 @@ function pictureOf(data, learned) {
   if (space.length >= 1 && names.every((_, i) => !data.periodic[i])) {
     const [a, b] = space, size = (i) => (i === undefined ? 0 : Math.max(...data.ranges.position[i].map(Math.abs)));
     return {
+      axes: [a, b].map((i) => (i === undefined ? null : withUnit(names[i], data.units[i]))),
       reach: () => 1.2 * Math.max(size(a), size(b)),
       centre: () => [0, 0],
       lines: b === undefined,
@@ -82,6 +87,11 @@ function pictureOf(data, learned) {
     };
   }
   return null;
+}
+
+// A quantity with its unit, if it has one.
+function withUnit(name, unit) {
+  return unit && unit !== "1" ? `${name} [${unit}]` : name;
 }
 
 // The angle of the same direction that is nearest to another.
@@ -172,6 +182,8 @@ function pictureOfPoints(data, { points, letters, arms }, learned) {
     return solid ? [wide, Math.hypot(wide * Math.sin(view.lift), radius * Math.cos(view.lift))] : [wide, wide];
   };
   return {
+    axes: solid ? null : points[0].map((at, i) => withUnit(points.length > 1 ? letters[i] : names[at], data.units[at])),
+    origin: middle,
     reach: () => reach,
     view,
     names: arms ? points.map((_, k) => `axis ${k + 1}`) : [],
@@ -197,4 +209,24 @@ function pictureOfPoints(data, { points, letters, arms }, learned) {
       return next;
     },
   };
+}
+
+// Round numbers within bounds, with their texts.
+function ticks(low, high, most) {
+  const least = (high - low) / Math.max(1, most), unit = 10 ** Math.floor(Math.log10(least));
+  const step = unit * ([1, 2, 5].find((factor) => factor * unit >= least * (1 - 1e-9)) || 10), found = [];
+  const power = Math.floor(Math.log10(step) + 1e-9), plain = power > -6 && Math.max(Math.abs(low), Math.abs(high)) < 1e5;
+  const text = (x) => (plain ? x.toFixed(Math.max(0, -power)) : x === 0 ? "0" : String(Number(x.toPrecision(3)))).replaceAll("-", "\u2212");
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step && found.length < 50; k++) found.push([k * step, text(k * step)]);
+  return found;
+}
+
+// A line across, or up, through a tick.
+function rule(pen, colour, from, to) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  pen.moveTo(...from);
+  pen.lineTo(...to);
+  pen.stroke();
 }

@@ -12,6 +12,7 @@ function play(data) {
     if (!Number.isFinite(x)) return "no number";
     return x !== 0 && Math.abs(x) < 1e-3 ? x.toExponential(2) : Number(x.toPrecision(4)).toString();
   };
+  const named = (i) => withUnit(data.columns[i], data.units[i]);
   const held = kinds.some(([, motion]) => motion.held.length);
   let flights, paths, running = false, last = 0, dragged = 0, speed = 1, reading = null, turning = null;
 
@@ -67,10 +68,12 @@ function play(data) {
 
   function drawStage() {
     const area = sheet($("stage")), { pen, width, height } = area;
-    if (!picture) return drawCurves(area, data.columns.slice(0, n).map((name, i) => [name, (point) => point.y[i]]));
+    if (!picture) return drawCurves(area, data.columns.slice(0, n).map((name, i) => [named(i), (point) => point.y[i]]));
     const { to, unit } = toScreen(area);
     pen.strokeStyle = colour("muted");
     pen.lineWidth = 1;
+    if (picture.axes) drawAxes(area, toScreen(area), picture.axes, picture.origin || [0, 0]);
+    pen.strokeStyle = colour("muted");
     if (picture.globe) {
       pen.beginPath();
       pen.arc(width / 2, height / 2, unit, 0, 7);
@@ -149,34 +152,85 @@ function play(data) {
     });
   }
 
+  // The axes of a plane at the edges of the stage; `origin` is the place in its middle.
+  function drawAxes({ pen, width, height }, { to, from }, [across, up], [ox, oy]) {
+    const [left, top] = from(0, 0), [right, bottom] = from(width, height);
+    const write = (text, x, y, align) => {
+      Object.assign(pen, { fillStyle: colour("muted"), textAlign: align });
+      pen.fillText(text, x, y);
+    };
+    ticks(left + ox, right + ox, width / 70).forEach(([at, text]) => {
+      const [x] = to([at - ox, 0]);
+      rule(pen, colour("line"), [x, 0], [x, height]);
+      if (x > 56 && x < width - 20) write(text, x, height - 7, "center");
+    });
+    write(across, width - 8, height - 24, "right");
+    if (up) {
+      ticks(bottom + oy, top + oy, height / 70).forEach(([at, text]) => {
+        const [, y] = to([0, at - oy]);
+        rule(pen, colour("line"), [0, y], [width, y]);
+        if (y > 30 && y < height - 24) write(text, 6, y - 3, "left");
+      });
+      write(up, 6, 17, "left");
+    }
+    pen.textAlign = "left";
+  }
+
   // Curves over time: of each kind in its colour, each quantity in a strip of its own.
   function drawCurves({ pen, width, height }, quantities) {
     const t = Math.max(1e-9, ...paths.map((path) => path[path.length - 1].t)), from = Math.max(0, t - data.span);
+    const left = 58, right = width - 10, foot = height - 20, tall = foot / quantities.length;
+    const across = (time) => left + ((time - from) / (t - from || 1)) * (right - left);
+    const label = withUnit(data.time_like === null ? "t" : "tau", data.time_unit), room = right - pen.measureText(label).width - 8;
+    pen.fillStyle = colour("muted");
+    pen.fillText(label, room + 8, height - 5);
+    pen.textAlign = "center";
+    if (t > 1e-9) {
+      ticks(from, t, 6).map(([at, text]) => [across(at), text]).forEach(([x, text]) => {
+        rule(pen, colour("line"), [x, 0], [x, foot]);
+        if (x + pen.measureText(text).width / 2 < room) pen.fillText(text, x, height - 5);
+      });
+    }
     quantities.forEach(([label, of], row) => {
-      const top = (row * height) / quantities.length, tall = height / quantities.length;
+      const top = row * tall;
       const seen = paths.map((path) => path.filter((point) => point.t >= from).map((point) => [point.t, of(point, path)]));
       const all = seen.flat().map((point) => point[1]).filter(Number.isFinite);
+      if (!all.length) return;
       let [low, high] = [Math.min(...all), Math.max(...all)];
-      if (!(high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high), 1e-30))) [low, high] = [low - 1, high + 1];
-      pen.fillStyle = colour("muted");
-      pen.fillText(`${label}: ${digits(low)} to ${digits(high)}`, 8, top + 16);
-      seen.forEach((points, k) => {
-        pen.strokeStyle = colour(kinds[k][0]);
-        pen.lineWidth = 1.5;
+      const room = 1e-9 + 1e-3 * Math.max(Math.abs(low), Math.abs(high));
+      if (!(high - low > room)) [low, high] = [low - room, high + room];
+      const up = (y) => top + tall - 6 - ((y - low) / (high - low)) * (tall - 30);
+      pen.textAlign = "right";
+      ticks(low, high, tall / 45).forEach(([at, text]) => {
+        rule(pen, colour("line"), [left, up(at)], [right, up(at)]);
+        pen.fillText(text, left - 6, up(at) + 4);
+      });
+      pen.textAlign = "left";
+      pen.fillText(label, left, top + 15);
+      // What is exact lies wide below what was learned.
+      seen.map((points, k) => [points, kinds[k][0]]).reverse().forEach(([points, name]) => {
+        pen.strokeStyle = colour(name);
+        [pen.lineWidth, pen.globalAlpha] = name === "exact" ? [4, 0.5] : [1.5, 1];
         pen.beginPath();
-        points.forEach(([time, y]) => pen.lineTo(((time - from) / (t - from || 1)) * width, top + tall - 6 - ((y - low) / (high - low)) * (tall - 30)));
+        points.forEach(([time, y]) => pen.lineTo(across(time), up(y)));
         pen.stroke();
       });
+      pen.globalAlpha = 1;
     });
   }
 
   function draw() {
     drawStage();
+    // Before a motion there is nothing to plot.
+    const still = paths.every((path) => path.length < 2);
+    $("energy").hidden = still;
+    $("first").hidden = still || !picture;
     const scale = (path) => Math.max(...path.map((point) => Math.abs(point.energy)), 1e-300);
     const curves = [[data.time_like === null ? "change of the energy, relative" : "change of the energy, the constraint, relative", (point, path) => (point.energy - path[0].energy) / scale(path)]];
     if (held) curves.push(["distance from the constraints", (point) => point.off]);
     drawCurves(sheet($("energy")), curves);
-    if (picture) drawCurves(sheet($("first")), [[data.columns[n > 1 && data.time_like === 0 ? 1 : 0], (point) => point.y[n > 1 && data.time_like === 0 ? 1 : 0]]]);
+    const first = n > 1 && data.time_like === 0 ? 1 : 0;
+    if (picture) drawCurves(sheet($("first")), [[named(first), (point) => point.y[first]]]);
     const ended = flights.map((flight, k) => (flight.ended ? `${kinds[k][0]}: ${flight.ended}.` : "")).join(" ");
     $("time").textContent = `${data.time_like === null ? "t" : "tau"} = ${flights[0].t.toFixed(2)} ${data.time_unit} ${ended}`;
     if (!running) read(reading || start.q, reading ? "under the cursor" : "at the start");
@@ -188,15 +242,17 @@ function play(data) {
   function read(q, where) {
     const within = held ? " within the constraints" : "";
     const text = kinds.map(([name, motion]) => {
-      const { determinant, mass } = motion.terms(q, start.v);
-      const diagonal = mass.map((row, i) => digits(row[i])).join(", ");
+      const factors = name === "learned" ? data.learned.factors : null;
+      const { determinant, diagonal } = aligned(motion.terms(q, start.v), factors, motion.held.length);
       const line = document.createElement("span");
       line.className = name;
-      line.textContent = `${name}: det M${within} = ${digits(determinant)}, diagonal of M ${diagonal}`;
+      line.textContent = `${name}: det M${within} = ${digits(determinant)}, diagonal of M ${diagonal.map(digits).join(", ")}`;
       return line;
     });
     const place = q.map((x, i) => `${data.columns[i]} = ${digits(x)}`).join(", ");
-    $("reading").replaceChildren(`${where}, ${place}; M is learned up to one factor`, ...text);
+    const { factors } = data.learned, same = factors && factors.every((factor) => factor === factors[0]);
+    const taken = factors ? `the learned M is taken times ${factors.slice(0, same ? 1 : n).map(digits).join(", ")}, its best ${same ? "factor" : "factors"}` : "M is learned up to one factor";
+    $("reading").replaceChildren(`${where}, ${place}; ${taken}`, ...text);
   }
 
   const sliders = [];
@@ -220,7 +276,7 @@ function play(data) {
   data.columns.forEach((name, i) => {
     const side = i < n ? "q" : "v", at = i % n, [low, high] = data.ranges[i < n ? "position" : "velocity"][at];
     const put = (x) => Object.assign(start, settle(start.q, start.v, (state) => (state[side][at] = x)));
-    slide("states", name, low, high, () => start[side][at], put);
+    slide("states", named(i), low, high, () => start[side][at], put);
   });
   if (exact && data.exact.parameters.length) {
     data.exact.parameters.forEach((p, i) => {
@@ -322,12 +378,12 @@ function play(data) {
   });
   window.addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  if (!picture) $("first").hidden = true;
   if (held) $("energy").classList.add("tall");
   $("held").textContent = Object.entries(data.constraints).map(([name, formula]) => `${name}: ${formula} = 0`).join("; ");
   $("held").hidden = !Object.keys(data.constraints).length;
   $("turned").hidden = !(picture && picture.view);
   reset();
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) toggle(true);
   return { advance, draw, toggle, flights: () => flights, start };
 }
 

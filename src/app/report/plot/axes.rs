@@ -7,12 +7,11 @@ use std::f64::consts::PI;
 const TICK: f64 = 12.0;
 /// Size of labels.
 const LABEL: f64 = 13.0;
-/// Size of titles.
-const TITLE: f64 = 14.0;
-/// Width of bold letters over that of plain ones.
-const BOLD: f64 = 1.16;
-/// Height of the line of a title.
+/// Height of the line of a title, and of the room above data without one.
 pub(super) const TITLE_HEIGHT: f64 = 28.0;
+pub(super) const TOP: f64 = 12.0;
+/// Height of a row of a legend.
+pub(super) const ROW: f64 = 18.0;
 /// Height below the data.
 pub(super) const BELOW: f64 = 44.0;
 /// Decades that have ticks of their own at every value.
@@ -196,10 +195,9 @@ pub(super) fn ruled(panel: &mut Panel, area: Area, (x, y): (&Axis, &Axis), title
     let Area { left, top, width, height } = area;
     let (right, bottom) = (left + width, top + height);
     let (mut grid, mut marks) = (Vec::new(), Vec::new());
-    let size = fitting(title, TITLE, (panel.width - 16.0) / BOLD);
-    // As far to the right as it can be, from above the data on.
-    let start = left.min(panel.width - 8.0 - BOLD * text_width(title, size)).max(8.0);
-    panel.title((start, 19.0), size, title);
+    if !title.is_empty() {
+        panel.title(left, title);
+    }
 
     // As many ticks as their texts have room for.
     let fits = |most: &usize| {

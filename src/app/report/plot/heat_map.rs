@@ -1,6 +1,6 @@
 //! Grids as colours, side by side.
 
-use super::axes::{Area, Axis, AxisScale, BELOW, TITLE_HEIGHT, number, room_left, ruled};
+use super::axes::{Area, Axis, AxisScale, BELOW, TITLE_HEIGHT, Tick, number, room_left, ruled};
 use super::png::indexed;
 use super::svg::{Anchor, DIVERGING, GAP, INK, MARK, Panel, VIRIDIS, at, text_width};
 use super::{HeatMap, Picture, PlotError, extremes, fine};
@@ -11,8 +11,10 @@ const SIZE: (f64, f64) = (332.0, 286.0);
 const BAR: (f64, f64) = (11.0, 10.0);
 /// Size of its texts.
 const TEXT: f64 = 12.0;
-/// Colours of a map; one more stands for gaps.
-const SHADES: usize = 255;
+/// Colours of a map, and of one with places that are greyed out, which take as many more; another one stands for gaps.
+const SHADES: (usize, usize) = (255, 127);
+/// How much of a colour is left where it is greyed out.
+const LEFT: f64 = 0.18;
 
 /// Draws grids side by side, each with its colour bar; gaps are grey.
 ///
@@ -20,7 +22,8 @@ const SHADES: usize = 255;
 /// [`PlotError::Empty`] if a grid has no finite value or fewer than two values per axis.
 pub fn heat_maps(maps: &[HeatMap]) -> Result<Picture, PlotError> {
     let panels = maps.iter().map(panel).collect::<Result<Vec<Panel>, PlotError>>()?;
-    if panels.is_empty() { Err(PlotError::Empty(String::new())) } else { Ok(Picture { panels }) }
+    let blank = maps.iter().flat_map(|map| &map.grid.values).all(|z| *z == 0.0 || !fine(*z));
+    if panels.is_empty() { Err(PlotError::Empty(String::new())) } else { Ok(Picture { panels, blank }) }
 }
 
 fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
@@ -52,15 +55,23 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
     }
     let constant = from >= to;
     let scale = if map.diverging { DIVERGING } else { VIRIDIS };
-    let mut palette: Vec<[u8; 3]> = (0..SHADES).map(|k| at(scale, k as f64 / (SHADES - 1) as f64)).collect();
+    let is_open = |k: usize| map.open.get(k).copied().unwrap_or(false);
+    let shades = if map.open.contains(&true) { SHADES.1 } else { SHADES.0 };
+    let mut palette: Vec<[u8; 3]> = (0..shades).map(|k| at(scale, k as f64 / (shades - 1) as f64)).collect();
+    if shades == SHADES.1 {
+        palette.extend(palette.clone().into_iter().map(greyed));
+    }
     palette.push(GAP);
-    let shade = |z: f64| match (z - from) / (to - from) {
-        _ if !fine(z) => SHADES as u8,
-        _ if constant => SHADES as u8 / 2,
-        part => (part.clamp(0.0, 1.0) * (SHADES - 1) as f64).round() as u8,
+    let shade = |(k, &z): (usize, &f64)| {
+        let colour = match (z - from) / (to - from) {
+            _ if !fine(z) => return (palette.len() - 1) as u8,
+            _ if constant => shades / 2,
+            part => (part.clamp(0.0, 1.0) * (shades - 1) as f64).round() as usize,
+        };
+        (if is_open(k) { colour + shades } else { colour }) as u8
     };
-    let image: Vec<Vec<u8>> =
-        grid.values.chunks_exact(columns).rev().map(|row| row.iter().map(|&z| shade(z)).collect()).collect();
+    let image: Vec<u8> = grid.values.iter().enumerate().map(shade).collect();
+    let image: Vec<Vec<u8>> = image.chunks_exact(columns).rev().map(<[u8]>::to_vec).collect();
 
     let texts = if constant { vec![] } else { bar_ticks(from, to) };
     let bar_room = texts.iter().map(|(_, text)| text_width(text, TEXT)).fold(0.0, f64::max) + BAR.0 + BAR.1 + 16.0;
@@ -77,7 +88,7 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
     // Lines across would be taken for data.
     let _ = ruled(&mut panel, area, axes, &title);
     if !constant {
-        let bar: Vec<Vec<u8>> = (0..SHADES as u8).rev().map(|k| vec![k]).collect();
+        let bar: Vec<Vec<u8>> = (0..shades as u8).rev().map(|k| vec![k]).collect();
         let place = area.left + area.width + BAR.1;
         panel.image(&indexed(&bar, &palette), (place, area.top), (BAR.0, area.height));
         for (z, text) in texts {
@@ -91,6 +102,12 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
 
 /// Ticks of a colour bar; their texts tell the power of ten.
 fn bar_ticks(from: f64, to: f64) -> Vec<(f64, String)> {
-    let (ticks, _) = Axis::new(from, to, AxisScale::Linear, "").ticks(5);
-    ticks.into_iter().map(|tick| (tick.at, number(tick.at))).collect()
+    let (ticks, power) = Axis::new(from, to, AxisScale::Linear, "").ticks(5);
+    let text = |tick: Tick| (tick.at, tick.text.filter(|_| power == 0).unwrap_or_else(|| number(tick.at)));
+    ticks.into_iter().map(text).collect()
+}
+
+/// A colour that is mixed with the grey of what is unknown.
+fn greyed(colour: [u8; 3]) -> [u8; 3] {
+    std::array::from_fn(|i| (LEFT * f64::from(colour[i]) + (1.0 - LEFT) * f64::from(GAP[i])).round() as u8)
 }

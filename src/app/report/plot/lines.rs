@@ -1,32 +1,30 @@
 //! Lines over a common axis, with no more points than an eye can see.
 
-use super::axes::{Area, Axis, AxisScale, BELOW, TITLE_HEIGHT, frame, room_left};
-use super::svg::{Anchor, INK, LINES, Panel, fitting, text_width};
+use super::axes::{Area, Axis, AxisScale, BELOW, ROW, TOP, frame, room_left};
+use super::svg::{INK, LINES, OVER, Panel, UNDER, entry_width, fitting};
 use super::{LinePlot, Picture, PlotError, Series, range, stretches, values, window};
 
 /// Size of the picture without its legend.
-const SIZE: (f64, f64) = (496.0, 304.0);
+const SIZE: (f64, f64) = (496.0, 288.0);
 /// Room right of the data.
 const RIGHT: f64 = 14.0;
-/// Size of the texts of a legend, height of a row of it, length of its lines.
-const LEGEND: (f64, f64, f64) = (12.5, 18.0, 22.0);
 /// Decades below the largest value that a logarithmic axis shows.
 const DECADES: f64 = 1e-18;
-/// Widths of a line, and of one that another is drawn over.
-const WIDTHS: (f64, f64) = (1.1, 3.4);
+/// Width of a line.
+const WIDTH: f64 = 1.3;
 /// Width of each of several lines that oscillate so fast that they would fill the picture.
 const DENSE: f64 = 0.7;
 /// Points at and above which a line may be one of these.
 const MANY: usize = 500;
-/// The colour of a line that another is drawn over.
-const UNDER: &str = "#7FB8DC";
+/// The colour of lines that show what is not determined.
+const OPEN: &str = "#9aa1ad";
 
 /// Draws lines.
 ///
 /// # Errors
 /// [`PlotError::Empty`] if nothing can be shown.
 pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
-    let empty = || PlotError::Empty(plot.title.clone());
+    let empty = || PlotError::Empty(plot.y_label.clone());
     let mut series = plot.series.clone();
     let all_x = range(series.iter().flat_map(|s| &s.points).map(|p| p.0));
     if plot.log_y {
@@ -41,24 +39,23 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
     let overlaid = series.iter().any(|s| s.over);
     let y = if overlaid { window(&series, |p| p.1) } else { range(values(&series, |p| p.1)) };
     let (y, x) = (y.ok_or_else(empty)?, all_x.ok_or_else(empty)?);
+    let blank = values(&series, |p| p.1).all(|y| y == 0.0);
     // Points without lines want room around them.
     let scattered = series.iter().all(|s| stretches(&s.points).iter().all(|stretch| stretch.len() == 1));
     let margin = if scattered { 0.04 * (x.1 - x.0) } else { 0.0 };
     let x = Axis::new(x.0 - margin, x.1 + margin, AxisScale::Linear, &plot.x_label);
     let y = vertical(plot, &series, y);
 
-    let height = SIZE.1 - TITLE_HEIGHT - BELOW - 4.0;
+    let height = SIZE.1 - TOP - BELOW - 4.0;
     let left = room_left(&y, height);
     let entries = legend(&series, SIZE.0 - left);
-    let rows = entries.last().map_or(0, |(row, ..)| row + 1) as f64 * LEGEND.1;
+    let rows = entries.last().map_or(0, |(row, ..)| row + 1) as f64 * ROW;
     let mut panel = Panel::new(SIZE.0, SIZE.1 + rows);
-    let area = Area { left, top: TITLE_HEIGHT + rows, width: SIZE.0 - left - RIGHT, height };
-    frame(&mut panel, area, (&x, &y), &plot.title);
+    let area = Area { left, top: TOP + rows, width: SIZE.0 - left - RIGHT, height };
+    frame(&mut panel, area, (&x, &y), "");
     for (row, place, index, name) in entries {
-        let (colour, width, _) = look(&series, index);
-        let (at, middle) = (left + place, TITLE_HEIGHT + LEGEND.1 * row as f64 + 3.0);
-        panel.segments(&[[(at, middle), (at + LEGEND.2, middle)]], colour, width.max(2.0));
-        panel.text((at + LEGEND.2 + 5.0, middle + 4.0), LEGEND.0, Anchor::Start, &name);
+        let (colour, width, _) = look(plot, index);
+        panel.entry((left + place, TOP + ROW * row as f64 + 3.0), (colour, width), &name);
     }
 
     let mut inner = Panel::new(area.width, area.height);
@@ -66,7 +63,7 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
     let mut order: Vec<usize> = (0..series.len()).collect();
     order.sort_by_key(|&index| series[index].over);
     for index in order {
-        let (colour, width, diameter) = look(&series, index);
+        let (colour, width, diameter) = look(plot, index);
         let stretches = stretches(&series[index].points).into_iter();
         let near = |(x, y): (f64, f64)| (x, y.clamp(-area.height, 2.0 * area.height));
         let stretches = stretches.map(|s| s.into_iter().map(|p| near(area.point((&x, &y), p))).collect::<Vec<_>>());
@@ -84,7 +81,7 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
         inner.haloed_text(text, size, &level.name);
     }
     panel.inset((area.left, area.top), &inner);
-    Ok(Picture { panels: vec![panel] })
+    Ok(Picture { panels: vec![panel], blank })
 }
 
 fn vertical(plot: &LinePlot, series: &[Series], (low, high): (f64, f64)) -> Axis {
@@ -105,13 +102,15 @@ fn vertical(plot: &LinePlot, series: &[Series], (low, high): (f64, f64)) -> Axis
 }
 
 /// Colour and width of a line, diameter of its dots.
-fn look(series: &[Series], index: usize) -> (&'static str, f64, f64) {
+fn look(plot: &LinePlot, index: usize) -> (&'static str, f64, f64) {
+    let series = &plot.series;
     let overlaid = series.len() > 1 && series.iter().any(|s| s.over);
     if overlaid && !series[index].over {
-        return (if index == 0 { UNDER } else { LINES[index % LINES.len()] }, WIDTHS.1, WIDTHS.1);
+        return (if index == 0 { UNDER.0 } else { LINES[index % LINES.len()] }, UNDER.1, UNDER.1);
     }
     let dense = !overlaid && series.len() > 1 && series.iter().any(|s| s.points.len() > MANY);
-    (LINES[index % LINES.len()], if dense { DENSE } else { WIDTHS.0 }, 4.0)
+    let width = if overlaid { OVER } else { WIDTH };
+    (if plot.open { OPEN } else { LINES[index % LINES.len()] }, if dense { DENSE } else { width }, 4.0)
 }
 
 /// Row, place, series and name of every entry of a legend, if there are several series.
@@ -119,7 +118,7 @@ fn legend(series: &[Series], room: f64) -> Vec<(usize, f64, usize, String)> {
     let (mut row, mut place, mut entries) = (0, 0.0, Vec::new());
     let named = series.iter().enumerate().filter(|(_, s)| series.len() > 1 && !s.name.is_empty());
     for (index, series) in named {
-        let width = LEGEND.2 + 5.0 + text_width(&series.name, LEGEND.0) + 14.0;
+        let width = entry_width(&series.name);
         if place > 0.0 && place + width > room {
             (row, place) = (row + 1, 0.0);
         }

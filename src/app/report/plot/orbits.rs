@@ -1,19 +1,13 @@
-//! Paths in a plane: orbits around a centre, one panel for each, what is exact wide, what was learned thin over it; traces
-//! side by side.
+//! Paths in a plane, what is exact wide, what was learned thin over it: orbits around a centre, one panel for each; traces.
 
-use super::axes::{Area, Axis, AxisScale, BELOW, TITLE_HEIGHT, frame, room_left};
-use super::svg::{Anchor, LINES, MARK, Panel, VIRIDIS, at, hex, text_width};
+use super::axes::{Area, Axis, AxisScale, BELOW, ROW, TITLE_HEIGHT, TOP, frame, room_left};
+use super::svg::{LINES, MARK, OVER, Panel, UNDER, VIRIDIS, at, entry_width, hex};
 use super::{Picture, PlotError, Series, Trace, fine, range, stretches, values, window};
 
 /// Size of a panel.
 const SIZE: (f64, f64) = (420.0, 428.0);
 /// Room right of the data.
 const RIGHT: f64 = 14.0;
-/// Height of the legend, size of its texts, length of its lines.
-const LEGEND: (f64, f64, f64) = (18.0, 12.5, 22.0);
-/// Colour and width of the lines below, and of those over them.
-const BELOW_LINE: (&str, f64) = ("#7FB8DC", 3.4);
-const OVER_WIDTH: f64 = 1.1;
 /// Colour of a hole.
 const HOLE: &str = "#c3c9d4";
 
@@ -36,7 +30,7 @@ pub struct OrbitPlot {
 /// [`PlotError::Empty`] if a panel has nothing to show.
 pub fn orbit_picture(plot: &OrbitPlot) -> Result<Picture, PlotError> {
     let panels = plot.panels.iter().map(|(title, orbits)| draw(plot, title, orbits)).collect::<Result<Vec<_>, _>>()?;
-    if panels.is_empty() { Err(PlotError::Empty("orbits".to_string())) } else { Ok(Picture { panels }) }
+    if panels.is_empty() { Err(PlotError::Empty("orbits".to_string())) } else { Ok(Picture { panels, blank: false }) }
 }
 
 fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotError> {
@@ -52,7 +46,7 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
     let (x, y) = (of(|p| p.0).ok_or_else(empty)?, of(|p| p.1).ok_or_else(empty)?);
 
     let mut panel = Panel::new(SIZE.0, SIZE.1);
-    let top = TITLE_HEIGHT + LEGEND.0;
+    let top = TITLE_HEIGHT + ROW;
     let height = SIZE.1 - top - BELOW - 6.0;
     let left = room_left(&Axis::new(y.0, y.1, AxisScale::Linear, ""), height);
     let area = Area { left, top, width: SIZE.0 - left - RIGHT, height };
@@ -71,18 +65,16 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
     let mut entry = left;
     for over in [false, true] {
         for (index, orbit) in orbits.iter().enumerate().filter(|(_, orbit)| orbit.over == over) {
-            let (colour, width) = if over { (LINES[index % LINES.len()], OVER_WIDTH) } else { BELOW_LINE };
+            let look = if over { (LINES[index % LINES.len()], OVER) } else { UNDER };
             // Any position outside will do.
             let near =
                 |(x, y): (f64, f64)| (x.clamp(-area.width, 2.0 * area.width), y.clamp(-area.height, 2.0 * area.height));
             let lines = stretches(&orbit.points).into_iter().filter(|stretch| stretch.len() > 1);
             let lines = lines.map(|s| s.into_iter().map(|p| near(area.point(axes, p))).collect()).collect::<Vec<_>>();
-            inner.lines(&lines, colour, width);
+            inner.lines(&lines, look.0, look.1);
             if !orbit.name.is_empty() {
-                let middle = TITLE_HEIGHT + 3.0;
-                panel.segments(&[[(entry, middle), (entry + LEGEND.2, middle)]], colour, width.max(2.0));
-                panel.text((entry + LEGEND.2 + 5.0, middle + 4.0), LEGEND.1, Anchor::Start, &orbit.name);
-                entry += LEGEND.2 + 5.0 + text_width(&orbit.name, LEGEND.1) + 14.0;
+                panel.entry((entry, TITLE_HEIGHT + 3.0), look, &orbit.name);
+                entry += entry_width(&orbit.name);
             }
         }
     }
@@ -91,7 +83,7 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
 }
 
 /// Size of a panel.
-const TRACE_SIZE: (f64, f64) = (420.0, 400.0);
+const TRACE_SIZE: (f64, f64) = (420.0, 384.0);
 /// Room right of the data.
 const TRACE_RIGHT: f64 = 14.0;
 /// Pieces of one colour.
@@ -101,12 +93,12 @@ const WIDTH: f64 = 1.0;
 /// The brightest colour that is seen on white.
 const BRIGHTEST: f64 = 0.92;
 
-/// Draws paths side by side, the same axes for all, from dark (start) to bright (end); a dot marks the start.
+/// Draws paths over each other, or one from dark (start) to bright (end); a dot marks the start.
 ///
 /// # Errors
 /// [`PlotError::Empty`] if nothing can be shown.
 pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
-    let empty = || PlotError::Empty(trace.title.clone());
+    let empty = || PlotError::Empty(trace.y_label.clone());
     let room = |(low, high): (f64, f64)| (low - 0.04 * (high - low), high + 0.04 * (high - low));
     let (x, y) = (window(&trace.paths, |p| p.0).ok_or_else(empty)?, window(&trace.paths, |p| p.1).ok_or_else(empty)?);
     let (x, mut horizontal, kind) = match trace.turn.map(|turn| (turn.low(), turn.high())) {
@@ -115,9 +107,10 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
     };
     let inside = |p: &(f64, f64)| x.0 <= p.0 && p.0 <= x.1 && y.0 <= p.1 && p.1 <= y.1;
     let mut upright = room(y);
-    let height = TRACE_SIZE.1 - TITLE_HEIGHT - BELOW - 6.0;
+    let height = TRACE_SIZE.1 - TOP - BELOW - 6.0;
     let left = room_left(&Axis::new(upright.0, upright.1, AxisScale::Linear, ""), height);
-    let area = Area { left, top: TITLE_HEIGHT, width: TRACE_SIZE.0 - left - TRACE_RIGHT, height };
+    let legend = if trace.paths.len() > 1 { ROW } else { 0.0 };
+    let area = Area { left, top: TOP + legend, width: TRACE_SIZE.0 - left - TRACE_RIGHT, height };
     if trace.equal {
         let per_pixel = f64::max((horizontal.1 - horizontal.0) / area.width, (upright.1 - upright.0) / area.height);
         let widened = |(low, high): (f64, f64), pixels: f64| {
@@ -131,33 +124,45 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
         &Axis::new(upright.0, upright.1, AxisScale::Linear, &trace.y_label),
     );
 
-    let longest = trace.paths.iter().map(|path| path.points.len()).max().unwrap_or(0).max(1);
-    let piece = longest.div_ceil(PIECES).max(2);
-    let mut panels = Vec::new();
-    for path in &trace.paths {
+    let (mut panel, mut inner) = (Panel::new(TRACE_SIZE.0, TRACE_SIZE.1 + legend), Panel::new(area.width, area.height));
+    frame(&mut panel, area, axes, "");
+    let (mut start, mut entry) = (None, left);
+    for (index, path) in trace.paths.iter().enumerate() {
         // Points outside the window form a gap.
         let gap = (f64::NAN, f64::NAN);
         let points: Vec<(f64, f64)> = path.points.iter().map(|p| if inside(p) { *p } else { gap }).collect();
-        let Some(&first) = points.iter().find(|p| fine(p.0) && fine(p.1)) else { continue };
-        let mut inner = Panel::new(area.width, area.height);
-        let mut start = 0;
-        while start + 1 < points.len() {
-            // Pieces share their end points.
-            let end = (start + piece).min(points.len() - 1);
-            let colour = hex(at(VIRIDIS, BRIGHTEST * start as f64 / longest as f64));
-            let lines = stretches(&points[start..=end]).into_iter().filter(|stretch| stretch.len() > 1);
-            let lines = lines.map(|s| s.into_iter().map(|p| area.point(axes, p)).collect()).collect::<Vec<_>>();
-            inner.lines(&lines, &colour, WIDTH);
-            start = end;
+        start = start.or(points.iter().find(|p| fine(p.0) && fine(p.1)).copied());
+        let lines = |points: &[(f64, f64)]| -> Vec<Vec<(f64, f64)>> {
+            let lines = stretches(points).into_iter().filter(|stretch| stretch.len() > 1);
+            lines.map(|s| s.into_iter().map(|p| area.point(axes, p)).collect()).collect()
+        };
+        if trace.paths.len() == 1 {
+            by_time(&points).for_each(|(piece, colour)| inner.lines(&lines(piece), &colour, WIDTH));
+            continue;
         }
-        inner.dots(&[area.point(axes, first)], MARK, 7.0);
-        let title = if path.name.is_empty() { trace.title.clone() } else { format!("{}: {}", trace.title, path.name) };
-        let mut panel = Panel::new(TRACE_SIZE.0, TRACE_SIZE.1);
-        frame(&mut panel, area, axes, &title);
-        panel.inset((area.left, area.top), &inner);
-        panels.push(panel);
+        let look = if index == 0 { UNDER } else { (LINES[index % LINES.len()], OVER) };
+        inner.lines(&lines(&points), look.0, look.1);
+        panel.entry((entry, TOP + 3.0), look, &path.name);
+        entry += entry_width(&path.name);
     }
-    if panels.is_empty() { Err(empty()) } else { Ok(Picture { panels }) }
+    inner.dots(&[area.point(axes, start.ok_or_else(empty)?)], MARK, 7.0);
+    panel.inset((area.left, area.top), &inner);
+    let stays = |part: fn(&(f64, f64)) -> f64| {
+        let mut all = values(&trace.paths, part);
+        let first = all.next();
+        all.all(|x| Some(x) == first)
+    };
+    Ok(Picture { panels: vec![panel], blank: stays(|p| p.0) && stays(|p| p.1) })
+}
+
+/// Pieces of a path, which share their ends, with a colour each.
+fn by_time(points: &[(f64, f64)]) -> impl Iterator<Item = (&[(f64, f64)], String)> {
+    let last = points.len().saturating_sub(1);
+    let piece = points.len().div_ceil(PIECES).max(2);
+    (0..last).step_by(piece).map(move |start| {
+        let colour = hex(at(VIRIDIS, BRIGHTEST * start as f64 / points.len() as f64));
+        (&points[start..=(start + piece).min(last)], colour)
+    })
 }
 
 #[cfg(test)]
@@ -179,7 +184,7 @@ mod tests {
         let pair = |r: f64| vec![circle("learned", 1.01 * r).over(), circle("exact", r)];
         let drawn =
             orbit_picture(&plot(vec![("near".to_string(), pair(6.0)), ("far".to_string(), pair(12.0))])).unwrap();
-        let svg = drawn.to_svg();
+        let svg = drawn.to_svg("");
         assert_eq!(drawn.panels(), 2);
         assert_eq!((svg.matches(">exact</text>").count(), svg.matches(">learned</text>").count()), (2, 2));
         assert_eq!(svg.matches(HOLE).count(), 2);
@@ -194,7 +199,7 @@ mod tests {
         let whole = orbit_picture(&plot(vec![("T".to_string(), vec![circle("", 6.0), away.clone()])])).unwrap();
         away.points.extend([(1e9, -1e9), (f64::NAN, 0.0), (f64::INFINITY, 1.0)]);
         let cut = orbit_picture(&plot(vec![("T".to_string(), vec![circle("", 6.0), away])])).unwrap();
-        let ticks = |picture: &Picture| picture.to_svg().matches("</text>").count();
+        let ticks = |picture: &Picture| picture.to_svg("").matches("</text>").count();
         assert_eq!(ticks(&whole), ticks(&cut));
         let nothing = vec![Series { name: String::new(), points: vec![(f64::NAN, 1.0)], over: false }];
         assert_eq!(orbit_picture(&plot(vec![("T".to_string(), nothing)])), Err(PlotError::Empty("T".to_string())));

@@ -31,6 +31,17 @@ pub(super) fn fitting(text: &str, size: f64, width: f64) -> f64 {
     (size * width / text_width(text, size).max(1.0)).min(size)
 }
 
+/// Size of titles, and width of their bold letters over that of plain ones.
+const TITLE: f64 = 14.0;
+const BOLD: f64 = 1.16;
+/// Size of the texts of a legend, length of its lines.
+const ENTRY: (f64, f64) = (12.5, 22.0);
+
+/// Width of an entry of a legend with the room behind it.
+pub(super) fn entry_width(name: &str) -> f64 {
+    ENTRY.1 + text_width(name, ENTRY.0) + 19.0
+}
+
 /// A drawing and its size.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Panel {
@@ -60,12 +71,20 @@ impl Panel {
             write!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{INK}\"{anchor}>{text}</text>");
     }
 
-    /// A title.
-    pub fn title(&mut self, (x, y): (f64, f64), size: f64, text: &str) {
-        let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
+    /// A title at the top, from a place on if it fits there.
+    pub fn title(&mut self, from: f64, text: &str) {
+        let size = fitting(text, TITLE, (self.width - 16.0) / BOLD);
+        let x = from.min(self.width - 8.0 - BOLD * text_width(text, size)).max(8.0);
+        let (x, y, size, text) = (short(x), short(19.0), short(size), escape(text));
         let style = "font-weight=\"600\"";
         let _ =
             write!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{INK}\" {style}>{text}</text>");
+    }
+
+    /// An entry of a legend: a line and its name.
+    pub fn entry(&mut self, (x, y): (f64, f64), (colour, width): (&str, f64), name: &str) {
+        self.segments(&[[(x, y), (x + ENTRY.1, y)]], colour, width.max(2.0));
+        self.text((x + ENTRY.1 + 5.0, y + 4.0), ENTRY.0, Anchor::Start, name);
     }
 
     /// A text that ends at a point, readable over lines.
@@ -185,6 +204,9 @@ pub(super) fn short(x: f64) -> String {
 
 /// Colours that are distinguishable with any colour vision (Wong 2011), without yellow.
 pub(super) const LINES: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333"];
+/// Colour and width of a line that others are drawn over, and width of these.
+pub(super) const UNDER: (&str, f64) = ("#93C5E8", 4.4);
+pub(super) const OVER: f64 = 1.5;
 /// Colour of highlights: the start of a path, a wrong sign.
 pub(super) const MARK: &str = "#D55E00";
 /// Colour of places without a value.

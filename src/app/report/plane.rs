@@ -1,0 +1,69 @@
+//! Polar coordinates as places in the plane.
+
+use super::{Series, Trace, with_unit};
+
+/// A radius and the angles that go with it, among the coordinates of a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Polar {
+    radius: usize,
+    angle: usize,
+    /// The angle from the axis of spherical coordinates, of which the plane of the equator is seen.
+    axis: Option<usize>,
+    labels: [String; 2],
+}
+
+impl Polar {
+    /// Those that are called `r` and `phi`, or `r` and `theta`, with the unit of every coordinate; all three are spherical coordinates.
+    pub fn of(names: &[String], units: &[String]) -> Option<Self> {
+        let place = |wanted: &str| names.iter().position(|name| name == wanted);
+        let (radius, phi, theta) = (place("r")?, place("phi"), place("theta"));
+        let (angle, axis) = if phi.is_some() { (phi?, theta) } else { (theta?, None) };
+        let unit = units.get(radius).map_or("", String::as_str);
+        let around = if axis.is_some() { "r sin theta" } else { "r" };
+        let labels = ["cos", "sin"].map(|of| with_unit(&format!("{around} {of} {}", names[angle]), unit));
+        Some(Self { radius, angle, axis, labels })
+    }
+
+    /// The place of a position.
+    pub fn place(&self, q: &[f64]) -> (f64, f64) {
+        let r = q[self.radius] * self.axis.map_or(1.0, |axis| q[axis].sin());
+        (r * q[self.angle].cos(), r * q[self.angle].sin())
+    }
+
+    /// Named paths of positions `(samples, n)`.
+    pub fn trace(&self, n: usize, paths: &[(&str, &[f64])]) -> Trace {
+        let [x_label, y_label] = self.labels.clone();
+        let path = |(name, positions): &(&str, &[f64])| Series {
+            points: positions.chunks_exact(n).map(|q| self.place(q)).collect(),
+            ..Series::new(name, &[], &[])
+        };
+        Trace { x_label, y_label, paths: paths.iter().map(path).collect(), equal: true, turn: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn polar_coordinates_are_places_in_the_plane() {
+        let of = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+            let units: Vec<String> =
+                names.iter().map(|name| if name == "r" { "m" } else { "rad" }.to_string()).collect();
+            Polar::of(&names, &units)
+        };
+        let near = |(x, y): (f64, f64), (u, w): (f64, f64)| (x - u).abs() < 1e-15 && (y - w).abs() < 1e-15;
+        let flat = of(&["phi", "r"]).unwrap();
+        assert!(near(flat.place(&[FRAC_PI_2, 2.0]), (0.0, 2.0)));
+        let trace = flat.trace(2, &[("exact", &[0.0, 1.0, FRAC_PI_2, 2.0])]);
+        assert_eq!((trace.x_label.as_str(), trace.paths[0].points[0]), ("r cos phi [m]", (1.0, 0.0)));
+        let solid = of(&["r", "theta", "phi"]).unwrap();
+        assert!(
+            near(solid.place(&[2.0, FRAC_PI_2, 0.0]), (2.0, 0.0)) && near(solid.place(&[2.0, 0.0, 1.0]), (0.0, 0.0))
+        );
+        assert!(near(of(&["r", "theta"]).unwrap().place(&[3.0, 0.0]), (3.0, 0.0)));
+        assert!(of(&["r", "z"]).is_none() && of(&["theta", "phi"]).is_none());
+    }
+}
