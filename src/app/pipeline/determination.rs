@@ -184,10 +184,20 @@ impl Determined {
         self.open(ENERGY).or_else(|| self.apart())
     }
 
+    /// Why the motion leaves the friction of a coordinate open; none if it determines it.
+    pub(crate) fn open_friction(&self, coordinate: &str) -> Option<String> {
+        self.open(&friction_name(coordinate))
+    }
+
+    /// Why nothing is known of what the motion determines; none if it is known.
+    pub(crate) fn unknown(&self) -> Option<String> {
+        self.withheld.as_ref().map(|reason| format!("whether the motion determines it is unknown: {reason}."))
+    }
+
     /// Why a quantity is open.
     fn open(&self, name: &str) -> Option<String> {
-        if let Some(reason) = &self.withheld {
-            return Some(format!("Whether the motion determines it is unknown: {reason}."));
+        if let Some(why) = self.unknown() {
+            return Some(why);
         }
         let quantity = self.determination.iter().find(|quantity| quantity.name == name)?;
         let range = match [quantity.low, quantity.high] {
@@ -196,7 +206,7 @@ impl Determined {
             }
             _ => format!("{name} has no bounds"),
         };
-        (quantity.determined == NOT).then(|| format!("The motion does not determine it: {range}."))
+        (quantity.determined == NOT).then(|| format!("the motion does not determine it: {range}."))
     }
 
     /// Share of the held-out states that the learned ones do not surround, if it is most of them.
@@ -327,6 +337,11 @@ fn mass_name(a: &str, b: &str) -> String {
     format!("mean M[{a},{b}]")
 }
 
+/// Name of the friction of a coordinate in the table.
+fn friction_name(coordinate: &str) -> String {
+    format!("friction of {coordinate}")
+}
+
 fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
     let n = names.len();
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
@@ -340,7 +355,7 @@ fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
     let friction = names
         .iter()
         .zip(&found.friction)
-        .map(|(name, estimate)| Quantity::new(format!("friction of {name}"), estimate, estimate.value.abs(), true));
+        .map(|(name, estimate)| Quantity::new(friction_name(name), estimate, estimate.value.abs(), true));
     let mut mass: Vec<Quantity> = mass.collect();
     if let Some(unit) = mass.first_mut().filter(|_| !found.absolute) {
         unit.determined = UNIT;
@@ -375,5 +390,6 @@ mod tests {
         assert!(energy.open_potential().is_some());
         let nothing = Determined::under_constraints();
         assert!(nothing.open_mass(["x", "x"]).is_some() && nothing.open_potential().is_some());
+        assert!(nothing.open_friction("x").is_some() && nothing.unknown().is_some());
     }
 }

@@ -247,8 +247,9 @@ impl Picturing<'_> {
             let (learned, exact) = (grid(pair.learned).map(|f| pair.factor * f), pair.exact.map(grid));
             let [a, b] = [i, j].map(|i| self.names[i].as_str());
             let quantity = format!("F[{a},{b}]");
+            let open = self.determined.and_then(Determined::unknown);
             let about = format!("The gyroscopic (magnetic) field {quantity} over the coordinates");
-            self.map([quantity, about, format!("gyroscopic_{a}_{b}")], learned, exact, None)
+            self.map([quantity, about, format!("gyroscopic_{a}_{b}")], learned, exact, open)
         });
         drawn.collect()
     }
@@ -295,8 +296,10 @@ impl Picturing<'_> {
             };
             let name = &self.names[i];
             let about = format!("The friction of {name}: force \u{2212}dD/dv over the velocity");
-            let caption = sentences(&["The other velocities are 0, the coordinates in the middle.", &self.unit]);
-            let plot = lines_over(&self.labels[n + i], "force", lines);
+            let open = self.determined.and_then(|determined| determined.open_friction(name));
+            let why = open.as_ref().map_or(String::new(), |why| format!("Grey: {why}"));
+            let caption = sentences(&["The other velocities are 0, the coordinates in the middle.", &why, &self.unit]);
+            let plot = LinePlot { open: open.is_some(), ..lines_over(&self.labels[n + i], "force", lines) };
             figure(&format!("friction_{}.svg", file_part(name)), about, line_plot(&plot), caption)
         });
         drawn.collect()

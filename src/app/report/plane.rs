@@ -9,25 +9,31 @@ pub(crate) struct Polar {
     angle: usize,
     /// The angle from the axis of spherical coordinates, of which the plane of the equator is seen.
     axis: Option<usize>,
+    /// `true` for an angle from the vertical downwards, as the interactive page takes it.
+    hangs: bool,
     labels: [String; 2],
 }
 
 impl Polar {
-    /// Those that are called `r` and `phi`, or `r` and `theta`, with the unit of every coordinate; all three are spherical coordinates.
+    /// Those that are called `r` and `phi`, or `r` and `theta`, this from the vertical downwards, with the unit of every coordinate; all three
+    /// are spherical coordinates.
     pub fn of(names: &[String], units: &[String]) -> Option<Self> {
         let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let (radius, phi, theta) = (place("r")?, place("phi"), place("theta"));
         let (angle, axis) = if phi.is_some() { (phi?, theta) } else { (theta?, None) };
         let unit = units.get(radius).map_or("", String::as_str);
         let around = if axis.is_some() { "r sin theta" } else { "r" };
-        let labels = ["cos", "sin"].map(|of| with_unit(&format!("{around} {of} {}", names[angle]), unit));
-        Some(Self { radius, angle, axis, labels })
+        let (hangs, name) = (phi.is_none(), &names[angle]);
+        let [cosine, sine] = ["cos", "sin"].map(|of| format!("{around} {of} {name}"));
+        let labels = if hangs { [sine, format!("\u{2212}{cosine}")] } else { [cosine, sine] };
+        Some(Self { radius, angle, axis, hangs, labels: labels.map(|label| with_unit(&label, unit)) })
     }
 
     /// The place of a position.
     pub fn place(&self, q: &[f64]) -> (f64, f64) {
         let r = q[self.radius] * self.axis.map_or(1.0, |axis| q[axis].sin());
-        (r * q[self.angle].cos(), r * q[self.angle].sin())
+        let (sine, cosine) = q[self.angle].sin_cos();
+        if self.hangs { (r * sine, -r * cosine) } else { (r * cosine, r * sine) }
     }
 
     /// Named paths of positions `(samples, n)`.
@@ -63,7 +69,8 @@ mod tests {
         assert!(
             near(solid.place(&[2.0, FRAC_PI_2, 0.0]), (2.0, 0.0)) && near(solid.place(&[2.0, 0.0, 1.0]), (0.0, 0.0))
         );
-        assert!(near(of(&["r", "theta"]).unwrap().place(&[3.0, 0.0]), (3.0, 0.0)));
+        let hanging = of(&["r", "theta"]).unwrap();
+        assert!(near(hanging.place(&[3.0, 0.0]), (0.0, -3.0)) && hanging.labels[1] == "\u{2212}r cos theta [m]");
         assert!(of(&["r", "z"]).is_none() && of(&["theta", "phi"]).is_none());
     }
 }

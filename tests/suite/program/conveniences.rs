@@ -206,7 +206,7 @@ fn unlike_units_are_not_drawn_on_one_axis() {
     let motion = ["rollout", "--system", "spring-pendulum", "--state", "1.2,0.5,0,0", "--t-end", "1", "--dt", "0.1"];
     lnn(&[&motion[..], &["--out", &csv, "--plot", &svg]].concat()).succeeded();
     let drawn = fs::read_to_string(&svg).unwrap();
-    for label in [">r [m]<", ">theta [rad]<", ">r cos theta [m]<"] {
+    for label in [">r [m]<", ">theta [rad]<", ">r sin theta [m]<"] {
         assert_eq!(drawn.matches(label).count(), 1, "{label}");
     }
     // Pendula share a unit, and a panel.

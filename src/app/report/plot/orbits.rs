@@ -101,11 +101,10 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
     let empty = || PlotError::Empty(trace.y_label.clone());
     let room = |(low, high): (f64, f64)| (low - 0.04 * (high - low), high + 0.04 * (high - low));
     let (x, y) = (window(&trace.paths, |p| p.0).ok_or_else(empty)?, window(&trace.paths, |p| p.1).ok_or_else(empty)?);
-    let (x, mut horizontal, kind) = match trace.turn.map(|turn| (turn.low(), turn.high())) {
-        Some(turn) => (turn, turn, AxisScale::Angle),
-        None => (x, room(x), AxisScale::Linear),
+    let (mut horizontal, kind) = match trace.turn {
+        Some(turn) => ((turn.low(), turn.high()), AxisScale::Angle),
+        None => (room(x), AxisScale::Linear),
     };
-    let inside = |p: &(f64, f64)| x.0 <= p.0 && p.0 <= x.1 && y.0 <= p.1 && p.1 <= y.1;
     let mut upright = room(y);
     let height = TRACE_SIZE.1 - TOP - BELOW - 6.0;
     let left = room_left(&Axis::new(upright.0, upright.1, AxisScale::Linear, ""), height);
@@ -124,6 +123,8 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
         &Axis::new(upright.0, upright.1, AxisScale::Linear, &trace.y_label),
     );
 
+    let within = |range: (f64, f64), at: f64| range.0 <= at && at <= range.1;
+    let inside = |p: &(f64, f64)| within(horizontal, p.0) && within(upright, p.1);
     let (mut panel, mut inner) = (Panel::new(TRACE_SIZE.0, TRACE_SIZE.1 + legend), Panel::new(area.width, area.height));
     frame(&mut panel, area, axes, "");
     let (mut start, mut entry) = (None, left);
