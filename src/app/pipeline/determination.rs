@@ -172,16 +172,14 @@ impl Determined {
 
     /// Why the motion leaves an element of the mass matrix open; none if it determines it.
     pub(crate) fn open_mass(&self, [a, b]: [&str; 2]) -> Option<String> {
-        self.open(&mass_name(a, b)).or_else(|| {
-            let apart = self.groups.iter().filter(|group| !group.unit_known);
-            let mut apart = apart.filter(|group| [a, b].iter().any(|name| group.coordinates.iter().any(|c| c == name)));
-            apart.next().and_then(|_| self.apart())
-        })
+        let free = |group: &Group| !group.unit_known && group.coordinates.iter().any(|name| name == a || name == b);
+        let apart = if self.groups.iter().any(free) { self.apart() } else { None };
+        apart.or_else(|| self.open(&mass_name(a, b)))
     }
 
     /// Why the motion leaves the potential open; none if it determines it, with the energy.
     pub(crate) fn open_potential(&self) -> Option<String> {
-        self.open(ENERGY).or_else(|| self.apart())
+        self.apart().or_else(|| self.open(ENERGY))
     }
 
     /// Why the motion leaves the friction of a coordinate open; none if it determines it.
@@ -196,17 +194,17 @@ impl Determined {
 
     /// Why a quantity is open.
     fn open(&self, name: &str) -> Option<String> {
-        if let Some(why) = self.unknown() {
-            return Some(why);
-        }
-        let quantity = self.determination.iter().find(|quantity| quantity.name == name)?;
-        let range = match [quantity.low, quantity.high] {
-            ends if ends.iter().all(|end| end.is_finite()) => {
-                format!("the range of {name} is {}", ends.map(number).join(" to "))
-            }
-            _ => format!("{name} has no bounds"),
+        let wide = || {
+            let quantity = self.determination.iter().find(|q| q.name == name && q.determined == NOT)?;
+            let range = match [quantity.low, quantity.high] {
+                ends if ends.iter().all(|end| end.is_finite()) => {
+                    format!("the range of {name} is {}", ends.map(number).join(" to "))
+                }
+                _ => format!("{name} has no bounds"),
+            };
+            Some(format!("the motion does not determine it: {range}."))
         };
-        (quantity.determined == NOT).then(|| format!("the motion does not determine it: {range}."))
+        self.unknown().or_else(wide)
     }
 
     /// Share of the held-out states that the learned ones do not surround, if it is most of them.

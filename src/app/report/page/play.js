@@ -201,7 +201,7 @@ function play(data) {
       if (!(high - low > room)) [low, high] = [low - room, high + room];
       const up = (y) => top + tall - 6 - ((y - low) / (high - low)) * (tall - 30);
       pen.textAlign = "right";
-      ticks(low, high, tall / 45).forEach(([at, text]) => {
+      ticks(low, high, tall / 36).forEach(([at, text]) => {
         rule(pen, colour("line"), [left, up(at)], [right, up(at)]);
         pen.fillText(text, left - 6, up(at) + 4);
       });
