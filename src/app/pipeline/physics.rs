@@ -254,8 +254,8 @@ impl Physics {
         };
         let at_rest = exact.map(|exact| mass_matrix_error(exact, network, &q));
         let (factor, unit) = match &at_rest {
-            // Of a black box on a mass shell only a comparison at rest knows the factor there.
-            Some(at_rest) => (found.unwrap_or(at_rest.factor), String::new()),
+            // The curvature takes the factor of the whole Lagrangian, which a black box on a mass shell has only at rest.
+            Some(at_rest) => (found.filter(|_| metric).unwrap_or(at_rest.factor), String::new()),
             None if metric => (1.0, String::new()),
             None if subject.is_forced() => (1.0, "In SI units, which the known forces fix.".to_string()),
             None => {
