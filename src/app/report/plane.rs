@@ -20,7 +20,7 @@ impl Polar {
     pub fn of(names: &[String], units: &[String]) -> Option<Self> {
         let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let (radius, phi, theta) = (place("r")?, place("phi"), place("theta"));
-        let (angle, axis) = if phi.is_some() { (phi?, theta) } else { (theta?, None) };
+        let (angle, axis) = phi.map_or_else(|| Some((theta?, None)), |phi| Some((phi, theta)))?;
         let unit = units.get(radius).map_or("", String::as_str);
         let around = if axis.is_some() { "r sin theta" } else { "r" };
         let (hangs, name) = (phi.is_none(), &names[angle]);
