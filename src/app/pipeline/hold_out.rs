@@ -16,9 +16,7 @@ use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::recording::Smoothed;
-use crate::report::{
-    Figure, LinePlot, Polar, Series, Turn, figure, line_plot, median_of, trace_plot, with_unit,
-};
+use crate::report::{Figure, LinePlot, Polar, Series, Turn, figure, line_plot, median_of, trace_plot, with_unit};
 use crate::rollout::SampledForce;
 use serde::Serialize;
 use std::f64::consts::TAU;

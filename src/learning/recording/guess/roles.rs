@@ -24,6 +24,10 @@ const LIKE: f64 = 0.03;
 const FIXED: f64 = 0.03;
 const OF_DISTANCE: f64 = 0.05;
 
+/// The same beside a velocity that was found.
+const BESIDE: f64 = 0.9;
+const BESIDE_LIKE: f64 = 0.2;
+
 /// What a column is.
 #[derive(Clone, Debug, PartialEq)]
 enum Role {
@@ -193,7 +197,12 @@ impl Roles<'_> {
 
     /// Finds velocities and accelerations among what is left.
     fn find_derivatives(&mut self) {
-        for order in [2, 1] {
+        // Where one velocity was found the others are likely to be there, also behind more noise.
+        for (order, [least, like]) in [(2, [UNNAMED, LIKE]), (1, [UNNAMED, LIKE]), (1, [BESIDE, BESIDE_LIKE])] {
+            let found = |(role, _): &(Role, String)| matches!(role, Role::Derivative(1, _));
+            if least == BESIDE && !self.roles.iter().flatten().any(found) {
+                continue;
+            }
             let says = if order == 1 { is_velocity } else { is_acceleration };
             for k in self.open() {
                 let name = &self.table.names[k];
@@ -203,14 +212,15 @@ impl Roles<'_> {
                 }
                 let sources = self.open().into_iter().filter(|&j| {
                     let other = &self.table.names[j];
-                    j != k && !is_velocity(other) && !is_acceleration(other)
+                    let is_free = self.of(&Role::Derivative(order, j)).is_empty();
+                    j != k && is_free && !is_velocity(other) && !is_acceleration(other)
                 });
                 let of = |j: usize| {
                     let (correlation, factor) = self.derivative(j, k, order)?;
                     let back = self
                         .derivative(k, j, 1)
                         .is_some_and(|(c, f)| c.abs() > UNNAMED && (f.abs() - 1.0).abs() < 3.0 * LIKE);
-                    let alike = correlation > UNNAMED && (factor - 1.0).abs() < LIKE && !back;
+                    let alike = correlation > least && (factor - 1.0).abs() < like && !back;
                     ((named && correlation > NAMED) || alike).then_some((j, correlation))
                 };
                 let best = sources.filter_map(of).max_by(|a, b| a.1.total_cmp(&b.1));
