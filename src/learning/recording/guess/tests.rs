@@ -93,7 +93,7 @@ fn a_circle_has_two_coordinates() {
     // Without names, a derivative is one that no other reading explains.
     let text = rows("0,1,0", 700, |t| vec![t + 0.01, (3.0 * t).cos(), -3.0 * (3.0 * t).sin()]);
     let columns = of(&text, &Columns::default()).unwrap().columns;
-    assert_eq!((columns.coords, columns.velocity), (list(&["2"]), list(&["3"])));
+    assert_eq!((columns.coords, columns.velocity), (list(&["c2"]), list(&["c3"])));
 }
 
 #[test]
