@@ -55,8 +55,11 @@ fn optional(argument: clap::Arg) -> clap::Arg {
     }
 }
 
-/// Ends of names of files of recorded motion.
-const DATA: [&str; 5] = ["csv", "gz", "npy", "npz", "xlsx"];
+/// `true` for a file that is neither a model nor a system.
+fn is_data(path: &Path) -> bool {
+    let ends = |end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
+    path.is_file() && !ends("toml") && !ends("safetensors")
+}
 
 /// The table of a file.
 #[derive(Serialize, Deserialize)]
@@ -71,7 +74,7 @@ struct Table {
 /// A usage error for arguments, a data error for data or a model that cannot be used, or a file that cannot be written.
 pub fn run(args: &Args) -> Result<(), CliError> {
     if let ([one], []) = (args.recording.data.as_slice(), args.recording.coords.as_slice())
-        && !one.extension().is_some_and(|end| DATA.iter().any(|known| end.eq_ignore_ascii_case(known)))
+        && !is_data(one)
     {
         return examined(&one.to_string_lossy(), args);
     }

@@ -50,7 +50,7 @@ fn a_page_shows_what_was_fitted_and_stays() {
     // Three pictures for each of two coordinates and one of the correlations; the verdict that was printed.
     assert_eq!(html.matches("<figure").count(), 7);
     let verdict = printed.stdout.lines().find(|line| line.starts_with("The model fits")).unwrap();
-    assert!(html.contains(verdict) && html.contains("value [rad]"), "{verdict}");
+    assert!(html.contains(verdict) && html.contains("theta1 [rad]"), "{verdict}");
     lnn(&arguments).refused(1, &["constants.html", "--overwrite"]);
     assert_eq!(lnn(&[&arguments[..], &["--overwrite", "--json"]].concat()).code, Some(0));
 }

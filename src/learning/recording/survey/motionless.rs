@@ -65,11 +65,20 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
 }
 
 /// `true` if coordinate `i` moves uniformly, or not at all, in every trajectory: it leaves a straight line over time by no more than its
-/// noise, or than rounding.
+/// noise, or than the rounding of its digits.
 pub fn is_uniform(recording: &Recording, i: usize, smoothing: &Smoothing) -> bool {
     let noise = smoothing.coordinates[i].noise;
+    let noise = if noise.resolved { noise.sigma.max(rounding(recording, i)) } else { rounding(recording, i) };
     let beside = scatter(recording, i, true);
-    (noise.resolved && beside <= MOVES * noise.sigma) || beside <= ROUNDING * scatter(recording, i, false)
+    beside <= MOVES * noise || beside <= ROUNDING * scatter(recording, i, false)
+}
+
+/// Standard deviation of the rounding of coordinate `i` to the digits after the point that all its values have; 0 of more than nine digits.
+fn rounding(recording: &Recording, i: usize) -> f64 {
+    let values = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(recording.n()));
+    let is_whole = |scale: f64| values().all(|x| (x * scale - (x * scale).round()).abs() <= 1e-9 * (x * scale).abs());
+    let step = (0..=9).map(|digits| 10f64.powi(-digits)).find(|step| is_whole(step.recip()));
+    step.map_or(0.0, |step| step / 12f64.sqrt())
 }
 
 /// Root mean square deviation of coordinate `i` from the mean of each trajectory or, `sloped`, from its straight line over time.
@@ -174,6 +183,9 @@ mod tests {
                 [|t| 0.01 * t * t, |t| (3.0 * t).sin(), |t| 2.0 * t + 0.02 * (20.0 * t).cos()];
             assert!(accelerated.iter().all(|motion| !uniform(*motion, sigma)), "{sigma}");
         }
+        // Rounding to three digits, whose pattern repeats.
+        let rounded = |motion: fn(f64) -> f64| both(move |t| (1e3 * motion(t)).round() / 1e3, 0.0).1;
+        assert!(rounded(|t| 0.3 + 0.71 * t) && !rounded(|t| 0.3 + 0.71 * t + 0.01 * t * t));
         // Large noise hides no motion that is larger, and all that is much smaller.
         assert!(!uniform(|t| (3.0 * t).sin(), 0.5) && uniform(|t| 1e-5 * t * t, 1e-3));
     }
