@@ -3,6 +3,7 @@
 
 use super::derivatives::{StateTerms, evaluate};
 use super::equations::Friction;
+use super::formula_forces::{FormulaForces, GivenForces};
 use super::recursion::Recursive;
 use super::system::{Range, Size, System};
 use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, unconstrained, visit_lagrangian};
@@ -60,6 +61,11 @@ pub enum SystemError {
         /// The text given.
         found: String,
     },
+    /// Forces that depend on the time, which a state does not tell.
+    Timed {
+        /// The system.
+        system: String,
+    },
     /// Constraints that contradict each other or leave no motion.
     Constraints {
         /// The system.
@@ -91,6 +97,10 @@ impl core::fmt::Display for SystemError {
             Self::Value { system, symbol, demand, found } => {
                 write!(f, "parameter `{symbol}` of {system} must be {demand}, found `{found}`")
             }
+            Self::Timed { system } => write!(
+                f,
+                "{system}: its forces depend on the time t, which only a motion tells: roll it out, or identify its constants"
+            ),
             Self::Constraints { system, problem } => write!(f, "{system}: {problem}"),
             Self::State { system, expected, found } => {
                 write!(f, "{system}: expected {expected} coordinates and velocities, found {found}")
@@ -157,8 +167,29 @@ impl<S: Scalar> SystemInstance<S> {
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
     /// [`Dd`](crate::scalar::Dd).
+    /// [`SystemError::Timed`] for forces that depend on the time: see [`build_driven`](Self::build_driven).
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        self.constrain(unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?)
+        match self.build_driven()? {
+            (model, None) => Ok(model),
+            _ => Err(SystemError::Timed { system: self.system.name.to_string() }),
+        }
+    }
+    /// The model without those forces of its description that depend on the time, and these.
+    ///
+    /// # Errors
+    /// As of [`build`](Self::build).
+    pub(crate) fn build_driven(&self) -> Result<(Box<dyn EulerLagrange<S>>, Option<GivenForces<S>>), SystemError> {
+        let model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
+        let Some(forces) = self.forces() else { return Ok((self.constrain(model)?, None)) };
+        let given = GivenForces::new(forces.clone(), self.parameters.clone());
+        match forces.is_timed() {
+            true => Ok((self.constrain(model)?, Some(given))),
+            false => Ok((self.constrain(Box::new(WithForces::new(model, given)))?, None)),
+        }
+    }
+    /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
+    pub(super) fn forces(&self) -> Option<&FormulaForces> {
+        self.system.described.as_ref()?.forces.as_ref()
     }
     /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.
     pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {
@@ -244,6 +275,9 @@ impl<S: Scalar> SystemInstance<S> {
     #[doc(hidden)]
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
+        if self.forces().is_some() {
+            return Ok(self.build()?.acceleration(q, v).unwrap_or_else(|_| vec![S::nan(); q.len()]));
+        }
         if self.constraints().is_some() {
             let (system, problem) =
                 (self.system.name.to_string(), "the acceleration under constraints has no closed form");

@@ -3,7 +3,7 @@
 //! With the residual `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q` a change of anything that it depends on, `a` held fixed,
 //! changes the acceleration by `-M^-1 dr`.
 
-use super::linearization::{ProgramSlopes, Rate, SlopePrograms, add};
+use super::linearization::{ProgramSlopes, Rate, SlopePrograms, SparseRows, add};
 use super::programs::derivatives;
 use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Rayleigh, Request, Slopes, SystemInstance};
 use crate::scalar::Real;
@@ -18,7 +18,9 @@ use alloc::vec::Vec;
 pub struct Equations {
     /// Number of coordinates.
     pub n: usize,
-    /// Of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv`, `(n)`.
+    /// `true` if forces depend on the time `t`, a number of each state that both programs then take last.
+    pub timed: bool,
+    /// Of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv + Q`, `(n)`.
     pub motion: Arc<Program<f64>>,
     /// Of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
     pub slopes: Arc<Program<f64>>,
@@ -36,6 +38,9 @@ impl Equations {
         if let Some(dissipation) = instance.dissipation() {
             parts.push(EquationPart::record(dissipation, count, true)?);
         }
+        if let Some(forces) = instance.forces() {
+            parts.push(EquationPart::Forces { programs: forces.programs()?, timed: forces.is_timed() });
+        }
         Self::of(n, count, &parts, (chosen, &[])).map(Some)
     }
 
@@ -50,24 +55,36 @@ impl Equations {
         parts: &[EquationPart],
         (chosen, terms): (&[usize], &[EquationPart]),
     ) -> Result<Self, TapeError> {
-        let motion = Program::record_within(ROWS, (2 * n, count), |x, p| {
+        let timed = parts.iter().any(|part| matches!(part, EquationPart::Forces { timed: true, .. }));
+        let time = usize::from(timed);
+        let motion = Program::record_within(ROWS, (2 * n + time, count), |x, p| {
             let zero = Tracer::zero();
+            let (state, time) = x.split_at(2 * n);
             let (mut mass_matrix, mut rest) = (vec![zero; n * n], vec![zero; n]);
-            for EquationPart { value, friction, .. } in parts {
-                if *friction {
-                    let first = value.derivatives(x, p, None)?.first;
-                    rest.iter_mut().zip(&first[n..]).for_each(|(rest, &force)| *rest -= force);
-                    continue;
-                }
-                let found = derivatives(value, x, p, Request::ACCELERATION)?;
-                for (rest, (g, c)) in rest.iter_mut().zip(found.dl_dq.into_iter().zip(found.coriolis)) {
-                    *rest += g - c;
-                }
-                for (i, row) in found.mass_matrix.into_iter().enumerate() {
-                    for (j, m) in row {
-                        mass_matrix[i * n + j] += m;
-                        if j < i {
-                            mass_matrix[j * n + i] += m;
+            for part in parts {
+                match part {
+                    EquationPart::Dissipation { value, .. } => {
+                        let first = value.derivatives(state, p, None)?.first;
+                        rest.iter_mut().zip(&first[n..]).for_each(|(rest, &force)| *rest -= force);
+                    }
+                    EquationPart::Forces { programs, timed } => {
+                        let inputs = [state, p, if *timed { time } else { &[] }].concat();
+                        for (i, program) in programs {
+                            rest[*i] += program.interpret(&inputs, &[]).ok()?[0];
+                        }
+                    }
+                    EquationPart::Lagrangian { value, .. } => {
+                        let found = derivatives(value, state, p, Request::ACCELERATION)?;
+                        for (rest, (g, c)) in rest.iter_mut().zip(found.dl_dq.into_iter().zip(found.coriolis)) {
+                            *rest += g - c;
+                        }
+                        for (i, row) in found.mass_matrix.into_iter().enumerate() {
+                            for (j, m) in row {
+                                mass_matrix[i * n + j] += m;
+                                if j < i {
+                                    mass_matrix[j * n + i] += m;
+                                }
+                            }
                         }
                     }
                 }
@@ -75,32 +92,54 @@ impl Equations {
             mass_matrix.extend(rest);
             Some(mass_matrix)
         })?;
-        // The residual r is less the equations f of the rates.
-        let slopes = Program::record_within(ROWS, (3 * n, count), |x, p| {
+        // The residual r is less the equations f.
+        let slopes = Program::record_within(ROWS, (3 * n + time, count), |x, p| {
             let mut rows = vec![BTreeMap::new(); n];
+            let (x, time) = x.split_at(3 * n);
             for part in parts {
-                for (row, own) in rows.iter_mut().zip(part.rate.slopes(x, p, chosen)?) {
+                for (row, own) in rows.iter_mut().zip(part.slopes((x, time), p, chosen)?) {
                     own.into_iter().for_each(|(column, f)| add(row, column, -f));
                 }
             }
             let width = 2 * n + chosen.len();
             for (k, term) in terms.iter().enumerate() {
-                let column = term.rate.equations(x, p)?;
+                let (EquationPart::Lagrangian { rate, .. } | EquationPart::Dissipation { rate, .. }) = term else {
+                    continue;
+                };
+                let column = rate.equations(x, p)?;
                 rows.iter_mut().zip(column).for_each(|(row, f)| add(row, width + k, -f));
             }
             let element = |row: &BTreeMap<_, _>, column| row.get(&column).copied().unwrap_or_else(Tracer::zero);
             Some(rows.iter().flat_map(|row| (0..width + terms.len()).map(move |column| element(row, column))).collect())
         })?;
-        Ok(Self { n, motion: Arc::new(motion), slopes: Arc::new(slopes) })
+        Ok(Self { n, timed, motion: Arc::new(motion), slopes: Arc::new(slopes) })
     }
 }
 
-/// A recorded function of state and parameters, a part of the Lagrangian or of the dissipation function, and its rate.
+/// A part of the equations of motion, recorded.
 #[derive(Debug)]
-pub struct EquationPart {
-    value: Program<f64>,
-    rate: Rate<f64>,
-    friction: bool,
+pub enum EquationPart {
+    /// A part of the Lagrangian, of state and parameters, and its rate.
+    Lagrangian {
+        /// The value.
+        value: Program<f64>,
+        /// Its rate.
+        rate: Rate<f64>,
+    },
+    /// A part of the dissipation function.
+    Dissipation {
+        /// The value.
+        value: Program<f64>,
+        /// Its rate.
+        rate: Rate<f64>,
+    },
+    /// Generalized forces, functions of state, parameters and, if they are `timed`, of the time; with their coordinates.
+    Forces {
+        /// Coordinates, and their forces.
+        programs: Vec<(usize, Program<f64>)>,
+        /// `true` if the programs take the time.
+        timed: bool,
+    },
 }
 
 impl EquationPart {
@@ -113,8 +152,29 @@ impl EquationPart {
     }
 
     fn of(value: Program<f64>, friction: bool) -> Result<Self, TapeError> {
-        let rate = if friction { Rate::of_dissipation(&value) } else { Rate::of_lagrangian(&value) };
-        Ok(Self { rate: rate?, value, friction })
+        Ok(match friction {
+            true => Self::Dissipation { rate: Rate::of_dissipation(&value)?, value },
+            false => Self::Lagrangian { rate: Rate::of_lagrangian(&value)?, value },
+        })
+    }
+
+    /// Derivatives of the equations `f` by state and chosen parameters, what is not zero of each row; `x` holds `q`, `v`, `a`.
+    fn slopes<R: Real>(&self, (x, time): (&[R], &[R]), p: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
+        match self {
+            Self::Lagrangian { rate, .. } | Self::Dissipation { rate, .. } => rate.slopes(x, p, chosen),
+            Self::Forces { programs, timed } => {
+                let n = x.len() / 3;
+                let inputs = [&x[..2 * n], p, if *timed { time } else { &[] }].concat();
+                let mut rows = vec![BTreeMap::new(); n];
+                for (i, program) in programs {
+                    let first = program.derivatives(&inputs, &[], None)?.first;
+                    let places = (0..2 * n).chain(chosen.iter().map(|k| 2 * n + k)).enumerate();
+                    let elements = places.map(|(column, place)| (column, first[place]));
+                    rows[*i].extend(elements.filter(|(_, x)| !x.is_exact_zero()));
+                }
+                Some(rows)
+            }
+        }
     }
 }
 

@@ -14,6 +14,7 @@ mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
+mod formula_forces;
 #[cfg(feature = "rollout")]
 mod groups;
 mod linearization;
@@ -74,6 +75,8 @@ pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
 pub use linearization::{Gradient, Linearization, Linearizer};
+#[doc(hidden)]
+pub use formula_forces::GivenForces;
 #[doc(hidden)]
 pub use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;

@@ -144,6 +144,7 @@ fn asked(problem: &Problem<'_>, x: &[f64], motion: &Smoothed) -> Vec<f64> {
     let mut scratch = vec![0.0; LANES * n];
     for first in (0..force.len()).step_by(LANES * n) {
         let range = first..(first + LANES * n).min(force.len());
+        follower.at_times(motion.times[first / n..range.end / n].iter().copied());
         follower.accelerate(
             &values,
             (&motion.q[range.clone()], &motion.v[range.clone()]),

@@ -90,6 +90,8 @@ pub(super) struct Follower<'a> {
     rest: Vec<f64>,
     by_state: Vec<f64>,
     force: Vec<f64>,
+    /// Times of the states, if the equations depend on it.
+    time: Vec<f64>,
     row: Vec<f64>,
 }
 
@@ -106,7 +108,25 @@ impl<'a> Follower<'a> {
             rest: Vec::new(),
             by_state: Vec::new(),
             force: Vec::new(),
+            time: Vec::new(),
             row: Vec::new(),
+        }
+    }
+
+    /// Sets the times of the states that are evaluated next, `(lanes)`; without them states are spread over the recording.
+    pub fn at_times(&mut self, times: impl IntoIterator<Item = f64>) {
+        if self.course.equations.timed {
+            self.time.clear();
+            self.time.extend(times);
+        }
+    }
+
+    /// Spreads states over the recording if their times are not known.
+    fn spread_times(&mut self, lanes: usize) {
+        if self.course.equations.timed && self.time.len() != lanes {
+            let times = || self.course.recording.tracks.iter().flat_map(|track| &track.times);
+            let (low, high) = times().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+            self.time = (0..lanes).map(|k| low + (high - low) * (k as f64 + 0.5) / lanes as f64).collect();
         }
     }
 
@@ -122,7 +142,10 @@ impl<'a> Follower<'a> {
         self.mass.resize(lanes * n * n, 0.0);
         self.rest.resize(lanes * n, 0.0);
         // Shapes are those of the recorded program.
-        let _ = self.motion.evaluate(lanes, &[q, v], values, &mut [&mut self.mass, &mut self.rest]);
+        self.spread_times(lanes);
+        let inputs: [&[f64]; 3] = [q, v, &self.time];
+        let inputs = &inputs[..2 + usize::from(self.course.equations.timed)];
+        let _ = self.motion.evaluate(lanes, inputs, values, &mut [&mut self.mass, &mut self.rest]);
         if !force.is_empty() {
             self.rest.iter_mut().zip(force).for_each(|(rest, force)| *rest += force);
         }
@@ -145,7 +168,10 @@ impl<'a> Follower<'a> {
     pub fn force_slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
         let n = self.course.equations.n;
         self.by_state.resize(q.len() * (2 * n + self.course.chosen), 0.0);
-        let _ = self.slopes.evaluate(q.len() / n, &[q, v, a], values, &mut [&mut self.by_state]);
+        self.spread_times(q.len() / n);
+        let inputs: [&[f64]; 4] = [q, v, a, &self.time];
+        let inputs = &inputs[..3 + usize::from(self.course.equations.timed)];
+        let _ = self.slopes.evaluate(q.len() / n, inputs, values, &mut [&mut self.by_state]);
         &self.by_state
     }
 
@@ -230,6 +256,11 @@ impl<'a> Follower<'a> {
         let track = |segment: &Segment| -> &RecordedTrajectory { &course.recording.tracks[segment.track] };
         let forced = segments.iter().any(|segment| !track(segment).force.is_empty());
         self.force = vec![0.0; if forced { lanes * n } else { 0 }];
+        let ends = |segment: &&Segment, sample: usize| {
+            let at = segment.first + sample.min(segment.samples - 1);
+            (track(segment).times[at.saturating_sub(1)], track(segment).times[at])
+        };
+        self.at_times(segments.iter().map(|segment| track(segment).times[segment.first]));
         visit(self, 0, &now);
         for sample in 1..longest {
             let interval = |segment: &&Segment| {
@@ -243,33 +274,38 @@ impl<'a> Follower<'a> {
             let steps = ((course.substeps as f64 * most / course.step - 0.5).ceil() as usize).max(course.substeps);
             let h: Vec<f64> = intervals.iter().map(|interval| interval / steps as f64).collect();
             for step in 0..steps {
-                self.advance((values, columns), (&h, &mut now), &mut scratch, |share, force| {
+                self.advance((values, columns), (&h, &mut now), &mut scratch, |share, force, time| {
                     let x = (step as f64 + share) / steps as f64;
+                    for (segment, time) in segments.iter().zip(time) {
+                        let (before, after) = ends(segment, sample);
+                        *time = before + x * (after - before);
+                    }
                     for (segment, into) in segments.iter().zip(force.chunks_exact_mut(n)) {
                         let at = segment.first + sample.min(segment.samples - 1);
                         forces(track(segment), course.between, (at, x), into);
                     }
                 });
             }
+            self.at_times(segments.iter().map(|segment| ends(segment, sample).1));
             visit(self, sample, &now);
         }
     }
 
-    /// A step of Runge and Kutta's method by `h` of each lane; `push` fills in the known forces at a share of the step.
+    /// A step of Runge and Kutta's method by `h` of each lane; `push` fills in the known forces and the times at a share of the step.
     fn advance(
         &mut self,
         (values, columns): (&[f64], usize),
         (h, now): (&[f64], &mut State),
         Scratch { stage, rates }: &mut Scratch,
-        push: impl Fn(f64, &mut [f64]),
+        push: impl Fn(f64, &mut [f64], &mut [f64]),
     ) {
         let n = self.course.equations.n;
         let widths = [n, n * columns];
         let part = |part: f64| h.iter().map(|h| h * part).collect::<Vec<f64>>();
         let half = part(0.5);
         for k in 0..4 {
-            if !self.force.is_empty() {
-                push([0.0, 0.5, 0.5, 1.0][k], &mut self.force);
+            if !self.force.is_empty() || self.course.equations.timed {
+                push([0.0, 0.5, 0.5, 1.0][k], &mut self.force, &mut self.time);
             }
             let (before, rest) = rates.split_at_mut(k);
             match k {
@@ -322,7 +358,10 @@ impl<'a> Follower<'a> {
             let steps = (course.substeps as f64 * most / course.step).ceil().max(1.0);
             let h: Vec<f64> = ways.iter().map(|way| way.1 / steps).collect();
             for step in 0..steps as usize {
-                self.advance((values, columns), (&h, late), &mut scratch, |share, force| {
+                self.advance((values, columns), (&h, late), &mut scratch, |share, force, time| {
+                    for (lane, time) in time.iter_mut().enumerate() {
+                        *time = places[lane].0 + (step as f64 + share) * h[lane];
+                    }
                     for (lane, into) in force.chunks_exact_mut(n).enumerate() {
                         let (track, end) = (tracks[lane], ways[lane].0.min(tracks[lane].len() - 1));
                         let before = track.times[end.saturating_sub(1)];

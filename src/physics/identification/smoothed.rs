@@ -94,6 +94,8 @@ impl States {
             let range = first..(first + LANES * n).min(self.q.len());
             let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);
+            let times = self.places[first / n..range.end / n].iter();
+            follower.at_times(times.map(|(track, sample)| problem.course.recording.tracks[*track].times[*sample]));
             follower.accelerate(&values, state, &self.force[range.clone()], a);
             visit(&mut follower, range, a);
         }

@@ -14,6 +14,7 @@ mod system;
 use super::ExpressionLagrangian;
 use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
+use super::formula_forces::FormulaForces;
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
 use crate::scalar::Real;
@@ -45,6 +46,9 @@ pub struct Description {
     /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<String>,
+    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names and of the time `t`.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub forces: BTreeMap<String, String>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -213,6 +217,7 @@ impl Description {
             time_unit: Some(time_unit.to_string()),
             lagrangian: Some(lagrangian),
             dissipation: None,
+            forces: BTreeMap::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),
@@ -277,6 +282,8 @@ pub struct Described {
     pub lagrangian: ExpressionLagrangian,
     /// Its dissipation function, if it has one; parameters as the Lagrangian's.
     pub dissipation: Option<ExpressionLagrangian>,
+    /// Its forces, if there are any; parameters as the Lagrangian's.
+    pub(super) forces: Option<FormulaForces>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
     /// `true` if these are known to be independent: nothing has to be examined.

@@ -2,6 +2,7 @@
 
 use super::{Described, Description, DescriptionError, Quantity};
 use crate::lagrangian::constraints::ExpressionConstraints;
+use crate::lagrangian::formula_forces::FormulaForces;
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_name, is_reserved};
 use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
@@ -21,6 +22,9 @@ use core::f64::consts::PI;
 const MAX_COORDINATES: usize = 64;
 /// Most parameters, most definitions, and most constraints.
 const MAX_NAMES: usize = 256;
+
+/// Name of the time in formulas of forces.
+const TIME: &str = "t";
 
 type Outcome<T> = Result<T, DescriptionError>;
 
@@ -83,6 +87,7 @@ impl Description {
             }
         };
         let dissipation = self.friction(&mut compiler, &scope)?;
+        let forces = self.forces(&mut compiler, &scope)?;
         let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
@@ -115,6 +120,7 @@ impl Description {
                 lagrangian: ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value)),
                 dissipation: dissipation
                     .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),
+                forces,
                 constraints,
                 independent: catalogued,
                 chain,
@@ -260,6 +266,34 @@ impl Description {
             return Err(DescriptionError::new("dissipation", "expected a velocity in it, such as theta_dot"));
         }
         Ok(Some(value))
+    }
+
+    /// The generalized forces; `t` is the time in them, unless it is the name of something else.
+    fn forces(
+        &self,
+        compiler: &mut Compiler,
+        scope: &BTreeMap<String, Meaning>,
+    ) -> Outcome<Option<FormulaForces>> {
+        let size = (self.coordinates.len(), self.parameters.len());
+        let mut scope = scope.clone();
+        let is_free = !scope.contains_key(TIME);
+        if is_free {
+            scope.insert(TIME.to_string(), Meaning::Parameter(size.1));
+        }
+        let (mut formulas, mut timed) = (Vec::new(), false);
+        for (name, text) in &self.forces {
+            let key = format!("forces.{name}");
+            let names = || self.coordinates.iter().map(|c| c.name.as_str());
+            let place = names().position(|known| known == name);
+            let place = place.ok_or_else(|| {
+                DescriptionError::new(&key, unknown("coordinate", name, names().collect::<Vec<_>>()))
+            })?;
+            let expression: Expression = text.parse().map_err(DescriptionError::formula(&key))?;
+            timed |= is_free && expression.names().any(|used| used == TIME);
+            let value = compiler.add(&expression, &scope, false).map_err(DescriptionError::formula(&key))?;
+            formulas.push((place, compiler.formula(value)));
+        }
+        Ok((!formulas.is_empty()).then(|| FormulaForces::compiled(size, formulas, timed)))
     }
 
     /// The formulas that vanish.
