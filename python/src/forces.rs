@@ -2,7 +2,7 @@
 
 use crate::errors::value;
 use crate::subject::{Subject, slice};
-use lnn::lagrangian::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
+use lnn::lagrangian::{ForceParts, GivenForces, InverseDynamics, force_parts, inverse_dynamics};
 use lnn::rollout::{Between, Force, SampledForce};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -87,6 +87,17 @@ impl Forces {
             forces.called = Some(called);
         }
         Ok(forces)
+    }
+
+    /// The same beside forces of the system that depend on the time.
+    pub fn beside(mut self, own: GivenForces<f64>) -> Self {
+        if self.each.is_empty() {
+            self.each.push(Box::new(own));
+        } else {
+            let both = |one: Box<dyn Force<f64>>| Box::new((one, own.clone())) as Box<dyn Force<f64>>;
+            self.each = self.each.into_iter().map(both).collect();
+        }
+        self
     }
 
     /// The force on a start.

@@ -529,13 +529,25 @@ impl Subject {
             _ => None,
         };
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
-        let forces = Forces::of(n, (t0, t_end), forces.0, forces.1)?;
+        let mut forces = Forces::of(n, (t0, t_end), forces.0, forces.1)?;
+        let mut driven = None;
+        if let Kind::System(configured, _) = &self.kind
+            && configured.is_driven()
+            && let (model, Some(own)) = configured.build_driven().map_err(value)?
+        {
+            (forces, driven) = (forces.beside(own), Some(model));
+        }
         let starts = q.chunks(n).zip(v.chunks(n)).enumerate();
         let starts: Vec<_> = starts.map(|(k, (q, v))| Start { q, v, force: forces.on(k) }).collect();
         let motions = whole(py, None, |watch| {
-            self.with_friction(friction, |model| {
+            let follow = |model: &dyn EulerLagrange<f64>| {
                 rollout_each(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
-            })
+            };
+            match (&driven, friction) {
+                (Some(model), true) => follow(model.as_ref()),
+                (Some(model), false) => follow(&Frictionless(model.as_ref())),
+                (None, _) => self.with_friction(friction, follow),
+            }
         })?;
         if let Some(error) = forces.raised() {
             return Err(error);

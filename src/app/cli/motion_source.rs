@@ -4,7 +4,7 @@ use crate::cli::learned::{Learned, model_file};
 use crate::cli::source::Source;
 use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, forces};
-use crate::lagrangian::EulerLagrange;
+use crate::lagrangian::{EulerLagrange, GivenForces};
 use crate::report::with_unit;
 use crate::rollout::Domain;
 use std::path::{Path, PathBuf};
@@ -19,6 +19,8 @@ pub struct MotionSource {
     pub columns: Vec<String>,
     /// Their units; of a system that was only recorded `rad` of angles, `SI` of others.
     pub units: Vec<String>,
+    /// Forces of its own that depend on the time.
+    pub driving: Option<GivenForces<f64>>,
     /// Names of the external forces, one per coordinate.
     pub forces: Vec<String>,
     /// The states a model was trained on.
@@ -53,7 +55,7 @@ impl MotionSource {
         let time_like = learned.header.architecture.time_like.is_some();
         let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        Ok(Self { name, model, columns, units, forces, domain, time_unit, time_like, file })
+        Ok(Self { name, model, columns, units, driving: None, forces, domain, time_unit, time_like, file })
     }
 
     /// A system by name or by file.
@@ -62,11 +64,15 @@ impl MotionSource {
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
-        let Source { model, columns, forces } = Source::configured(system.clone(), given)?;
+        let (Source { model, columns, forces }, driven) = Source::driven(system.clone(), given)?;
+        let (model, driving) = match driven {
+            Some((model, force)) => (model, Some(force)),
+            None => (model, None),
+        };
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
         let (time_like, units) = (system.time_like.is_some(), system.units(columns.len() / 2));
-        Ok(Self { name, model, columns, units, forces, domain: None, time_unit, time_like, file })
+        Ok(Self { name, model, columns, units, driving, forces, domain: None, time_unit, time_like, file })
     }
 
     /// Label of the parameter of the motion: a time, or the affine parameter of geodesics, which is the proper time of matter.

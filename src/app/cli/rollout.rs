@@ -14,7 +14,9 @@ use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
-use crate::rollout::{Driven, Ending, EnergyBalance, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
+use crate::rollout::{
+    Driven, Ending, EnergyBalance, Force, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
+};
 use crate::symmetry::Invariant;
 use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
@@ -187,7 +189,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (q, v) = args.state.split_at(columns.len() / 2);
     let options = args.options(&source)?;
     args.require_room(&source)?;
-    let force = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
+    let recorded = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
+    let force: Option<Box<dyn Force<f64>>> = match (recorded, source.driving.clone()) {
+        (None, None) => None,
+        (Some(recorded), None) => Some(Box::new(recorded)),
+        (None, Some(own)) => Some(Box::new(own)),
+        (Some(recorded), Some(own)) => Some(Box::new((recorded, own))),
+    };
     if args.charges && force.is_some() {
         return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
     }
@@ -204,7 +212,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let moving = Interruptible::new(network, &stop);
-    let driven = force.as_ref().map(|force| Driven::new(&moving, force));
+    let driven = force.as_deref().map(|force| Driven::new(&moving, force));
     let mut watch = Watch::new(source.range(), columns);
     let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
     let mut take = |piece: &Trajectory<f64>| {

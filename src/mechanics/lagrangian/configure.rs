@@ -3,7 +3,7 @@
 
 use super::derivatives::{StateTerms, evaluate};
 use super::equations::Friction;
-use super::formula_forces::{FormulaForces, GivenForces};
+use super::formula_forces::{FormulaForces, GivenForces, NeedsTime};
 use super::recursion::Recursive;
 use super::system::{Range, Size, System};
 use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, unconstrained, visit_lagrangian};
@@ -61,11 +61,6 @@ pub enum SystemError {
         /// The text given.
         found: String,
     },
-    /// Forces that depend on the time, which a state does not tell.
-    Timed {
-        /// The system.
-        system: String,
-    },
     /// Constraints that contradict each other or leave no motion.
     Constraints {
         /// The system.
@@ -97,10 +92,6 @@ impl core::fmt::Display for SystemError {
             Self::Value { system, symbol, demand, found } => {
                 write!(f, "parameter `{symbol}` of {system} must be {demand}, found `{found}`")
             }
-            Self::Timed { system } => write!(
-                f,
-                "{system}: its forces depend on the time t, which only a motion tells: roll it out, or identify its constants"
-            ),
             Self::Constraints { system, problem } => write!(f, "{system}: {problem}"),
             Self::State { system, expected, found } => {
                 write!(f, "{system}: expected {expected} coordinates and velocities, found {found}")
@@ -167,18 +158,19 @@ impl<S: Scalar> SystemInstance<S> {
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
     /// [`Dd`](crate::scalar::Dd).
-    /// [`SystemError::Timed`] for forces that depend on the time: see [`build_driven`](Self::build_driven).
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        match self.build_driven()? {
-            (model, None) => Ok(model),
-            _ => Err(SystemError::Timed { system: self.system.name.to_string() }),
-        }
+        Ok(match self.build_driven()? {
+            (model, None) => model,
+            (model, Some(_)) => Box::new(NeedsTime(model)),
+        })
     }
-    /// The model without those forces of its description that depend on the time, and these.
+    /// The model without those forces of its description that depend on the time, and these. What [`build`](Self::build) gives of a system
+    /// with such forces refuses to evaluate states.
     ///
     /// # Errors
     /// As of [`build`](Self::build).
-    pub(crate) fn build_driven(&self) -> Result<(Box<dyn EulerLagrange<S>>, Option<GivenForces<S>>), SystemError> {
+    #[doc(hidden)]
+    pub fn build_driven(&self) -> Result<(Box<dyn EulerLagrange<S>>, Option<GivenForces<S>>), SystemError> {
         let model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
         let Some(forces) = self.forces() else { return Ok((self.constrain(model)?, None)) };
         let given = GivenForces::new(forces.clone(), self.parameters.clone());
@@ -186,6 +178,11 @@ impl<S: Scalar> SystemInstance<S> {
             true => Ok((self.constrain(model)?, Some(given))),
             false => Ok((self.constrain(Box::new(WithForces::new(model, given)))?, None)),
         }
+    }
+    /// `true` if forces of its description depend on the time.
+    #[doc(hidden)]
+    pub fn is_driven(&self) -> bool {
+        self.forces().is_some_and(FormulaForces::is_timed)
     }
     /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
     pub(super) fn forces(&self) -> Option<&FormulaForces> {

@@ -246,6 +246,100 @@ mod tests {
         a
     }
 
+    /// A program of `x` and parameters at one point, and what a change of one of its numbers does.
+    fn evaluated(program: &Arc<Program<f64>>, fields: &[&[f64]], p: &[f64], size: usize) -> Vec<f64> {
+        let mut out = vec![0.0; size];
+        Replay::new(Arc::clone(program)).evaluate(1, fields, p, &mut [&mut out]).unwrap();
+        out
+    }
+
+    #[test]
+    fn forces_in_time_have_slopes_by_state_and_parameters() {
+        let mut description = damped();
+        let forces = [("a", "k*cos(m*t + a) - e*b_dot*abs(a_dot)"), ("b", "c*t^2")];
+        description.forces = forces.map(|(name, text)| (name.to_string(), text.to_string())).into();
+        let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let p = instance.parameters.clone();
+        let equations = Equations::record(&instance, &[4, 3, 0]).unwrap().unwrap();
+        assert!(equations.timed && instance.is_driven());
+        let (x, a, t) = ([0.3, 1.1, 0.7, -0.4], [0.2, -0.9], [2.5]);
+        let residual = |x: &[f64], t: f64, p: &[f64]| -> Vec<f64> {
+            let found = evaluated(&equations.motion, &[&x[..2], &x[2..], &[t]], p, 6);
+            (0..2).map(|i| found[2 * i] * a[0] + found[2 * i + 1] * a[1] - found[4 + i]).collect()
+        };
+        // Beside the same equations without forces.
+        description.forces.clear();
+        let free = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let free = Equations::record(&free, &[4, 3, 0]).unwrap().unwrap();
+        let [own, other] = [
+            evaluated(&equations.motion, &[&x[..2], &x[2..], &t], &p, 6),
+            evaluated(&free.motion, &[&x[..2], &x[2..]], &p, 6),
+        ];
+        let [c, e, _, k, m] = p[..] else { panic!("five parameters") };
+        let q = [k * (m * t[0] + x[0]).cos() - e * x[3] * x[2].abs(), c * t[0].powi(2)];
+        assert!((own[4] - other[4] - q[0]).abs() < 1e-12 && (own[5] - other[5] - q[1]).abs() < 1e-12);
+        assert_eq!((own[..4].to_vec(), free.timed), (other[..4].to_vec(), false));
+        let slopes = evaluated(&equations.slopes, &[&x[..2], &x[2..], &a, &t], &p, 14);
+        const H: f64 = 1e-5;
+        for column in 0..7 {
+            let at = |h: f64| {
+                let (mut x, mut p) = (x, p.clone());
+                match column {
+                    0..4 => x[column] += h,
+                    _ => p[[4, 3, 0][column - 4]] += h,
+                }
+                residual(&x, t[0], &p)
+            };
+            let (up, down) = (at(H), at(-H));
+            for i in 0..2 {
+                let difference = (up[i] - down[i]) / (2.0 * H);
+                assert!((difference - slopes[7 * i + column]).abs() < 1e-7, "{i} {column}: {difference} {slopes:?}");
+            }
+        }
+        // No state alone has an acceleration.
+        let model = instance.build().unwrap();
+        assert_eq!(model.acceleration(&x[..2], &x[2..]).unwrap_err(), crate::lagrangian::MechanicsError::Timed);
+    }
+
+    #[test]
+    fn forces_of_the_state_are_part_of_the_model_and_of_its_linearization() {
+        let mut description = damped();
+        description.forces = [("b".to_string(), "-k*b_dot*abs(b_dot) + c*a^2".to_string())].into();
+        let a = |p: &[(&str, f64)], q: &[f64], v: &[f64]| accelerations(&description, p, q, v);
+        let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let model = instance.build().unwrap();
+        let (q, v) = ([0.3, 1.1], [0.7, -0.4]);
+        let found = crate::lagrangian::Linearizer::new(&*model).unwrap().linearize(&q, &v).unwrap();
+        const H: f64 = 1e-5;
+        for k in 0..4 {
+            let at = |h: f64| {
+                let (mut q, mut v) = (q, v);
+                if k < 2 {
+                    q[k] += h
+                } else {
+                    v[k - 2] += h
+                }
+                a(&[], &q, &v)
+            };
+            let (up, down) = (at(H), at(-H));
+            for i in 0..2 {
+                let by = if k < 2 { found.by_q[2 * i + k] } else { found.by_v[2 * i + k - 2] };
+                assert!(((up[i] - down[i]) / (2.0 * H) - by).abs() < 1e-7, "{i} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn mistakes_in_forces_are_named() {
+        let wrong = |name: &str, text: &str| {
+            let mut description = damped();
+            description.forces = [(name.to_string(), text.to_string())].into();
+            description.system().unwrap_err().to_string()
+        };
+        assert!(wrong("aa", "1").starts_with("forces.aa: unknown coordinate \"aa\""), "{}", wrong("aa", "1"));
+        assert!(wrong("a", "tt").starts_with("forces.a: column 1: unknown name \"tt\""), "{}", wrong("a", "tt"));
+    }
+
     #[test]
     fn slopes_of_accelerations_are_those_of_differences() {
         let description = damped();

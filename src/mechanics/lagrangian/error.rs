@@ -55,6 +55,8 @@ pub enum MechanicsError {
     },
     /// A model that a flag has ended.
     Interrupted,
+    /// Forces that depend on the time, which a state does not tell.
+    Timed,
     /// Derivatives that a model does not have.
     Derivatives {
         /// Of which term.
@@ -79,6 +81,9 @@ impl core::fmt::Display for MechanicsError {
             Self::NotFinite { row, what } => write!(f, "{what} of state {row} is not finite"),
             Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
             Self::Interrupted => f.write_str("interrupted"),
+            Self::Timed => f.write_str(
+                "the forces of this system depend on the time t, which a state does not tell: roll its motion out, or identify its constants",
+            ),
             Self::Derivatives { what } => write!(f, "{what}: this model has no such derivatives"),
         }
     }
@@ -96,7 +101,7 @@ impl MechanicsError {
             | Self::OffConstraints { row, .. }
             | Self::NotFinite { row, .. }
             | Self::Uncertified { row } => Some(row),
-            Self::Shape { .. } | Self::Interrupted | Self::Derivatives { .. } => None,
+            Self::Shape { .. } | Self::Interrupted | Self::Timed | Self::Derivatives { .. } => None,
         }
     }
 

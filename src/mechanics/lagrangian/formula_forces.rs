@@ -2,7 +2,7 @@
 
 use super::expression::Formula;
 use super::linearization::{Held, Products};
-use super::{GeneralizedForce, MechanicsError, Slopes};
+use super::{EulerLagrange, GeneralizedForce, Manifold, MechanicsError, Request, Slopes, Terms};
 use crate::forward::Dual;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Program, TapeError, Tracer};
@@ -86,6 +86,31 @@ impl<S: Scalar> GeneralizedForce<S> for GivenForces<S> {
 
     fn slopes(&self, _: usize) -> Option<Box<dyn Slopes<S> + '_>> {
         Some(Box::new(ForceSlopes(self)))
+    }
+}
+
+/// A system whose forces depend on the time: its states have no accelerations.
+pub(super) struct NeedsTime<M>(pub M);
+
+impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for NeedsTime<M> {
+    fn coordinates(&self) -> usize {
+        self.0.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        if request.includes(Request::FORCE) {
+            terms.clear();
+            return Err(MechanicsError::Timed);
+        }
+        self.0.terms(q, v, request, terms)
+    }
+
+    fn manifold(&self) -> Option<&dyn Manifold<S>> {
+        self.0.manifold()
+    }
+
+    fn conserves_energy(&self) -> bool {
+        false
     }
 }
 

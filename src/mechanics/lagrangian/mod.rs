@@ -70,13 +70,13 @@ pub use expression::ExpressionLagrangian;
 pub(crate) use expression::quantity;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
+#[doc(hidden)]
+pub use formula_forces::GivenForces;
 #[cfg(feature = "rollout")]
 pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
 pub use linearization::{Gradient, Linearization, Linearizer};
-#[doc(hidden)]
-pub use formula_forces::GivenForces;
 #[doc(hidden)]
 pub use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;

@@ -3,7 +3,7 @@
 use super::pieces::{Ending, hand_over};
 use super::run::{adaptive_or_fixed, fixed};
 use super::{Between, EnergyBalance, Integrable, Options, Rollout, RolloutError, Trajectory};
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, GivenForces, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 use std::cmp::Ordering;
@@ -27,6 +27,37 @@ pub trait Force<S: Scalar>: Send + Sync {
 impl<S: Scalar, F: Fn(S, &[S], &[S], &mut [S]) + Send + Sync> Force<S> for F {
     fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
         self(t, q, v, force);
+    }
+}
+
+/// The sum of two forces, one of which may have breaks.
+impl<S: Scalar, A: Force<S>, B: Force<S>> Force<S> for (A, B) {
+    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
+        self.0.force(t, q, v, force);
+        let mut other = vec![<S as Real>::zero(); force.len()];
+        self.1.force(t, q, v, &mut other);
+        force.iter_mut().zip(other).for_each(|(force, other)| *force += other);
+    }
+
+    fn breaks(&self) -> &[S] {
+        if self.0.breaks().is_empty() { self.1.breaks() } else { self.0.breaks() }
+    }
+}
+
+impl<S: Scalar> Force<S> for Box<dyn Force<S>> {
+    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
+        (**self).force(t, q, v, force);
+    }
+
+    fn breaks(&self) -> &[S] {
+        (**self).breaks()
+    }
+}
+
+impl<S: Scalar> Force<S> for GivenForces<S> {
+    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
+        force.fill(<S as Real>::zero());
+        self.add(t, (q, v), force);
     }
 }
 

@@ -78,11 +78,28 @@ impl States {
         self.q.len() / n
     }
 
+    /// The time of a state.
+    fn time(&self, problem: &Problem<'_>, at: usize) -> f64 {
+        let (track, sample) = self.places[at];
+        problem.course.recording.tracks[track].times[sample]
+    }
+
     /// Calls `visit` with every batch of states: the integrator, the batch's offset among the numbers, and its accelerations for constants `x`.
     pub fn batches(
         &self,
         problem: &Problem<'_>,
         x: &[f64],
+        visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
+    ) {
+        self.batches_at(problem, x, |at| self.time(problem, at), visit);
+    }
+
+    /// The same with states at other times.
+    fn batches_at(
+        &self,
+        problem: &Problem<'_>,
+        x: &[f64],
+        time: impl Fn(usize) -> f64,
         mut visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
         let n = problem.course.equations.n;
@@ -94,8 +111,7 @@ impl States {
             let range = first..(first + LANES * n).min(self.q.len());
             let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);
-            let times = self.places[first / n..range.end / n].iter();
-            follower.at_times(times.map(|(track, sample)| problem.course.recording.tracks[*track].times[*sample]));
+            follower.at_times((first / n..range.end / n).map(&time));
             follower.accelerate(&values, state, &self.force[range.clone()], a);
             visit(&mut follower, range, a);
         }
@@ -236,6 +252,72 @@ impl States {
             }
         }
         Some(best)
+    }
+}
+
+/// Growth of a derivative from the first to the last third of the time from which a constant is one of a phase, such as a frequency.
+const GROWS: f64 = 2.5;
+/// Part of the given value of such a constant on either side of it that is searched, and most values that are tried on either side.
+const SEARCHED: f64 = 0.5;
+const TRIED: usize = 40;
+
+impl States {
+    /// As [`States::fit`] to accelerations under forces that depend on the time: the sum of squares has many minima over a frequency, as many
+    /// as there are periods in the recording, so that the fit begins at several values of it.
+    pub fn fit_in_time(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> Option<Normal> {
+        let given = x.clone();
+        let mut best = self.fit(problem, x, Met::Accelerations)?;
+        for k in 0..problem.chosen.len() {
+            let Some(step) = self.phase_step(problem, &given, k) else { continue };
+            let most = if given[k] == 0.0 { TRIED } else { ((SEARCHED * given[k].abs() / step) as usize).min(TRIED) };
+            for place in (1..=most).flat_map(|j| [j as f64, -(j as f64)]) {
+                let mut tried = given.clone();
+                tried[k] += place * step;
+                let found = self.fit(problem, &mut tried, Met::Accelerations);
+                if let Some(found) = found.filter(|found| found.square < best.square) {
+                    (*x, best) = (tried, found);
+                }
+            }
+        }
+        Some(best)
+    }
+
+    /// Change of constant `k` that turns the phase of the forces by about half a radian at the end of the recording; none of a constant
+    /// whose effect does not grow with time.
+    fn phase_step(&self, problem: &Problem<'_>, x: &[f64], k: usize) -> Option<f64> {
+        let (n, m) = (problem.course.equations.n, problem.chosen.len());
+        let times = || (0..self.places.len()).map(|at| self.time(problem, at));
+        let (low, high) = times().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+        let third = (high - low) / 3.0;
+        let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+        self.residuals(problem, x, Met::Accelerations, |first, _, slopes| {
+            for (row, slopes) in slopes.chunks_exact(2 * n + m).enumerate() {
+                let since = self.time(problem, (first + row) / n) - low;
+                let part = if since < third { 0 } else { 1 };
+                if since < third || since > 2.0 * third {
+                    sums[part] += slopes[2 * n + k].powi(2);
+                    counts[part] += 1.0;
+                }
+            }
+        });
+        let [early, late] = [0, 1].map(|part| (sums[part] / f64::max(counts[part], 1.0)).sqrt());
+        if !(late > GROWS * early) {
+            return None;
+        }
+        // What the forces do between one time and others.
+        let mut all = vec![0.0; self.q.len()];
+        self.batches(problem, x, |_, range, a| all[range].copy_from_slice(a));
+        self.batches_at(
+            problem,
+            x,
+            |_| low,
+            |_, range, a| {
+                all[range].iter_mut().zip(a).for_each(|(moved, still)| *moved -= still);
+            },
+        );
+        let effect = (all.iter().filter(|x| x.is_finite()).map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
+        let step = 0.5 * effect / late;
+        (step.is_finite() && step > 0.0).then_some(step)
     }
 }
 

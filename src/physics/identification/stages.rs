@@ -176,7 +176,11 @@ pub fn identify(
         return Ok(found.named(recording, options.robust));
     }
     let states = States::new(&on_pieces, &pieces.smoothed);
-    let fitted = states.len(n) == 0 || states.fit(&on_pieces, &mut x, met).is_some();
+    let fitted = match equations.timed {
+        _ if states.len(n) == 0 => true,
+        true => states.fit_in_time(&on_pieces, &mut x).is_some(),
+        false => states.fit(&on_pieces, &mut x, met).is_some(),
+    };
     stop.check()?;
     if !fitted {
         return Err(IdentifyError::Singular);

@@ -6,6 +6,7 @@ mod configuration;
 mod constraints;
 mod conveniences;
 mod dissipation;
+mod driven;
 mod first_minute;
 mod fit;
 mod fit_resume;

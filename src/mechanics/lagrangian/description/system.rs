@@ -2,8 +2,8 @@
 
 use super::{Described, Description, DescriptionError, Quantity};
 use crate::lagrangian::constraints::ExpressionConstraints;
-use crate::lagrangian::formula_forces::FormulaForces;
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_name, is_reserved};
+use crate::lagrangian::formula_forces::FormulaForces;
 use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
@@ -269,11 +269,7 @@ impl Description {
     }
 
     /// The generalized forces; `t` is the time in them, unless it is the name of something else.
-    fn forces(
-        &self,
-        compiler: &mut Compiler,
-        scope: &BTreeMap<String, Meaning>,
-    ) -> Outcome<Option<FormulaForces>> {
+    fn forces(&self, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Option<FormulaForces>> {
         let size = (self.coordinates.len(), self.parameters.len());
         let mut scope = scope.clone();
         let is_free = !scope.contains_key(TIME);
@@ -285,9 +281,8 @@ impl Description {
             let key = format!("forces.{name}");
             let names = || self.coordinates.iter().map(|c| c.name.as_str());
             let place = names().position(|known| known == name);
-            let place = place.ok_or_else(|| {
-                DescriptionError::new(&key, unknown("coordinate", name, names().collect::<Vec<_>>()))
-            })?;
+            let place = place
+                .ok_or_else(|| DescriptionError::new(&key, unknown("coordinate", name, names().collect::<Vec<_>>())))?;
             let expression: Expression = text.parse().map_err(DescriptionError::formula(&key))?;
             timed |= is_free && expression.names().any(|used| used == TIME);
             let value = compiler.add(&expression, &scope, false).map_err(DescriptionError::formula(&key))?;

@@ -1,0 +1,170 @@
+//! Systems with forces as formulas: rolled out, identified, and refused where no time is known.
+#![cfg(feature = "cli")]
+
+use crate::common::program::{Folder, lnn, text};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::fmt::Write as _;
+
+/// A motor drives a spring: `x'' = -k x + F cos(om t + phi)`.
+const SPRING: &str = r#"
+name = "driven-spring"
+lagrangian = "x_dot^2/2 - k*x^2/2"
+[[coordinates]]
+name = "x"
+bounds = [-3, 3]
+velocity_bounds = [-5, 5]
+[parameters]
+k = 4
+F = 0.7
+om = 1.3
+phi = 0.4
+[forces]
+x = "F*cos(om*t + phi)"
+"#;
+
+/// A pendulum of unit length in a drive, the constants 20 % off their truth: g 9.81, F 1.5, om 2.2, phi 0.5.
+const PENDULUM: &str = r#"
+name = "driven-pendulum"
+lagrangian = "theta_dot^2/2 + g*cos(theta)"
+[[coordinates]]
+name = "theta"
+unit = "rad"
+periodic = true
+velocity_bounds = [-8, 8]
+[parameters]
+g = { default = 9.81, unit = "1/s^2" }
+F = { default = 1.8, learn = true }
+om = { default = 1.76, learn = true, range = "positive" }
+phi = { default = 0.6, learn = true }
+[forces]
+theta = "F*cos(om*t + phi)"
+"#;
+
+/// Columns of a CSV.
+fn columns(csv: &str) -> Vec<Vec<f64>> {
+    let rows = csv.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>());
+    let rows: Vec<Vec<f64>> = rows.collect();
+    (0..rows[0].len()).map(|k| rows.iter().map(|row| row[k]).collect()).collect()
+}
+
+#[test]
+fn a_driven_spring_moves_as_its_closed_form() {
+    let folder = Folder::new();
+    let system = folder.file("spring.toml", SPRING);
+    let out = text(&folder.path("motion.csv"));
+    let (k, f, om, phi) = (4.0f64, 0.7, 1.3f64, 0.4f64);
+    let w = k.sqrt();
+    // From t0 at x = 0.5, v = -0.2.
+    let exact = |t: f64, t0: f64| {
+        let (c, d) = (f / (k - om * om), om * t0 + phi);
+        let (x, v) = (0.5 - c * d.cos(), -0.2 + c * om * d.sin());
+        c * (om * t + phi).cos() + x * (w * (t - t0)).cos() + v / w * (w * (t - t0)).sin()
+    };
+    for (method, start, accuracy) in [("dopri5", "0", 1e-6), ("gauss6", "3", 1e-6), ("variational", "0", 5e-3)] {
+        let run = lnn(&[
+            "rollout",
+            "--system",
+            &system,
+            "--state",
+            "0.5,-0.2",
+            "--t-start",
+            start,
+            "--t-end",
+            "15",
+            "--dt",
+            "0.02",
+            "--method",
+            method,
+            "--out",
+            &out,
+            "--overwrite",
+        ]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert!(run.stdout.contains("forces added"), "{}", run.stdout);
+        let found = columns(&std::fs::read_to_string(&out).unwrap());
+        let start: f64 = start.parse().unwrap();
+        for (t, x) in found[0].iter().zip(&found[1]) {
+            assert!((x - exact(*t, start)).abs() < accuracy, "{method} {t}: {x} {}", exact(*t, start));
+        }
+    }
+    // A recorded force acts beside it, and here takes it away.
+    let against = ["--force", "x=-0.7", "--param", "om=1e-9", "--param", "phi=0"];
+    let run = lnn(&[
+        &[
+            "rollout",
+            "--system",
+            &system,
+            "--state",
+            "0.5,0",
+            "--t-end",
+            "3",
+            "--dt",
+            "0.1",
+            "--out",
+            &out,
+            "--overwrite",
+        ],
+        &against[..],
+    ]
+    .concat());
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found = columns(&std::fs::read_to_string(&out).unwrap());
+    assert!(found[0].iter().zip(&found[1]).all(|(t, x)| (x - 0.5 * (w * t).cos()).abs() < 1e-5));
+    let states = folder.file("states.csv", "x,x_dot\n0.5,0\n");
+    lnn(&["inspect", "--system", &system, "--states", &states]).refused(1, &["time t"]);
+    lnn(&[
+        "rollout",
+        "--system",
+        &system,
+        "--state",
+        "0.5,0",
+        "--t-end",
+        "1",
+        "--dt",
+        "0.1",
+        "--charges",
+        "--out",
+        "-",
+    ])
+    .refused(2, &["--charges"]);
+}
+
+#[test]
+fn the_drive_of_a_pendulum_is_identified() {
+    let folder = Folder::new();
+    let system = folder.file("pendulum.toml", PENDULUM);
+    let out = text(&folder.path("motion.csv"));
+    let truth = ["F=1.5", "om=2.2", "phi=0.5"];
+    let (mut within, seeds) = (0, 5);
+    for seed in 0..seeds {
+        let state = format!("{},0", 0.4 + 0.1 * seed as f64);
+        let params = truth.map(|truth| ["--param", truth]).concat();
+        let run = lnn(&[
+            &["rollout", "--system", &system, "--state", &state, "--t-end", "20", "--dt", "0.02", "--rtol", "1e-11"],
+            &["--atol", "1e-12", "--out", &out, "--overwrite"],
+            &params[..],
+        ]
+        .concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let motion = columns(&std::fs::read_to_string(&out).unwrap());
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut csv = "t,theta\n".to_string();
+        for (t, theta) in motion[0].iter().zip(&motion[1]) {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            writeln!(csv, "{t},{}", theta + 1e-2 * noise).unwrap();
+        }
+        let data = folder.file("data.csv", csv);
+        let run = lnn(&["identify", &data, "--system", &system, "--json"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(found["explained"], true, "{}", run.stdout);
+        for (name, truth) in [("F", 1.5), ("om", 2.2), ("phi", 0.5)] {
+            let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+            assert!((value - truth).abs() < 5.0 * error && error < 0.02 * truth, "{seed} {name} {value} {error}");
+            within += usize::from((value - truth).abs() < 2.0 * error);
+        }
+    }
+    assert!(within >= 11, "{within} of 15 constants within two standard errors");
+}
