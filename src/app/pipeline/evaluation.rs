@@ -138,6 +138,7 @@ pub fn evaluate(
     let (plan, judging) = (options, &Judging::new(watch, PIECES));
     let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
     let n = system.coordinates;
+    system.require_states()?;
     let exact = system.build()?;
     let learned = held(system, network, plan.constraints.as_ref())?;
     let (exact, learned) = (judging.watched(exact.as_ref()), judging.watched(learned.as_ref()));

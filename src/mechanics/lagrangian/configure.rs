@@ -9,7 +9,8 @@ use super::system::{Range, Size, System};
 use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, unconstrained, visit_lagrangian};
 use super::{
     Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
-    Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_description, constrained_descriptions,
+    Lagrangian, MechanicsError, Rayleigh, Request, Terms, WithForces, constrained_description,
+    constrained_descriptions,
 };
 use crate::linalg::Workspace;
 use crate::names::unknown;
@@ -61,6 +62,11 @@ pub enum SystemError {
         /// The text given.
         found: String,
     },
+    /// Forces that depend on the time, where states are needed.
+    Timed {
+        /// The system.
+        system: String,
+    },
     /// Constraints that contradict each other or leave no motion.
     Constraints {
         /// The system.
@@ -92,6 +98,7 @@ impl core::fmt::Display for SystemError {
             Self::Value { system, symbol, demand, found } => {
                 write!(f, "parameter `{symbol}` of {system} must be {demand}, found `{found}`")
             }
+            Self::Timed { system } => write!(f, "{system}: {}", MechanicsError::Timed),
             Self::Constraints { system, problem } => write!(f, "{system}: {problem}"),
             Self::State { system, expected, found } => {
                 write!(f, "{system}: expected {expected} coordinates and velocities, found {found}")
@@ -179,13 +186,20 @@ impl<S: Scalar> SystemInstance<S> {
             false => Ok((self.constrain(Box::new(WithForces::new(model, given)))?, None)),
         }
     }
+    /// Refuses a system whose states alone have no accelerations.
+    ///
+    /// # Errors
+    /// [`SystemError::Timed`].
+    pub(crate) fn require_states(&self) -> Result<(), SystemError> {
+        if self.is_driven() { Err(SystemError::Timed { system: self.system.name.to_string() }) } else { Ok(()) }
+    }
     /// `true` if forces of its description depend on the time.
     #[doc(hidden)]
     pub fn is_driven(&self) -> bool {
         self.forces().is_some_and(FormulaForces::is_timed)
     }
     /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
-    pub(super) fn forces(&self) -> Option<&FormulaForces> {
+    pub(crate) fn forces(&self) -> Option<&FormulaForces> {
         self.system.described.as_ref()?.forces.as_ref()
     }
     /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.

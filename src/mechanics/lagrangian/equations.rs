@@ -309,7 +309,8 @@ mod tests {
         let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         let model = instance.build().unwrap();
         let (q, v) = ([0.3, 1.1], [0.7, -0.4]);
-        let found = crate::lagrangian::Linearizer::new(&*model).unwrap().linearize(&q, &v).unwrap();
+        let mut linearizer = crate::lagrangian::Linearizer::new(&*model);
+        let found = linearizer.at(&q, &v).unwrap();
         const H: f64 = 1e-5;
         for k in 0..4 {
             let at = |h: f64| {

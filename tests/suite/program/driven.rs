@@ -1,7 +1,7 @@
 //! Systems with forces as formulas: rolled out, identified, and refused where no time is known.
 #![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, text};
+use crate::common::program::{Folder, Run, lnn, text};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -49,11 +49,19 @@ fn columns(csv: &str) -> Vec<Vec<f64>> {
     (0..rows[0].len()).map(|k| rows.iter().map(|row| row[k]).collect()).collect()
 }
 
+/// `lnn rollout` of a system into a file, with options between blanks, and the columns that it wrote.
+fn motion((system, out): (&str, &str), options: &str) -> (Run, Vec<Vec<f64>>) {
+    let line = format!("rollout --system {system} --out {out} --overwrite {options}");
+    let run = lnn(&line.split(' ').collect::<Vec<_>>());
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found = columns(&std::fs::read_to_string(out).unwrap());
+    (run, found)
+}
+
 #[test]
 fn a_driven_spring_moves_as_its_closed_form() {
     let folder = Folder::new();
-    let system = folder.file("spring.toml", SPRING);
-    let out = text(&folder.path("motion.csv"));
+    let (system, out) = (folder.file("spring.toml", SPRING), text(&folder.path("motion.csv")));
     let (k, f, om, phi) = (4.0f64, 0.7, 1.3f64, 0.4f64);
     let w = k.sqrt();
     // From t0 at x = 0.5, v = -0.2.
@@ -62,93 +70,35 @@ fn a_driven_spring_moves_as_its_closed_form() {
         let (x, v) = (0.5 - c * d.cos(), -0.2 + c * om * d.sin());
         c * (om * t + phi).cos() + x * (w * (t - t0)).cos() + v / w * (w * (t - t0)).sin()
     };
-    for (method, start, accuracy) in [("dopri5", "0", 1e-6), ("gauss6", "3", 1e-6), ("variational", "0", 5e-3)] {
-        let run = lnn(&[
-            "rollout",
-            "--system",
-            &system,
-            "--state",
-            "0.5,-0.2",
-            "--t-start",
-            start,
-            "--t-end",
-            "15",
-            "--dt",
-            "0.02",
-            "--method",
-            method,
-            "--out",
-            &out,
-            "--overwrite",
-        ]);
-        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    for (method, start, accuracy) in [("dopri5", 0.0, 2e-6), ("gauss6", 3.0, 1e-9), ("variational", 0.0, 5e-3)] {
+        let options = format!("--state 0.5,-0.2 --t-start {start} --t-end 15 --dt 0.02 --method {method}");
+        let (run, found) = motion((&system, &out), &options);
         assert!(run.stdout.contains("forces added"), "{}", run.stdout);
-        let found = columns(&std::fs::read_to_string(&out).unwrap());
-        let start: f64 = start.parse().unwrap();
         for (t, x) in found[0].iter().zip(&found[1]) {
             assert!((x - exact(*t, start)).abs() < accuracy, "{method} {t}: {x} {}", exact(*t, start));
         }
     }
     // A recorded force acts beside it, and here takes it away.
-    let against = ["--force", "x=-0.7", "--param", "om=1e-9", "--param", "phi=0"];
-    let run = lnn(&[
-        &[
-            "rollout",
-            "--system",
-            &system,
-            "--state",
-            "0.5,0",
-            "--t-end",
-            "3",
-            "--dt",
-            "0.1",
-            "--out",
-            &out,
-            "--overwrite",
-        ],
-        &against[..],
-    ]
-    .concat());
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
-    let found = columns(&std::fs::read_to_string(&out).unwrap());
+    let options = "--state 0.5,0 --t-end 3 --dt 0.1 --force x_force=-0.7 --param om=1e-9 --param phi=0";
+    let (_, found) = motion((&system, &out), options);
     assert!(found[0].iter().zip(&found[1]).all(|(t, x)| (x - 0.5 * (w * t).cos()).abs() < 1e-5));
     let states = folder.file("states.csv", "x,x_dot\n0.5,0\n");
     lnn(&["inspect", "--system", &system, "--states", &states]).refused(1, &["time t"]);
-    lnn(&[
-        "rollout",
-        "--system",
-        &system,
-        "--state",
-        "0.5,0",
-        "--t-end",
-        "1",
-        "--dt",
-        "0.1",
-        "--charges",
-        "--out",
-        "-",
-    ])
-    .refused(2, &["--charges"]);
+    lnn(&["train", &system, "--epochs", "1", "--out", &out]).refused(2, &["driven-spring", "time t"]);
+    let charges = format!("rollout --system {system} --state 0.5,0 --t-end 1 --dt 0.1 --charges --out -");
+    lnn(&charges.split(' ').collect::<Vec<_>>()).refused(2, &["--charges"]);
+    // What is read off the Lagrangian does not depend on the drive.
+    assert_eq!(lnn(&["symmetries", "--system", &system]).code, Some(0));
 }
 
 #[test]
 fn the_drive_of_a_pendulum_is_identified() {
     let folder = Folder::new();
-    let system = folder.file("pendulum.toml", PENDULUM);
-    let out = text(&folder.path("motion.csv"));
-    let truth = ["F=1.5", "om=2.2", "phi=0.5"];
+    let (system, out) = (folder.file("pendulum.toml", PENDULUM), text(&folder.path("motion.csv")));
     let (mut within, seeds) = (0, 5);
     for seed in 0..seeds {
-        let state = format!("{},0", 0.4 + 0.1 * seed as f64);
-        let params = truth.map(|truth| ["--param", truth]).concat();
-        let run = lnn(&[
-            &["rollout", "--system", &system, "--state", &state, "--t-end", "20", "--dt", "0.02", "--rtol", "1e-11"],
-            &["--atol", "1e-12", "--out", &out, "--overwrite"],
-            &params[..],
-        ]
-        .concat());
-        assert_eq!(run.code, Some(0), "{}", run.stderr);
-        let motion = columns(&std::fs::read_to_string(&out).unwrap());
+        let options = "--param F=1.5 --param om=2.2 --param phi=0.5 --t-end 20 --dt 0.02 --rtol 1e-11 --atol 1e-12";
+        let (_, motion) = motion((&system, &out), &format!("{options} --state 0.{},0", 4 + seed));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut csv = "t,theta\n".to_string();
         for (t, theta) in motion[0].iter().zip(&motion[1]) {
