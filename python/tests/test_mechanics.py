@@ -397,3 +397,21 @@ def test_what_knows_free_coordinates_alone_refuses_constraints(models):
         for call in [moves.certify, moves.symmetries, moves.formula, lambda: moves.geometry([0.5] * n)]:
             with pytest.raises(ValueError, match=refused):
                 call()
+
+
+def test_a_driven_system_moves_in_time_and_has_no_states() -> None:
+    text = """
+name = "driven-spring"
+lagrangian = "x_dot^2/2 - k*x^2/2"
+coordinates = [{ name = "x", bounds = [-3, 3], velocity_bounds = [-5, 5] }]
+parameters = { k = 4, F = 0.7, om = 1.3 }
+forces = { x = "F*cos(om*t)" }
+"""
+    spring = lnn.System.from_toml(text)
+    motion = spring.rollout([0.0], [0.0], t_end=8.0, dt=0.05, rtol=1e-10, atol=1e-12)
+    exact = 0.7 / (4 - 1.3**2) * (np.cos(1.3 * motion.t) - np.cos(2 * motion.t))
+    assert np.allclose(motion.q[:, 0], exact, atol=1e-7)
+    beside = spring.rollout([0.0], [0.0], t_end=8.0, dt=0.05, force=lambda t, q, v: -0.7 * np.cos(1.3 * t))
+    assert np.allclose(beside.q, 0.0, atol=1e-6)
+    with pytest.raises(ValueError, match="time t"):
+        spring.acceleration([0.0], [0.0])
