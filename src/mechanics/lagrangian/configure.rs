@@ -123,6 +123,9 @@ pub struct SystemInstance<S> {
     pub parameters: Vec<S>,
 }
 
+/// A model, and those of its forces that depend on the time.
+type ModelAndDrive<S> = (Box<dyn EulerLagrange<S>>, Option<GivenForces<S>>);
+
 /// A function of the Lagrangian of a system, generic in the type of the Lagrangian.
 pub trait LagrangianVisitor {
     /// Result of the visit.
@@ -177,7 +180,7 @@ impl<S: Scalar> SystemInstance<S> {
     /// # Errors
     /// As of [`build`](Self::build).
     #[doc(hidden)]
-    pub fn build_driven(&self) -> Result<(Box<dyn EulerLagrange<S>>, Option<GivenForces<S>>), SystemError> {
+    pub fn build_driven(&self) -> Result<ModelAndDrive<S>, SystemError> {
         let model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
         let Some(forces) = self.forces() else { return Ok((self.constrain(model)?, None)) };
         let given = GivenForces::new(forces.clone(), self.parameters.clone());

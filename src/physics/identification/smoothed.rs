@@ -301,7 +301,7 @@ impl States {
             }
         });
         let [early, late] = [0, 1].map(|part| (sums[part] / f64::max(counts[part], 1.0)).sqrt());
-        if !(late > GROWS * early) {
+        if late.is_nan() || late <= GROWS * early {
             return None;
         }
         // What the forces do between one time and others.
