@@ -43,6 +43,7 @@ macro_rules! page {
             "[configuration]: crate::docs::configuration\n",
             "[system-files]: crate::docs::system_files\n",
             "[links]: crate::docs::system_files#a-chain-of-links\n",
+            "[forces]: crate::docs::system_files#forces\n",
             "[formulas]: crate::docs::system_files#formulas\n",
             "[summary]: crate::docs::summary\n",
             "[presets]: crate::docs::configuration#presets\n",

@@ -84,7 +84,8 @@ fn a_driven_spring_moves_as_its_closed_form() {
     assert!(found[0].iter().zip(&found[1]).all(|(t, x)| (x - 0.5 * (w * t).cos()).abs() < 1e-5));
     let states = folder.file("states.csv", "x,x_dot\n0.5,0\n");
     lnn(&["inspect", "--system", &system, "--states", &states]).refused(1, &["time t"]);
-    lnn(&["train", &system, "--epochs", "1", "--out", &out]).refused(2, &["driven-spring", "time t"]);
+    let run = text(&folder.path("run"));
+    lnn(&["train", &system, "--epochs", "1", "--out", &run]).refused(2, &["driven-spring", "time t"]);
     let charges = format!("rollout --system {system} --state 0.5,0 --t-end 1 --dt 0.1 --charges --out -");
     lnn(&charges.split(' ').collect::<Vec<_>>()).refused(2, &["--charges"]);
     // What is read off the Lagrangian does not depend on the drive.
