@@ -49,6 +49,7 @@ macro_rules! page {
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[guess]: crate::docs::recorded_motion#how-columns-are-guessed\n",
+            "[guesses]: crate::docs::verdicts#checks-and-guesses\n",
             "[recorded]: crate::docs::recorded_motion#ways-to-learn\n",
             "[by-forces]: crate::docs::recorded_motion#residuals-of-force\n",
             "[tube]: crate::docs::recorded_motion#tubes\n",
