@@ -10,8 +10,8 @@ use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::{Geometry, GeometryError, geometries};
 use lnn::lagrangian::system::{Bounds, Size};
 use lnn::lagrangian::{
-    Description, EulerLagrange, Frictionless, Interruptible, Linearization, Linearizer, Request, SystemInstance, Terms,
-    configure, configure_system, configure_values, constrained_systems, find,
+    Description, EulerLagrange, Frictionless, Interruptible, Linearization, Linearizer, MechanicsError, Request,
+    SystemInstance, Terms, configure, configure_system, configure_values, constrained_systems, find,
 };
 use lnn::linalg::Workspace;
 use lnn::network::NetworkLagrangian;
@@ -276,6 +276,12 @@ impl Subject {
         (request, friction): (Request, bool),
         threads: usize,
     ) -> PyResult<Vec<(Terms<f64>, usize)>> {
+        if let Kind::System(configured, _) = &self.kind
+            && configured.is_driven()
+            && request.includes(Request::FORCE)
+        {
+            return Err(value(MechanicsError::Timed));
+        }
         let work = |watch: &Watch| {
             self.with_friction(friction, |model| computed(model, states, request, threads, &watch.interrupt))
         };

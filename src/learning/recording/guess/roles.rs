@@ -223,7 +223,11 @@ impl Roles<'_> {
                     let alike = correlation > least && (factor - 1.0).abs() < like && !back;
                     ((named && correlation > NAMED) || alike).then_some((j, correlation))
                 };
-                let best = sources.filter_map(of).max_by(|a, b| a.1.total_cmp(&b.1));
+                // On a circle each coordinate is nearly the derivative of the other: names that belong together decide.
+                let together =
+                    |j: usize| name.starts_with(&*self.table.names[j]) || name.ends_with(&*self.table.names[j]);
+                let best = sources.filter_map(of);
+                let best = best.max_by(|a, b| together(a.0).cmp(&together(b.0)).then(a.1.total_cmp(&b.1)));
                 match best {
                     Some((j, _)) => {
                         let because =
