@@ -58,7 +58,7 @@ impl FormulaForces {
     }
 }
 
-/// [`FormulaForces`] with values of the parameters.
+/// Generalized forces `Q(q, v, t)` of a system file, with values of its parameters.
 #[derive(Clone, Debug)]
 pub struct GivenForces<S> {
     forces: FormulaForces,
