@@ -64,11 +64,7 @@ impl MotionSource {
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
-        let (Source { model, columns, forces }, driven) = Source::driven(system.clone(), given)?;
-        let (model, driving) = match driven {
-            Some((model, force)) => (model, Some(force)),
-            None => (model, None),
-        };
+        let (Source { model, columns, forces }, driving) = Source::driven(system.clone(), given)?;
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
         let (time_like, units) = (system.time_like.is_some(), system.units(columns.len() / 2));

@@ -98,9 +98,8 @@ impl Probe {
     /// As [`Probe::system`].
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
-        let (Source { model, columns, .. }, driven) = Source::driven(system.clone(), given)?;
         // What is read off a Lagrangian does not depend on what drives it.
-        let model = driven.map_or(model, |(model, _)| model);
+        let (Source { model, columns, .. }, _) = Source::driven(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
         let n = configured.coordinates;
         require_at_most(MAX_COORDINATES, n)?;

@@ -3,7 +3,7 @@
 use crate::cli::learned::Learned;
 use crate::cli::{CliError, forces, output, system_arg};
 use crate::lagrangian::system::System;
-use crate::lagrangian::{EulerLagrange, GivenForces, configure_system};
+use crate::lagrangian::{EulerLagrange, GivenForces, SystemInstance, configure_system};
 use crate::pipeline::usual_force;
 use crate::scalar::Scalar;
 use std::borrow::Cow;
@@ -11,9 +11,6 @@ use std::path::{Path, PathBuf};
 
 /// What makes something of a system, by its name or file and the values of its parameters.
 type FromSystem<T> = fn(&str, &[(String, String)]) -> Result<T, CliError>;
-
-/// A model and the forces that drive it in time.
-pub type DrivenModel<S> = (Box<dyn EulerLagrange<S>>, GivenForces<S>);
 
 /// Something that moves by a Lagrangian, with the names of its state's components.
 pub struct Source<S> {
@@ -39,30 +36,31 @@ impl<S: Scalar> Source<S> {
     /// # Errors
     /// A usage error for a wrong parameter.
     pub fn configured(system: Cow<'static, System>, given: &[(String, String)]) -> Result<Self, CliError> {
-        Ok(Self::driven(system, given)?.0)
+        let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
+        let model = configured.build().map_err(CliError::usage)?;
+        Ok(Self::of(&configured, model))
     }
 
-    /// A system without those of its forces that depend on the time, beside which it refuses to evaluate states, and these with the model
-    /// that they drive.
+    /// A system without those of its forces that depend on the time, and these.
     ///
     /// # Errors
     /// A usage error for a wrong parameter.
     pub fn driven(
         system: Cow<'static, System>,
         given: &[(String, String)],
-    ) -> Result<(Self, Option<DrivenModel<S>>), CliError> {
+    ) -> Result<(Self, Option<GivenForces<S>>), CliError> {
         let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
-        let model = configured.build().map_err(CliError::usage)?;
-        let driven = match configured.build_driven().map_err(CliError::usage)? {
-            (model, Some(force)) => Some((model, force)),
-            _ => None,
-        };
+        let (model, driving) = configured.build_driven().map_err(CliError::usage)?;
+        Ok((Self::of(&configured, model), driving))
+    }
+
+    fn of(configured: &SystemInstance<S>, model: Box<dyn EulerLagrange<S>>) -> Self {
         for name in model.manifold().map_or(&[][..], |manifold| manifold.redundant()) {
             output::note(&format!("the constraint `{name}` follows from the others and is left out"));
         }
         let columns = configured.system.columns(configured.coordinates);
         let forces = columns[..configured.coordinates].iter().map(|name| usual_force(name)).collect();
-        Ok((Self { model, columns, forces }, driven))
+        Self { model, columns, forces }
     }
 
     /// A trained model; its weights are converted to the precision of `S`.

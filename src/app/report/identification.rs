@@ -14,7 +14,7 @@ const POINTS: usize = 4000;
 const LAGS: usize = 40;
 
 /// What was measured and fitted, for pictures.
-struct Fit<'a> {
+struct Fitted<'a> {
     /// Names of the coordinates, of which files have theirs.
     names: Vec<&'a str>,
     /// `true` if forces on them were fitted.
@@ -28,7 +28,7 @@ struct Fit<'a> {
 /// coordinate; the correlations of the constants. `periodic` are the coordinates that are angles.
 pub fn identification_figures(found: &Identified, periodic: &[bool]) -> Vec<Figure> {
     let is_force = found.segments == 0;
-    let fit = Fit {
+    let fit = Fitted {
         names: found.residuals.iter().map(|residual| residual.coordinate.as_str()).collect(),
         is_force,
         units: units(periodic, is_force),
@@ -40,7 +40,7 @@ pub fn identification_figures(found: &Identified, periodic: &[bool]) -> Vec<Figu
 
 /// Measured and fitted values of held-out motion, as [`identification_figures`] draws them; none for the formula of a model.
 pub fn formula_figures(found: &FoundFormula) -> Vec<Figure> {
-    let fit = Fit {
+    let fit = Fitted {
         names: found.coordinates.iter().map(String::as_str).collect(),
         is_force: false,
         units: units(&found.periodic, false),
@@ -54,7 +54,7 @@ fn units(periodic: &[bool], is_force: bool) -> Vec<&'static str> {
     periodic.iter().map(|angle| if *angle && !is_force { "rad" } else { "SI" }).collect()
 }
 
-impl Fit<'_> {
+impl Fitted<'_> {
     fn figures(&self) -> impl Iterator<Item = Figure> {
         (0..self.names.len().min(COORDINATES)).flat_map(|i| self.of(i)).flatten()
     }

@@ -183,7 +183,7 @@ pub enum SamplingError {
 pub(crate) struct Drawn<'a> {
     system: &'a SystemInstance<f64>,
     /// The model of a system under constraints or forces.
-    whole: Option<Box<dyn EulerLagrange<f64>>>,
+    model: Option<Box<dyn EulerLagrange<f64>>>,
     pub q: Vec<f64>,
     pub v: Vec<f64>,
     a: Vec<f64>,
@@ -200,9 +200,9 @@ impl<'a> Drawn<'a> {
     /// [`SamplingError::System`] for constraints that contradict each other or leave no motion, and for forces that depend on the time.
     pub fn new(system: &'a SystemInstance<f64>) -> Result<Self, SamplingError> {
         system.require_states()?;
-        let is_whole = system.constraints().is_some() || system.forces().is_some();
-        let whole = is_whole.then(|| system.build()).transpose()?;
-        Ok(Self { system, whole, q: Vec::new(), v: Vec::new(), a: Vec::new() })
+        let needs_model = system.constraints().is_some() || system.forces().is_some();
+        let model = needs_model.then(|| system.build()).transpose()?;
+        Ok(Self { system, model, q: Vec::new(), v: Vec::new(), a: Vec::new() })
     }
 
     /// Goes on unless a flag was raised.
@@ -216,13 +216,13 @@ impl<'a> Drawn<'a> {
     /// Brings a state to the mass shell of the system, or the shortest way to its constraints; what is demanded where there is no way.
     pub fn impose(&self, q: &mut [f64], v: &mut [f64]) -> Result<Option<&'static str>, SamplingError> {
         self.system.impose_constraint(q, v)?;
-        let manifold = self.whole.as_ref().and_then(|model| model.manifold());
+        let manifold = self.model.as_ref().and_then(|model| model.manifold());
         Ok(manifold.and_then(|manifold| project(manifold, q, v).err()).map(|_| CONSTRAINTS))
     }
 
     /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
     pub fn take(&mut self, q: &[f64], v: &[f64]) -> Result<Option<&'static str>, SamplingError> {
-        let a = match &self.whole {
+        let a = match &self.model {
             Some(model) => model.acceleration(q, v).unwrap_or_default(),
             None => self.system.exact_acceleration(q, v)?,
         };
@@ -242,7 +242,7 @@ impl<'a> Drawn<'a> {
     /// [`SamplingError::Dataset`] without any state, or where a constraint is not finite.
     pub fn finish(self) -> Result<Dataset<f64>, SamplingError> {
         let set = Dataset::new(self.system.coordinates, self.q, self.v, self.a)?;
-        match self.whole.as_ref().and_then(|model| model.manifold()) {
+        match self.model.as_ref().and_then(|model| model.manifold()) {
             Some(manifold) => Ok(set.on(manifold)?),
             None => Ok(set),
         }

@@ -450,18 +450,11 @@ impl Judged<'_> {
         doubts
     }
 
-    /// What was measured, and what is left of it, in SI.
+    /// Positions and residuals of the segments in SI units.
     fn paths(&self) -> Vec<ResidualPath> {
         let data = self.search.motion.data;
-        let n = data.n;
         let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
-            let track = &data.recording.tracks[segment.track];
-            let (samples, sigma) = (segment.first..segment.first + segment.samples, &data.sigma_of[segment.track]);
-            ResidualPath {
-                times: track.times[samples.clone()].to_vec(),
-                measured: track.q[samples.start * n..samples.end * n].to_vec(),
-                residuals: residuals.iter().enumerate().map(|(k, r)| r * sigma[k % n]).collect(),
-            }
+            ResidualPath::of(data.recording, segment, residuals, |_, i| data.sigma_of[segment.track][i])
         };
         self.segments.iter().zip(self.residuals).map(of).collect()
     }

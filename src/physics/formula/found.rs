@@ -138,9 +138,9 @@ pub struct FoundFormula {
     pub friction: bool,
     /// Seed of the random choices.
     pub seed: u64,
-    /// Coordinates with known forces.
     /// Held-out motion, measured and followed; empty for the formula of a model.
     pub paths: Vec<ResidualPath>,
+    /// Coordinates with known forces.
     pub(super) forced: Vec<bool>,
     pub(super) bounds: Vec<[f64; 2]>,
     pub(super) speeds: Vec<f64>,

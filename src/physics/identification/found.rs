@@ -1,5 +1,6 @@
 //! What was identified.
 
+use super::follow::Segment;
 use super::{Between, Verdict};
 use crate::recording::{LoadedRecording, Recording};
 use serde::{Serialize, Serializer};
@@ -165,6 +166,25 @@ pub struct ResidualPath {
     pub measured: Vec<f64>,
     /// Measured minus fitted, in SI, `(samples, n)`; `NaN` where nothing was fitted.
     pub residuals: Vec<f64>,
+}
+
+impl ResidualPath {
+    /// Positions of a segment and their residuals, which are in units of the noise: `noise` by sample of the trajectory and coordinate.
+    pub(crate) fn of(
+        recording: &Recording,
+        segment: &Segment,
+        residuals: &[f64],
+        noise: impl Fn(usize, usize) -> f64,
+    ) -> Self {
+        let (track, n) = (&recording.tracks[segment.track], recording.n());
+        let samples = segment.first..segment.first + segment.samples;
+        let own = residuals.iter().enumerate().map(|(k, r)| r * noise(segment.first + k / n, k % n));
+        Self {
+            times: track.times[samples.clone()].to_vec(),
+            measured: track.q[samples.start * n..samples.end * n].to_vec(),
+            residuals: own.collect(),
+        }
+    }
 }
 
 /// Constants with their standard errors, and how far these can be trusted.

@@ -606,15 +606,9 @@ fn result(
 
 /// Positions of the segments and their residuals, in SI; `residuals` are in units of the noise.
 fn paths(problem: &Problem<'_>, segments: &[Segment], residuals: &[Vec<f64>]) -> Vec<ResidualPath> {
-    let n = problem.sigma.len();
     let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
-        let (track, end) = (&problem.course.recording.tracks[segment.track], segment.first + segment.samples);
-        let unit = |k: usize| problem.sigma_at(segment.track, segment.first + k / n, k % n);
-        ResidualPath {
-            times: track.times[segment.first..end].to_vec(),
-            measured: track.q[segment.first * n..end * n].to_vec(),
-            residuals: residuals.iter().enumerate().map(|(k, r)| r * unit(k)).collect(),
-        }
+        let noise = |sample: usize, i: usize| problem.sigma_at(segment.track, sample, i);
+        ResidualPath::of(problem.course.recording, segment, residuals, noise)
     };
     segments.iter().zip(residuals).map(of).collect()
 }

@@ -1,4 +1,4 @@
-//! Coordinates that stand still, individually or relative to others.
+//! Coordinates that stand still, individually or relative to others, and those that move uniformly.
 
 use crate::names::number;
 use crate::recording::smooth::Smoothing;
