@@ -32,11 +32,10 @@ pub(crate) fn constraint_figures(
         manifold.rows(q, v, &mut rows);
         let moved = model.terms(q, v, Request::ACCELERATION, &mut terms).is_ok();
         for c in 0..names.len() {
-            let size = rows.matrix[c * q.len()..(c + 1) * q.len()].iter().fold(0.0, |size: f64, x| size.hypot(*x));
-            let off = if manifold.is_holonomic(c) { rows.values[c] } else { rows.rates[c] };
+            let (distance, length) = rows.distance(manifold, c);
             // Exact values have no place on a logarithmic axis.
-            strays[c].push((off.abs() / size).max(f64::EPSILON));
-            loads[c].push(if moved { terms.multipliers[c] * size } else { f64::NAN });
+            strays[c].push(distance.abs().max(f64::EPSILON));
+            loads[c].push(if moved { terms.multipliers[c] * length } else { f64::NAN });
         }
     }
     let lines = |values: &[Vec<f64>]| -> Vec<Series> {

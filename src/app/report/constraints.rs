@@ -22,9 +22,7 @@ pub fn found_constraint_figures(found: &FoundConstraints, samples: &MotionSample
         let (q, v) = samples.state(at).split_at(n);
         manifold.rows(q, v, &mut rows);
         for (c, distances) in distances.iter_mut().enumerate() {
-            let size = rows.matrix[c * n..(c + 1) * n].iter().fold(0.0, |size: f64, x| size.hypot(*x));
-            let off = if manifold.is_holonomic(c) { rows.values[c] } else { rows.rates[c] };
-            distances.push(off / size);
+            distances.push(rows.distance(&manifold, c).0);
         }
     }
     let places: Vec<f64> = places.into_iter().map(|at| at as f64).collect();

@@ -18,6 +18,17 @@ pub struct ManifoldRows<S> {
     pub drift: Vec<S>,
 }
 
+#[cfg(feature = "plot")]
+impl ManifoldRows<f64> {
+    /// Distance of the state from constraint `c`, `phi` over the length of its gradient or `(A v - b)` over that of its row, and this length.
+    pub(crate) fn distance(&self, manifold: &(impl Manifold<f64> + ?Sized), c: usize) -> (f64, f64) {
+        let n = manifold.coordinates();
+        let length = self.matrix[c * n..(c + 1) * n].iter().fold(0.0, |length: f64, x| length.hypot(*x));
+        let off = if manifold.is_holonomic(c) { self.values[c] } else { self.rates[c] };
+        (off / length, length)
+    }
+}
+
 /// The states that the constraints of a model allow: `phi(q) = 0` and `A v = b`.
 pub trait Manifold<S: Scalar>: Send + Sync {
     /// Number of coordinates `n`.
