@@ -26,7 +26,7 @@ use std::path::PathBuf;
 ///     config.training.phases[0].epochs = 2;
 /// });
 /// let fitted = fit.run()?;
-/// println!("{}", fitted.text());
+/// println!("{}", fitted.findings());
 /// assert!(fitted.hold_out.model[0].median.is_finite());
 /// let a = fitted.network.acceleration(&[0.3, 0.1], &[0.0, 0.0])?;
 /// # assert!(a[0].is_finite());
