@@ -63,6 +63,7 @@ class Subject:
         accuracy: tuple[float, float, float | None],
         acting: tuple[bool, bool],
         forces: _Driving,
+        inputs: _Driving,
         threads: int,
     ) -> list[tuple[_Doubles, _Doubles, _Doubles, _Doubles, str | None, int]]: ...
     def linearize(

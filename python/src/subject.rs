@@ -28,6 +28,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// States whose terms are computed at a time.
@@ -237,6 +238,7 @@ impl Subject {
                 json!({
                     "name": system.name, "title": system.title, "time_unit": system.time_unit,
                     "parameters": values(configured), "description": system.description(),
+                    "inputs": configured.inputs().collect::<Vec<_>>(),
                 })
             }
             Kind::Model(header, ..) => json!({ "name": header.system, "header": header }),
@@ -277,8 +279,7 @@ impl Subject {
         threads: usize,
     ) -> PyResult<Vec<(Terms<f64>, usize)>> {
         if let Kind::System(configured, _) = &self.kind
-            && configured.is_driven()
-            && request.includes(Request::FORCE)
+            && configured.is_timed()
         {
             return Err(value(MechanicsError::Timed));
         }
@@ -524,6 +525,7 @@ impl Subject {
         accuracy: (f64, f64, Option<f64>),
         acting: (bool, bool),
         forces: (Option<Samples>, Option<Py<PyAny>>),
+        inputs: (Option<Samples>, Option<Py<PyAny>>),
         threads: usize,
     ) -> PyResult<Bound<'py, PyList>> {
         let (q, v) = self.states(&q, &v)?;
@@ -535,13 +537,15 @@ impl Subject {
             _ => None,
         };
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
-        let mut forces = Forces::of(n, (t0, t_end), forces.0, forces.1)?;
-        let mut driven = None;
+        let forces = Forces::of(n, (t0, t_end), "force", forces)?;
+        let mut known = None;
+        let mut fed = None;
         if let Kind::System(configured, _) = &self.kind
-            && configured.is_driven()
-            && let (model, Some(own)) = configured.build_driven().map_err(value)?
+            && configured.inputs().next().is_some()
         {
-            (forces, driven) = (forces.beside(own), Some(model));
+            let given = Arc::new(Forces::of(configured.inputs().count(), (t0, t_end), "inputs", inputs)?);
+            fed = Some(configured.build_with(Forces::inputs(&given, configured.inputs().count())).map_err(value)?);
+            known = Some(given);
         }
         let starts = q.chunks(n).zip(v.chunks(n)).enumerate();
         let starts: Vec<_> = starts.map(|(k, (q, v))| Start { q, v, force: forces.on(k) }).collect();
@@ -549,13 +553,13 @@ impl Subject {
             let follow = |model: &dyn EulerLagrange<f64>| {
                 rollout_each(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
             };
-            match (&driven, friction) {
+            match (&fed, friction) {
                 (Some(model), true) => follow(model.as_ref()),
                 (Some(model), false) => follow(&Frictionless(model.as_ref())),
                 (None, _) => self.with_friction(friction, follow),
             }
         })?;
-        if let Some(error) = forces.raised() {
+        if let Some(error) = forces.raised().or_else(|| known.and_then(|known| known.raised())) {
             return Err(error);
         }
         let result = PyList::empty(py);

@@ -123,6 +123,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         delays: args.delay.clone(),
         noise: args.noise.clone(),
         errors: reading.errors.clone(),
+        inputs: reading.inputs.clone(),
         targets: args.targets.map(Targets::from),
         between: args.between,
         segment: args.segment,
@@ -160,7 +161,8 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
         let angles = recording.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
         recording.periodic = angles.map(|(column, _)| column.clone()).collect();
     }
-    let columns = Columns { error: args.error.clone(), whole: true, ..recording.meaning() };
+    let (error, input) = (args.error.clone(), instance.inputs().map(str::to_string).collect());
+    let columns = Columns { error, input, whole: true, ..recording.meaning() };
     read_files(&recording.data, &columns)
 }
 

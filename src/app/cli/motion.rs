@@ -146,6 +146,9 @@ pub struct Facts<'a> {
     pub work: Option<f64>,
     /// Energy taken by friction.
     pub dissipated: Option<f64>,
+    /// What took it, in words.
+    #[serde(skip)]
+    pub taken_by: &'static str,
     /// Energy that is not accounted for.
     pub energy_defect: Option<f64>,
     /// What the motion conserves without friction and forces, as far as it is kept.
@@ -246,8 +249,9 @@ impl Facts<'_> {
         let work = self.work.map_or(String::new(), |work| format!("forces added {}, ", rounded(work, 10)));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
-                "energy changed by {}, {work}friction removed {}, defect {}\n",
+                "energy changed by {}, {work}{} removed {}, defect {}\n",
                 rounded(change, 10),
+                self.taken_by,
                 rounded(dissipated, 10),
                 rounded(defect, 2)
             ),

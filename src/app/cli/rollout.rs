@@ -14,9 +14,7 @@ use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
-use crate::rollout::{
-    Driven, Ending, EnergyBalance, Force, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
-};
+use crate::rollout::{Driven, Ending, EnergyBalance, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::symmetry::Invariant;
 use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
@@ -181,7 +179,11 @@ impl Args {
 /// A usage error for a state of the wrong length; a data error for a bad model, a file that cannot be written, or a
 /// motion that ends before its time, the samples up to there being written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let source = args.source()?;
+    let mut source = args.source()?;
+    let span = (args.t_start, args.t_end);
+    let coordinates = &source.columns[..source.columns.len() / 2];
+    let force = args.forces.force(coordinates, &source.forces, span.0, span.1)?;
+    let force = source.take_inputs(force)?;
     let (columns, standard) = (&source.columns, input::is_standard(&args.out));
     if args.json && standard {
         return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
@@ -189,17 +191,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (q, v) = args.state.split_at(columns.len() / 2);
     let options = args.options(&source)?;
     args.require_room(&source)?;
-    let recorded = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
-    let force: Option<Box<dyn Force<f64>>> = match (recorded, source.driving.clone()) {
-        (None, None) => None,
-        (Some(recorded), None) => Some(Box::new(recorded)),
-        (None, Some(own)) => Some(Box::new(own)),
-        (Some(recorded), Some(own)) => Some(Box::new((recorded, own))),
-    };
-    if args.charges && force.is_some() {
-        return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
+    if args.charges && (force.is_some() || source.model.is_timed()) {
+        return Err(CliError::usage("--charges: forces from outside and the time change them; leave these out"));
     }
-    let span = (args.t_start, args.t_end);
     let tube = args.tube.tube((source.model.as_ref(), args.model.as_deref()), &columns[..q.len()], span)?;
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
@@ -212,7 +206,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let moving = Interruptible::new(network, &stop);
-    let driven = force.as_deref().map(|force| Driven::new(&moving, force));
+    let driven = force.as_ref().map(|force| Driven::new(&moving, force));
     let mut watch = Watch::new(source.range(), columns);
     let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
     let mut take = |piece: &Trajectory<f64>| {
@@ -294,6 +288,7 @@ impl Args {
             energy_change: balance.map(|balance| balance.change),
             work: balance.filter(|_| is_driven).map(|balance| balance.work),
             dissipated: balance.map(|balance| balance.dissipated),
+            taken_by: if model.is_timed() { "friction, own forces and time" } else { "friction" },
             energy_defect: balance.map(EnergyBalance::defect),
             conserved: invariant.map(|invariant| Kept::new(invariant, watch.energy)),
             left_training_range: watch.leaving.as_ref(),

@@ -98,6 +98,8 @@ pub struct LoadedRecording {
     pub bridged: Bridged,
     /// Standard deviations of the positions of every trajectory, `(samples, n)` each; empty if they are in no columns.
     pub errors: Vec<Vec<f64>>,
+    /// Inputs of every trajectory, `(samples, inputs)` each, in the order of their columns; empty if there are none.
+    pub inputs: Vec<Vec<f64>>,
     /// Number of the take of every trajectory: those that gaps cut out of one have the same.
     pub takes: Vec<usize>,
     /// Meaning of the columns, which have the names of the first file's header without units; without files it is empty.
@@ -123,7 +125,7 @@ impl From<Recording> for LoadedRecording {
     fn from(recording: Recording) -> Self {
         let rows = vec![Rows::default(); recording.tracks.len()];
         let takes = (0..recording.tracks.len()).collect();
-        let (cuts, dropped, errors) = (Vec::new(), Vec::new(), Vec::new());
+        let (cuts, dropped, errors, inputs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let bridged = Bridged::default();
         let (columns, formats) = (Columns::default(), Vec::new());
         Self {
@@ -136,6 +138,7 @@ impl From<Recording> for LoadedRecording {
             dropped,
             bridged,
             errors,
+            inputs,
             takes,
             columns,
             formats,

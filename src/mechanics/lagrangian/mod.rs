@@ -17,6 +17,7 @@ mod expression;
 mod formula_forces;
 #[cfg(feature = "rollout")]
 mod groups;
+mod in_time;
 mod linearization;
 mod mechanics;
 mod pattern;
@@ -70,12 +71,11 @@ pub use expression::ExpressionLagrangian;
 pub(crate) use expression::quantity;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
-#[doc(hidden)]
-pub use formula_forces::GivenForces;
 #[cfg(feature = "rollout")]
 pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
+pub use in_time::{InTime, Inputs};
 pub use linearization::{Gradient, Linearization, Linearizer};
 #[doc(hidden)]
 pub use linearization::{Held, Products, Slopes};

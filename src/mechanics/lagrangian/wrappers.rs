@@ -183,6 +183,22 @@ pub struct Frictionless<'a, S>(
     pub &'a dyn EulerLagrange<S>,
 );
 
+impl<S: Scalar> Frictionless<'_, S> {
+    /// Empties the forces of the terms of the model, whose evaluation ended so, and solves.
+    fn without_force(
+        &self,
+        outcome: Result<(), MechanicsError>,
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let found = terms.drain_failures(outcome)?;
+        terms.force.clear();
+        terms.dissipation.clear();
+        terms.complete_beside(found, self.coordinates(), v, request)
+    }
+}
+
 impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
     fn coordinates(&self) -> usize {
         self.0.coordinates()
@@ -190,10 +206,19 @@ impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         let outcome = self.0.terms(q, v, request.without_solution(), terms);
-        let found = terms.drain_failures(outcome)?;
-        terms.force.clear();
-        terms.dissipation.clear();
-        terms.complete_beside(found, self.coordinates(), v, request)
+        self.without_force(outcome, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let outcome = self.0.terms_at(t, q, v, request.without_solution(), terms);
+        self.without_force(outcome, v, request, terms)
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
@@ -230,6 +255,25 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
             return Err(MechanicsError::Interrupted);
         }
         self.model.terms(q, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        if request != Request::ENERGY && self.flag.load(Ordering::Relaxed) {
+            terms.clear();
+            return Err(MechanicsError::Interrupted);
+        }
+        self.model.terms_at(t, q, v, request, terms)
+    }
+
+    fn is_timed(&self) -> bool {
+        self.model.is_timed()
     }
 
     fn solved(&self) -> Option<Solved<'_, S>> {

@@ -19,9 +19,11 @@ struct MotionEquations<'a, S> {
     force: Option<&'a dyn Force<S>>,
     options: &'a Options<S>,
     n: usize,
-    /// The model that moves without a force from outside.
+    /// `true` if the accelerations depend on the time: by the model, or by a force from outside.
+    timed: bool,
+    /// The model if they do not.
     accelerations: Accelerations<'a, S>,
-    /// The model to which a force from outside is added.
+    /// The terms of the model if they do.
     terms: Terms<S>,
     external: Vec<S>,
     workspace: Workspace<S>,
@@ -44,14 +46,16 @@ impl<S: Scalar> MotionEquations<'_, S> {
         let (q, v) = y.split_at(n);
         let (speed, a) = dy.split_at_mut(n);
         speed.copy_from_slice(v);
-        match self.force {
-            None => self.accelerations.at(q, v, a).map_err(StepFailure::Model)?,
-            Some(force) => {
-                self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
-                force.force(piece.time(self.time(elapsed)), q, v, &mut self.external);
+        if self.timed {
+            let t = piece.time(self.time(elapsed));
+            self.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
+            if let Some(force) = self.force {
+                force.force(t, q, v, &mut self.external);
                 self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(StepFailure::Model)?;
-                a.copy_from_slice(&self.terms.acceleration);
             }
+            a.copy_from_slice(&self.terms.acceleration);
+        } else {
+            self.accelerations.at(q, v, a).map_err(StepFailure::Model)?;
         }
         if a.iter().any(|a| !a.is_finite()) {
             return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
@@ -76,7 +80,8 @@ pub(super) fn run<S: Integrable>(
     let (n, zero) = (model.coordinates(), <S as Real>::zero());
     let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
     let accelerations = Accelerations::new(model);
-    let mut motion = MotionEquations { model, force, options, n, accelerations, terms, external, workspace };
+    let timed = force.is_some() || model.is_timed();
+    let mut motion = MotionEquations { model, force, options, n, timed, accelerations, terms, external, workspace };
     let all = Samples::new(options);
     let (domain, manifold) = (options.domain.as_ref(), model.manifold());
     let mut state: Vec<S> = q.iter().chain(v).copied().collect();
@@ -96,7 +101,7 @@ pub(super) fn run<S: Integrable>(
             atol: options.atol,
             max_steps: options.max_steps.saturating_sub(attempts),
             first_step: S::min(first_step, piece.end - start),
-            timed: force.is_some(),
+            timed,
             start: &state,
             samples: &samples,
         };

@@ -96,6 +96,7 @@ pub(super) fn run<S: Scalar>(
     let zero = <S as Real>::zero();
     let domain = options.domain.as_ref();
     let start: Vec<S> = q.iter().chain(v).copied().collect();
+    phase.stop_at(options.t0);
     let moving = StepFailure::check(domain, &start).and_then(|()| phase.momentum(q, v));
     let stop = match moving {
         Err(failure) => Some(into_error(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
@@ -154,6 +155,7 @@ fn advance<S: Scalar>(
                 return stop;
             }
         }
+        phase.stop_at(position.time(options, options.t_end < options.t0));
         let arrived = position.velocity(phase).and_then(|v| {
             let sample: Vec<S> = position.state.q.high.iter().copied().chain(v).collect();
             StepFailure::check(domain, &sample).map(|()| sample)
@@ -263,6 +265,7 @@ impl<S: Scalar> Position<'_, S> {
         options: &Options<S>,
         backwards: bool,
     ) -> RolloutError {
+        phase.stop_at(self.time(options, backwards));
         let v = self.velocity(phase).unwrap_or_else(|_| self.near.clone());
         let state = self.state.q.high.iter().chain(&v).map(|x| x.to_f64()).collect();
         let step = if self.steps == 0 && self.since == <S as Real>::zero() { 0.0 } else { self.h.to_f64() };

@@ -108,7 +108,7 @@ impl<'a, S: Scalar> Exchange<'a, S> {
     /// Adds the powers at a time, over `weight` in the unit of time.
     fn add(&mut self, t: S, weight: S, q: &[S], v: &[S]) {
         if !self.model.conserves_energy() {
-            let known = self.model.terms(q, v, Request::FORCE, &mut self.terms).is_ok();
+            let known = self.model.terms_at(&[t], q, v, Request::FORCE, &mut self.terms).is_ok();
             let power = self.terms.dissipation.first().copied().filter(|_| known).unwrap_or_else(S::nan);
             self.dissipated += weight * power;
         }
@@ -158,9 +158,9 @@ impl<S: Scalar> EnergyBalance<S> {
         let size = CHUNK * (*coordinates).max(1);
         let (mut energy, mut power) = (Vec::with_capacity(t.len()), Vec::with_capacity(t.len()));
         let mut terms = Terms::default();
-        for (q, v) in q.chunks(size).zip(v.chunks(size)) {
+        for ((q, v), t) in q.chunks(size).zip(v.chunks(size)).zip(t.chunks(CHUNK)) {
             model
-                .terms(q, v, Request::ENERGY | Request::FORCE, &mut terms)
+                .terms_at(t, q, v, Request::ENERGY | Request::FORCE, &mut terms)
                 .map_err(|e| invalid(format!("samples from {}: {e}", energy.len())))?;
             energy.extend_from_slice(&terms.energy);
             power.extend_from_slice(&terms.dissipation);

@@ -269,6 +269,9 @@ pub fn certify_system<S: Scalar>(
             certify(lagrangian, self.0, self.1, self.2)
         }
     }
+    if configured.is_timed() {
+        return Err(CertificateError::NoLagrangian);
+    }
     configured.visit(Certify(&configured.parameters, region, options)).unwrap_or(Err(CertificateError::NoLagrangian))
 }
 

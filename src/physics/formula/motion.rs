@@ -123,6 +123,7 @@ impl Motion<'_> {
             equations: &equations,
             chosen: wanted.len(),
             between: self.between,
+            inputs: Vec::new(),
             step: data.step,
             substeps: self.substeps,
         };

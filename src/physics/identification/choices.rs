@@ -1,11 +1,12 @@
 //! The user's choices: unknown constants, sensors, position errors, and the quantity that is fitted.
 
+use super::follow::Inputs;
 use super::smoothed::Met;
 use super::solve::{Sensor, SensorKind};
 use super::{IdentifyError, IdentifyOptions};
 use crate::lagrangian::SystemInstance;
 use crate::names::pluralize;
-use crate::recording::{Recording, Targets};
+use crate::recording::{RecordedTrajectory, Recording, Targets};
 
 /// Position errors: one positive number for each position.
 pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result<(), IdentifyError> {
@@ -24,6 +25,29 @@ pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result
         }
     }
     Ok(())
+}
+
+/// The inputs of every trajectory, for which the options must have as many numbers as the system takes.
+pub(super) fn inputs<'a>(
+    instance: &SystemInstance<f64>,
+    recording: &'a Recording,
+    options: &'a IdentifyOptions,
+) -> Result<Vec<Inputs<'a>>, IdentifyError> {
+    let count = instance.inputs().count();
+    if count == 0 && options.inputs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let of = |(at, track): (usize, &'a RecordedTrajectory)| {
+        let values = options.inputs.get(at).map_or(&[][..], Vec::as_slice);
+        let expected = track.len() * count;
+        let found = match values.iter().position(|x| !x.is_finite()) {
+            None if values.len() == expected => return Ok(Inputs { times: &track.times, values }),
+            None => pluralize(values.len(), "number", "numbers"),
+            Some(at) => format!("{} of sample {}", values[at], at / count.max(1)),
+        };
+        Err(IdentifyError::Inputs { track: track.name.clone(), expected, found })
+    };
+    recording.tracks.iter().enumerate().map(of).collect()
 }
 
 /// What the constants are fitted to.

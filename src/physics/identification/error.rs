@@ -78,6 +78,16 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
+    /// An input that is not a finite number, or the wrong number of inputs.
+    #[error("inputs of {track}: expected {expected} finite numbers, found {found}")]
+    Inputs {
+        /// The trajectory.
+        track: String,
+        /// Its inputs, those of a sample one behind the other.
+        expected: usize,
+        /// What was found.
+        found: String,
+    },
     /// A standard deviation of a position that is not a finite number above 0, or the wrong number of standard deviations.
     #[error("errors of {track}: expected a finite number above 0 for each of {expected} positions, found {found}")]
     Errors {

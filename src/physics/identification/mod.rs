@@ -89,10 +89,13 @@ pub struct IdentifyOptions {
     /// them. Empty if they are not known.
     #[serde(default)]
     pub errors: Vec<Vec<f64>>,
+    /// Inputs of the forces of the system at the samples of every trajectory, `(samples, inputs)` each, in the order of their names.
+    #[serde(default)]
+    pub inputs: Vec<Vec<f64>>,
     /// What is fitted, [`Targets::Motion`] or [`Targets::Forces`]; by default the forces of a chain of links under known forces, otherwise the
     /// motion.
     pub targets: Option<Targets>,
-    /// Interpolation of known forces between the samples; by default the one that fits the motion best.
+    /// Interpolation of known forces and inputs between the samples; by default the one that fits the motion best.
     pub between: Option<Between>,
     /// Length of the segments in s; chosen by the data if not given.
     pub segment: Option<f64>,

@@ -77,6 +77,7 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
         equations: &equations,
         chosen: 2,
         between: Between::Linear,
+        inputs: Vec::new(),
         step: 0.02,
         substeps: 4,
     };

@@ -78,10 +78,10 @@ impl States {
         self.q.len() / n
     }
 
-    /// The time of a state.
-    fn time(&self, problem: &Problem<'_>, at: usize) -> f64 {
+    /// The track and the time of a state.
+    fn place(&self, problem: &Problem<'_>, at: usize) -> (usize, f64) {
         let (track, sample) = self.places[at];
-        problem.course.recording.tracks[track].times[sample]
+        (track, problem.course.recording.tracks[track].times[sample])
     }
 
     /// Calls `visit` with every batch of states: the integrator, the batch's offset among the numbers, and its accelerations for constants `x`.
@@ -91,7 +91,7 @@ impl States {
         x: &[f64],
         visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
-        self.batches_at(problem, x, |at| self.time(problem, at), visit);
+        self.batches_at(problem, x, |at| self.place(problem, at), visit);
     }
 
     /// The same with states at other times.
@@ -99,7 +99,7 @@ impl States {
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        time: impl Fn(usize) -> f64,
+        place: impl Fn(usize) -> (usize, f64),
         mut visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
         let n = problem.course.equations.n;
@@ -111,7 +111,7 @@ impl States {
             let range = first..(first + LANES * n).min(self.q.len());
             let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);
-            follower.at_times((first / n..range.end / n).map(&time));
+            follower.at((first / n..range.end / n).map(&place));
             follower.accelerate(&values, state, &self.force[range.clone()], a);
             visit(&mut follower, range, a);
         }
@@ -286,13 +286,13 @@ impl States {
     /// whose effect does not grow with time.
     fn phase_step(&self, problem: &Problem<'_>, x: &[f64], k: usize) -> Option<f64> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
-        let times = || (0..self.places.len()).map(|at| self.time(problem, at));
+        let times = || (0..self.places.len()).map(|at| self.place(problem, at).1);
         let (low, high) = times().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
         let third = (high - low) / 3.0;
         let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
         self.residuals(problem, x, Met::Accelerations, |first, _, slopes| {
             for (row, slopes) in slopes.chunks_exact(2 * n + m).enumerate() {
-                let since = self.time(problem, (first + row) / n) - low;
+                let since = self.place(problem, (first + row) / n).1 - low;
                 let part = if since < third { 0 } else { 1 };
                 if since < third || since > 2.0 * third {
                     sums[part] += slopes[2 * n + k].powi(2);
@@ -310,7 +310,7 @@ impl States {
         self.batches_at(
             problem,
             x,
-            |_| low,
+            |at| (self.places[at].0, low),
             |_, range, a| {
                 all[range].iter_mut().zip(a).for_each(|(moved, still)| *moved -= still);
             },

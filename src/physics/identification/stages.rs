@@ -1,6 +1,6 @@
 //! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
 
-use super::choices::{check_errors, chosen, met, sensors};
+use super::choices::{check_errors, chosen, inputs, met, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
@@ -114,6 +114,7 @@ pub fn identify(
     }
     recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;
     check_errors(recording, &options.errors)?;
+    let inputs = inputs(instance, recording, options)?;
     let filled = filled(recording);
     let repeated = filled.as_ref().map_or_else(Vec::new, repeated);
     let recording = filled.as_ref().map_or(recording, |filled| &filled.recording);
@@ -141,6 +142,7 @@ pub fn identify(
         equations: &equations,
         chosen: chosen.len(),
         between: options.between.unwrap_or(Between::Linear),
+        inputs: inputs.clone(),
         step: pieces.step,
         substeps: 1,
     };
@@ -164,7 +166,10 @@ pub fn identify(
     };
     stop.check()?;
     let mut x = given.clone();
-    let on_pieces = Problem { course: Course { recording: &pieces.long, ..problem.course.clone() }, ..problem.clone() };
+    let of_piece = |track: usize| inputs.get(pieces.origin(track, 0).0).copied();
+    let of_pieces = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
+    let course = Course { recording: &pieces.long, inputs: of_pieces, ..problem.course.clone() };
+    let on_pieces = Problem { course, ..problem.clone() };
     if met == Met::Forces {
         stop.stage("forces");
         let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
@@ -176,10 +181,10 @@ pub fn identify(
         return Ok(found.named(recording, options.robust));
     }
     let states = States::new(&on_pieces, &pieces.smoothed);
-    let fitted = match equations.timed {
+    let fitted = match equations.known {
         _ if states.len(n) == 0 => true,
-        true => states.fit_in_time(&on_pieces, &mut x).is_some(),
-        false => states.fit(&on_pieces, &mut x, met).is_some(),
+        0 => states.fit(&on_pieces, &mut x, met).is_some(),
+        _ => states.fit_in_time(&on_pieces, &mut x).is_some(),
     };
     stop.check()?;
     if !fitted {
@@ -196,7 +201,7 @@ pub fn identify(
         refit(&problem, &mut fitted, ITERATIONS);
     }
     // The noise of the forces is now known, so that the smoothest curve through it does not win.
-    let (best, rivals) = best_between(&mut problem, fitted, options, forced);
+    let (best, rivals) = best_between(&mut problem, fitted, options, forced || !inputs.is_empty());
     fitted = best;
     if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
         refit(&problem, &mut fitted, ITERATIONS);

@@ -73,7 +73,13 @@ fn a_driven_spring_moves_as_its_closed_form() {
     for (method, start, accuracy) in [("dopri5", 0.0, 2e-6), ("gauss6", 3.0, 1e-9), ("variational", 0.0, 5e-3)] {
         let options = format!("--state 0.5,-0.2 --t-start {start} --t-end 15 --dt 0.02 --method {method}");
         let (run, found) = motion((&system, &out), &options);
-        assert!(run.stdout.contains("forces added"), "{}", run.stdout);
+        // Its own forces account for the change of its energy.
+        let number = |name: &str| {
+            let rest = run.stdout.split(name).nth(1).unwrap_or_else(|| panic!("{name} in {}", run.stdout));
+            rest.split([',', '\n']).next().unwrap().trim().parse::<f64>().unwrap()
+        };
+        let (change, removed) = (number("energy changed by "), number("own forces and time removed "));
+        assert!(change.abs() > 0.1 && (change + removed).abs() < 1e-3 * change.abs(), "{}", run.stdout);
         for (t, x) in found[0].iter().zip(&found[1]) {
             assert!((x - exact(*t, start)).abs() < accuracy, "{method} {t}: {x} {}", exact(*t, start));
         }
@@ -118,4 +124,76 @@ fn the_drive_of_a_pendulum_is_identified() {
         }
     }
     assert!(within >= 11, "{within} of 15 constants within two standard errors");
+}
+
+/// A pendulum whose support shakes, `y = a cos(om t)`, and whose rod grows at a rate.
+const SHAKEN: &str = r#"
+name = "shaken-pendulum"
+lagrangian = "rod^2*theta_dot^2/2 + rod*(g - a*om^2*cos(om*t))*cos(theta)"
+[definitions]
+rod = "1 + rate*t"
+[[coordinates]]
+name = "theta"
+unit = "rad"
+periodic = true
+velocity_bounds = [-8, 8]
+[parameters]
+g = 9.81
+a = { default = 0.05, learn = true }
+om = { default = 7, learn = true, range = "positive" }
+rate = { default = 0, learn = true }
+"#;
+
+#[test]
+fn a_lagrangian_in_time_is_rolled_out_and_identified() {
+    let folder = Folder::new();
+    let (system, out) = (folder.file("shaken.toml", SHAKEN), text(&folder.path("motion.csv")));
+    let truth = [("a", 0.06), ("om", 6.6), ("rate", 0.03)];
+    let values = truth.map(|(name, value)| format!("--param {name}={value}")).join(" ");
+    let options = format!("{values} --state 0.5,0.3 --t-start 1 --t-end 11 --dt 0.02");
+    // Methods that have nothing in common agree, and the energy is accounted for.
+    let (_, reference) = motion((&system, &out), &format!("{options} --method dop853 --rtol 1e-13 --atol 1e-13"));
+    for (method, step, accuracy) in
+        [("gauss8", "0.02", 1e-9), ("gauss4", "0.005", 1e-7), ("variational", "0.001", 1e-4)]
+    {
+        let (run, found) = motion((&system, &out), &format!("{options} --method {method} --step {step}"));
+        let worst = found[1].iter().zip(&reference[1]).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        assert!(worst < accuracy, "{method}: {worst}");
+        let defect = run.stdout.split("defect ").nth(1).and_then(|rest| rest.split_whitespace().next()).unwrap();
+        assert!(defect.parse::<f64>().unwrap().abs() < 1e3 * accuracy, "{method}: {}", run.stdout);
+    }
+    // The equation of motion, written by hand, holds along it.
+    let (rows, h) = (reference[0].len(), 0.02);
+    for k in 2..rows - 2 {
+        let (t, theta, v) = (reference[0][k], reference[1][k], &reference[2]);
+        let a = (8.0 * (v[k + 1] - v[k - 1]) - (v[k + 2] - v[k - 2])) / (12.0 * h);
+        let rod = 1.0 + 0.03 * t;
+        let wanted = -((9.81 - 0.06 * 6.6 * 6.6 * (6.6 * t).cos()) * theta.sin() + 2.0 * 0.03 * v[k]) / rod;
+        assert!((a - wanted).abs() < 1e-3, "{t}: {a} {wanted}");
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut csv = "t,theta\n".to_string();
+    for (t, theta) in reference[0].iter().zip(&reference[1]) {
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        writeln!(csv, "{t},{}", theta + 1e-3 * noise).unwrap();
+    }
+    let data = folder.file("data.csv", csv);
+    let run = lnn(&["identify", &data, "--system", &system, "--json"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(found["explained"], true, "{}", run.stdout);
+    for (name, truth) in truth {
+        let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{name} {value} {error}");
+    }
+    // Where no time is known it is refused, and nothing panics.
+    for command in ["symmetries", "certify"] {
+        lnn(&[command, "--system", &system]).refused(2, &["time t"]);
+    }
+    let net = ["fit", &data, "--known", &system, "--epochs", "1", "--out", &text(&folder.path("run"))];
+    lnn(&net).refused(2, &["time `t`"]);
+    let held = SHAKEN.replace("[parameters]", "[constraints]\nsupport = \"theta - 0.1*t\"\n[parameters]");
+    lnn(&["systems", "--system", &folder.file("held.toml", held)]).refused(2, &["held.toml", "support", "time `t`"]);
+    let circle = SHAKEN.replace("1 + rate*t", "1 + rate*t*rod");
+    lnn(&["systems", "--system", &folder.file("circle.toml", circle)]).refused(2, &["rod", "itself"]);
 }

@@ -20,6 +20,8 @@ pub struct TrackBuilder {
     pub track: RecordedTrajectory,
     /// Standard deviations of its positions, `(samples, n)`; empty if there are none.
     pub error: Vec<f64>,
+    /// Inputs, `(samples, inputs)`; empty if there are none.
+    pub input: Vec<f64>,
     /// The row before, as it stands in the file.
     last: Vec<f64>,
     last_row: u64,
@@ -127,12 +129,15 @@ impl<'a> Builder<'a> {
                 part.push(value?);
             }
         }
-        for (name, error) in self.columns.error.iter().zip(scaled) {
+        for (name, error) in self.columns.error.iter().zip(scaled.by_ref()) {
             let error = error?;
             if error <= 0.0 {
                 return Err(Problem::Error { row, column: name.clone(), found: error });
             }
             open.error.push(error);
+        }
+        for value in scaled {
+            open.input.push(value?);
         }
         Ok(())
     }
@@ -165,8 +170,8 @@ impl<'a> Builder<'a> {
             force: room(force.len()),
             ..empty()
         };
-        let (rows, error, last) = (Rows::default(), Vec::new(), Vec::new());
-        self.tracks.push(TrackBuilder { label, rows, track, error, last, last_row: 0 });
+        let (rows, error, input, last) = (Rows::default(), Vec::new(), Vec::new(), Vec::new());
+        self.tracks.push(TrackBuilder { label, rows, track, error, input, last, last_row: 0 });
         Ok(())
     }
 }

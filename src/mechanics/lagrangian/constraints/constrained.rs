@@ -329,14 +329,16 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
     }
 }
 
-impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constrained<M, C, S> {
-    fn coordinates(&self) -> usize {
-        self.model.coordinates()
-    }
-
-    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
+    /// Adds the rows of the constraints to the terms of the model beneath, whose evaluation ended so, and solves.
+    fn add_rows(
+        &self,
+        outcome: Result<(), MechanicsError>,
+        (q, v): (&[S], &[S]),
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
         let n = self.model.coordinates();
-        let outcome = self.model.terms(q, v, request.without_solution(), terms);
         let found = terms.drain_failures(outcome)?;
         if terms.constraints > 0 {
             let (what, expected) = ("constraints of the model beneath", 0);
@@ -352,6 +354,29 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
             }
         }
         terms.complete_beside(found, n, v, request)
+    }
+}
+
+impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constrained<M, C, S> {
+    fn coordinates(&self) -> usize {
+        self.model.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let outcome = self.model.terms(q, v, request.without_solution(), terms);
+        self.add_rows(outcome, (q, v), request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let outcome = self.model.terms_at(t, q, v, request.without_solution(), terms);
+        self.add_rows(outcome, (q, v), request, terms)
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

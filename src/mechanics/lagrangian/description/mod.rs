@@ -11,12 +11,12 @@ mod quantity;
 mod read;
 mod system;
 
-use super::ExpressionLagrangian;
 use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
 use super::formula_forces::FormulaForces;
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
+use super::{ExpressionLagrangian, Lagrangian};
 use crate::scalar::Real;
 use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
@@ -46,9 +46,12 @@ pub struct Description {
     /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<String>,
-    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names and of the time `t`.
+    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names, of the time `t` and of inputs.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub forces: BTreeMap<String, String>,
+    /// Measured quantities in the forces, such as the voltage of a motor, and their units.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub inputs: BTreeMap<String, String>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -218,6 +221,7 @@ impl Description {
             lagrangian: Some(lagrangian),
             dissipation: None,
             forces: BTreeMap::new(),
+            inputs: BTreeMap::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),
@@ -278,7 +282,8 @@ pub struct Described {
     pub description: Description,
     /// The description with its links, if it has any.
     written: Option<Description>,
-    /// Its Lagrangian; parameters in the order of their names.
+    /// Its Lagrangian; parameters in the order of their names. If it or the forces depend on the time, this is a coordinate behind the others,
+    /// and inputs are coordinates behind the time.
     pub lagrangian: ExpressionLagrangian,
     /// Its dissipation function, if it has one; parameters as the Lagrangian's.
     pub dissipation: Option<ExpressionLagrangian>,
@@ -297,6 +302,11 @@ pub struct Described {
 }
 
 impl Described {
+    /// `true` if the Lagrangian or forces depend on the time, or on inputs.
+    pub fn is_timed(&self) -> bool {
+        Lagrangian::coordinates(&self.lagrangian) > self.description.coordinates.len()
+    }
+
     /// `true` if it was written as a chain of links.
     pub fn is_chain(&self) -> bool {
         self.written.is_some()
