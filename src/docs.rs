@@ -44,6 +44,8 @@ macro_rules! page {
             "[system-files]: crate::docs::system_files\n",
             "[links]: crate::docs::system_files#a-chain-of-links\n",
             "[forces]: crate::docs::system_files#forces\n",
+            "[inputs]: crate::docs::system_files#inputs\n",
+            "[time]: crate::docs::system_files#time\n",
             "[formulas]: crate::docs::system_files#formulas\n",
             "[summary]: crate::docs::summary\n",
             "[presets]: crate::docs::configuration#presets\n",

@@ -124,6 +124,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         noise: args.noise.clone(),
         errors: reading.errors.clone(),
         inputs: reading.inputs.clone(),
+        missing: reading.missing.clone(),
         targets: args.targets.map(Targets::from),
         between: args.between,
         segment: args.segment,

@@ -90,6 +90,11 @@ pub struct LoadedRecording {
     pub time: Option<String>,
     /// Rows left out because they repeat the row before, digit by digit.
     pub duplicates: usize,
+    /// Rows left out because a field is empty or `NaN`.
+    pub incomplete: usize,
+    /// Readings of positions that are missing in rows of trajectories that stay whole, `(samples, n)` of each; those of the recording lie on
+    /// lines between their neighbours. Empty if none is missing.
+    pub missing: Vec<Vec<bool>>,
     /// Gaps in time.
     pub cuts: Vec<Cut>,
     /// Stretches left out.
@@ -134,6 +139,8 @@ impl From<Recording> for LoadedRecording {
             files: 0,
             time: None,
             duplicates: 0,
+            incomplete: 0,
+            missing: Vec::new(),
             cuts,
             dropped,
             bridged,

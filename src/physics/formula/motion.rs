@@ -136,6 +136,7 @@ impl Motion<'_> {
             sigma: data.sigma.clone(),
             sigma_of: data.sigma_of.clone(),
             errors: &[],
+            missing: &[],
             gaps: Vec::new(),
             spread: data.spread.clone(),
             robust: true,

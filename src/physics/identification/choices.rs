@@ -27,6 +27,22 @@ pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result
     Ok(())
 }
 
+/// What is said of readings that are missing; tracks without any may have no marks.
+pub(super) fn missing(recording: &Recording, missing: &[Vec<bool>]) -> Result<Vec<String>, IdentifyError> {
+    let n = recording.n();
+    let wrong = recording.tracks.iter().zip(missing).find(|(track, own)| !own.is_empty() && own.len() != track.q.len());
+    if let Some((track, own)) = wrong {
+        let (track, expected) = (track.name.clone(), track.q.len());
+        return Err(IdentifyError::Missing { track, expected, found: own.len() });
+    }
+    let samples = recording.samples();
+    let of = |(i, name): (usize, &String)| {
+        let count = missing.iter().flat_map(|own| own.iter().skip(i).step_by(n)).filter(|missing| **missing).count();
+        (count > 0).then(|| format!("{name}: {count} of {samples} readings are missing"))
+    };
+    Ok(recording.coordinates.iter().enumerate().filter_map(of).collect())
+}
+
 /// The inputs of every trajectory, for which the options must have as many numbers as the system takes.
 pub(super) fn inputs<'a>(
     instance: &SystemInstance<f64>,

@@ -78,6 +78,16 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
+    /// Marks of missing readings that are not one for each position.
+    #[error("missing readings of {track}: expected {expected} marks, one for each position, found {found}")]
+    Missing {
+        /// The trajectory.
+        track: String,
+        /// Its positions.
+        expected: usize,
+        /// Marks found.
+        found: usize,
+    },
     /// An input that is not a finite number, or the wrong number of inputs.
     #[error("inputs of {track}: expected {expected} finite numbers, found {found}")]
     Inputs {

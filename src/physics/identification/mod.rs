@@ -89,6 +89,10 @@ pub struct IdentifyOptions {
     /// them. Empty if they are not known.
     #[serde(default)]
     pub errors: Vec<Vec<f64>>,
+    /// Readings of positions that are missing, `true` in `(samples, n)` of every trajectory; numbers in their place only start the search. Empty
+    /// if none is missing.
+    #[serde(default)]
+    pub missing: Vec<Vec<bool>>,
     /// Inputs of the forces of the system at the samples of every trajectory, `(samples, inputs)` each, in the order of their names.
     #[serde(default)]
     pub inputs: Vec<Vec<f64>>,

@@ -197,3 +197,105 @@ fn a_lagrangian_in_time_is_rolled_out_and_identified() {
     let circle = SHAKEN.replace("1 + rate*t", "1 + rate*t*rod");
     lnn(&["systems", "--system", &folder.file("circle.toml", circle)]).refused(2, &["rod", "itself"]);
 }
+
+/// A pendulum with a motor: its torque is a gain times the voltage.
+const MOTOR: &str = r#"
+name = "motor"
+lagrangian = "J*theta_dot^2/2 + w*cos(theta)"
+dissipation = "b*theta_dot^2/2"
+[[coordinates]]
+name = "theta"
+unit = "rad"
+periodic = true
+velocity_bounds = [-20, 20]
+[parameters]
+J = { default = 0.02, unit = "kg m^2" }
+w = { default = 0.5, unit = "N m" }
+b = { default = 0.01, learn = true }
+K = { default = 0.1, learn = true, unit = "N m/V" }
+[inputs]
+u = "V"
+[forces]
+theta = "K*u"
+"#;
+
+#[test]
+fn inputs_of_forces_are_read_from_recordings() {
+    let folder = Folder::new();
+    let (system, out) = (folder.file("motor.toml", MOTOR), text(&folder.path("motion.csv")));
+    // A voltage of 2 V is the torque K u.
+    let (_, one) = motion((&system, &out), "--state 0.1,0 --t-end 3 --dt 0.1 --force u=2 --method gauss6");
+    let (run, other) =
+        motion((&system, &out), "--state 0.1,0 --t-end 3 --dt 0.1 --force u=0 --force theta_force=0.2 --method gauss6");
+    assert!(run.stdout.contains("forces added"), "{}", run.stdout);
+    assert!(one[1].iter().zip(&other[1]).all(|(a, b)| (a - b).abs() < 1e-12));
+    let voltage = |t: f64| 3.0 * (1.7 * t).sin() + 1.5 * (4.3 * t + 1.0).sin();
+    let rows: String = (0..=500).map(|k| format!("{0},{1}\n", k as f64 * 0.02, voltage(k as f64 * 0.02))).collect();
+    let drive = folder.file("drive.csv", format!("t,u\n{rows}"));
+    let options =
+        format!("--state 0.1,0 --t-end 10 --dt 0.02 --force {drive} --param K=0.13 --param b=0.015 --method dop853");
+    let (run, truth) = motion((&system, &out), &format!("{options} --rtol 1e-11 --atol 1e-12"));
+    assert!(!run.stderr.contains("theta_force"), "{}", run.stderr);
+    let (mut within, mut explained, seeds) = (0, 0, 6);
+    for seed in 0..seeds {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut csv = "t,theta,u\n".to_string();
+        for (t, theta) in truth[0].iter().zip(&truth[1]) {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            writeln!(csv, "{t},{},{}", theta + 1e-3 * noise, voltage(*t)).unwrap();
+        }
+        let run = lnn(&["identify", &folder.file("log.csv", csv), "--system", &system, "--json"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+        explained += usize::from(found["explained"] == true);
+        for (name, truth) in [("K", 0.13), ("b", 0.015)] {
+            let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+            assert!((value - truth).abs() < 5.0 * error && error < 0.002 * truth, "{seed} {name} {value} {error}");
+            within += usize::from((value - truth).abs() < 2.0 * error);
+        }
+    }
+    assert!(within >= 9 && explained >= 5, "{within} of 12 within two errors, {explained} of 6 explained");
+    // What is missing or wrong is named.
+    let roll = ["rollout", "--system", &system, "--state", "0,0", "--t-end", "1", "--dt", "0.1", "--out", "-"];
+    lnn(&roll).refused(2, &["--force", "u"]);
+    let bare = folder.file("bare.csv", format!("t,theta\n{rows}"));
+    lnn(&["identify", &bare, "--system", &system]).refused(1, &["bare.csv", "input", "\"u\""]);
+    for (from, to, says) in [
+        ("dissipation = \"b*", "dissipation = \"u*b*", "unknown name \"u\""),
+        ("theta = \"K*u\"", "theta = \"K\"", "inputs.u"),
+        ("u = \"V\"", "b = \"V\"", "`b` is taken"),
+        ("u = \"V\"", "\"u v\" = \"V\"", "valid name"),
+    ] {
+        let file = folder.file("wrong.toml", MOTOR.replace(from, to));
+        lnn(&["systems", "--system", &file]).refused(2, &["wrong.toml", says]);
+    }
+}
+
+#[test]
+fn a_frequency_is_found_in_a_long_recording() {
+    let folder = Folder::new();
+    let (system, out) = (folder.file("pendulum.toml", PENDULUM), text(&folder.path("motion.csv")));
+    let options = "--param F=0.3 --param om=2.2 --param phi=0.5 --t-end 150 --dt 0.1 --rtol 1e-11 --atol 1e-12";
+    let (_, motion) = motion((&system, &out), &format!("{options} --state 0.4,0"));
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut csv = "t,theta\n".to_string();
+    for (t, theta) in motion[0].iter().zip(&motion[1]) {
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        writeln!(csv, "{t},{}", theta + 3e-3 * noise).unwrap();
+    }
+    let data = folder.file("data.csv", csv);
+    let identified = |start: &str| {
+        let run = lnn(&["identify", &data, "--system", &system, "--json", "--param", "F=0.36", start]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        serde_json::from_str::<serde_json::Value>(&run.stdout).unwrap()
+    };
+    // 27 periods of beating away: forty values at the end of the whole recording would not reach so far.
+    let found = identified("om=1.76");
+    let om = &found["constants"]["om"];
+    assert!((om["value"].as_f64().unwrap() - 2.2).abs() < 5.0 * om["standard_error"].as_f64().unwrap(), "{found}");
+    assert_eq!(found["explained"], true, "{found}");
+    // What is out of reach is not said to be searched.
+    let found = identified("om=40");
+    let says = found["obstacles"].as_array().unwrap();
+    assert!(says.iter().any(|text| text.as_str().unwrap().starts_with("om was searched")), "{found}");
+}
