@@ -36,7 +36,15 @@ impl<S: Scalar> Source<S> {
     /// # Errors
     /// A usage error for a wrong parameter.
     pub fn configured(system: Cow<'static, System>, given: &[(String, String)]) -> Result<Self, CliError> {
-        Self::of(&configure_system::<S>(system, given).map_err(CliError::usage)?)
+        let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
+        if let Some(input) = configured.inputs().next() {
+            let problem = "depend on the input";
+            return Err(CliError::usage(format_args!(
+                "the forces of {} {problem} {input}: roll its motion out, or identify its constants",
+                configured.system.name
+            )));
+        }
+        Self::of(&configured)
     }
 
     /// A system with values of its parameters.

@@ -161,7 +161,7 @@ fn integrate_fixed<S: Scalar>(
         let problem = format!("{} adapts its steps; {} offers fixed steps only", options.method.name(), S::NAME);
         return refused(RolloutError::Invalid { what: "method", problem });
     };
-    if options.method == Integrator::Variational && !model.conserves_energy() {
+    if options.method == Integrator::Variational && !model.conserves_energy() && !model.is_timed() {
         let problem = "the variational integrator keeps the energy and this model loses it by friction; \
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
         return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });
