@@ -183,7 +183,7 @@ fn refused(error: IdentifyError) -> CliError {
         }
         IdentifyError::Cancelled(_) => CliError::nothing_written(),
         IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
-        IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
+        IdentifyError::Description(_) | IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
             CliError::usage(format_args!("--system: {error}"))
         }
         _ => CliError::data(error),

@@ -182,6 +182,10 @@ impl<S: Scalar> SystemInstance<S> {
         }
         self.constrain(if self.is_timed() { Box::new(InTime::with_inputs(model, inputs)) } else { model })
     }
+    /// `true` if its forces depend on measured inputs.
+    pub(crate) fn has_inputs(&self) -> bool {
+        self.system.description().is_some_and(|own| own.inputs.len() > own.marks())
+    }
     /// Names of the inputs of its forces.
     #[doc(hidden)]
     pub fn inputs(&self) -> impl Iterator<Item = &str> {

@@ -78,6 +78,9 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
+    /// A constant with a value for each trajectory that does not fit the recording.
+    #[error(transparent)]
+    Description(#[from] crate::lagrangian::DescriptionError),
     /// Marks of missing readings that are not one for each position.
     #[error("missing readings of {track}: expected {expected} marks, one for each position, found {found}")]
     Missing {

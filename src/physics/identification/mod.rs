@@ -40,6 +40,7 @@ mod innovations;
 mod invariants;
 pub(crate) mod linear;
 mod moves;
+mod per_trajectory;
 mod pieces;
 mod quality;
 mod says;

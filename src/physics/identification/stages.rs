@@ -5,6 +5,7 @@ use super::covariance::{Root, Weighing, agreement, continuation, long_run, score
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::innovations::Disturbances;
+use super::per_trajectory::per_trajectory;
 use super::pieces::{LEAST_SEGMENT, Pieces};
 use super::quality::{
     CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
@@ -108,6 +109,9 @@ pub fn identify(
     recording: &Recording,
     options: &IdentifyOptions,
 ) -> Result<Identified, IdentifyError> {
+    if let Some((instance, options)) = per_trajectory(instance, recording, options)? {
+        return identify(&instance, recording, &options);
+    }
     let n = instance.coordinates;
     if recording.n() != n {
         return Err(IdentifyError::Coordinates { expected: n, found: recording.n() });
@@ -202,7 +206,7 @@ pub fn identify(
         refit(&problem, &mut fitted, ITERATIONS);
     }
     // The noise of the forces is now known, so that the smoothest curve through it does not win.
-    let (best, mut rivals) = best_between(&mut problem, fitted, &Rivals::all(options, forced || !inputs.is_empty()));
+    let (best, mut rivals) = best_between(&mut problem, fitted, &Rivals::all(options, forced || instance.has_inputs()));
     fitted = best;
     if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
         refit(&problem, &mut fitted, ITERATIONS);
@@ -605,7 +609,7 @@ fn result(
         segments: fitted.segments.len(),
         segment_seconds,
         substeps: fitted.substeps,
-        between: (!problem.course.inputs.is_empty() || recording.tracks.iter().any(|track| !track.force.is_empty()))
+        between: (instance.has_inputs() || recording.tracks.iter().any(|track| !track.force.is_empty()))
             .then_some(problem.course.between),
         ..unknowns(
             instance,

@@ -294,7 +294,7 @@ fn a_frequency_is_found_in_a_long_recording() {
     }
     let data = folder.file("data.csv", csv);
     let identified = |start: &str| {
-        let run = lnn(&["identify", &data, "--system", &system, "--json", "--param", "F=0.36", start]);
+        let run = lnn(&["identify", &data, "--system", &system, "--json", "--param", "F=0.36", "--param", start]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         serde_json::from_str::<serde_json::Value>(&run.stdout).unwrap()
     };
@@ -307,4 +307,56 @@ fn a_frequency_is_found_in_a_long_recording() {
     let found = identified("om=40");
     let says = found["obstacles"].as_array().unwrap();
     assert!(says.iter().any(|text| text.as_str().unwrap().starts_with("om was searched")), "{found}");
+}
+
+/// A mass on a spring that carries another payload in every log.
+const LOADED: &str = r#"
+name = "loaded-spring"
+lagrangian = "total*x_dot^2/2 - k*x^2/2"
+[definitions]
+total = "1 + payload"
+[[coordinates]]
+name = "x"
+bounds = [-3, 3]
+velocity_bounds = [-5, 5]
+[parameters]
+k = { default = 3, learn = true, range = "positive" }
+payload = { default = 0.3, unit = "kg", per = "trajectory", known = { empty = 0 } }
+"#;
+
+#[test]
+fn a_payload_differs_between_logs() {
+    let folder = Folder::new();
+    let (system, out) = (folder.file("loaded.toml", LOADED), text(&folder.path("motion.csv")));
+    let truth = [("empty", 0.0), ("half", 0.5), ("no 2", 1.2)];
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut csv = "t,x,log\n".to_string();
+    for (log, payload) in truth {
+        let options =
+            format!("--state 1,0 --t-end 12 --dt 0.05 --param k=4 --param payload={payload} --rtol 1e-11 --atol 1e-12");
+        let (_, motion) = motion((&system, &out), &options);
+        for (t, x) in motion[0].iter().zip(&motion[1]) {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            writeln!(csv, "{t},{},{log}", x + 2e-3 * noise).unwrap();
+        }
+    }
+    let data = folder.file("data.csv", &csv);
+    let run = lnn(&["identify", &data, "--system", &system, "--trajectory", "log", "--json"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(found["explained"], true, "{}", run.stdout);
+    assert!(found["constants"].get("payload_empty").is_none() && found["between"].is_null(), "{}", run.stdout);
+    for (name, truth) in [("k", 4.0), ("payload_half", 0.5), ("payload_no_2", 1.2)] {
+        let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.01, "{name} {value} {error}");
+    }
+    // Without a known one, nothing but ratios are determined.
+    let open = folder.file("open.toml", LOADED.replace(", known = { empty = 0 }", ""));
+    let run = lnn(&["identify", &data, "--system", &open, "--trajectory", "log", "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert!(found["constants"]["k"]["standard_error"].is_null(), "{}", run.stdout);
+    for (from, to, says) in [("empty = 0", "full = 0", "no trajectory full"), ("per = \"trajectory\", ", "", "per")] {
+        let file = folder.file("wrong.toml", LOADED.replace(from, to));
+        lnn(&["identify", &data, "--system", &file, "--trajectory", "log"]).refused(2, &[says]);
+    }
 }

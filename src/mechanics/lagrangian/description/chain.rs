@@ -365,6 +365,8 @@ impl Description {
                 unit: (*unit).to_string(),
                 range: Range::Any,
                 learn: true,
+                per: None,
+                known: BTreeMap::new(),
             };
             self.parameters.insert(format!("{name}{number}"), own);
         }

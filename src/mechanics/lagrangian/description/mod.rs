@@ -6,6 +6,7 @@
 mod chain;
 #[cfg(feature = "serde")]
 pub(crate) mod pair;
+mod per_trajectory;
 mod quantity;
 #[cfg(feature = "serde")]
 mod read;
@@ -18,12 +19,13 @@ use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
 use super::{ExpressionLagrangian, Lagrangian};
 use crate::scalar::Real;
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
+pub use per_trajectory::Per;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -52,6 +54,9 @@ pub struct Description {
     /// Measured quantities in the forces, such as the voltage of a motor, and their units.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub inputs: BTreeMap<String, String>,
+    /// Inputs that do not change along a motion, so that all formulas may depend on them.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    marks: BTreeSet<String>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -154,6 +159,12 @@ pub struct ParameterDescription {
     /// `true` if its value is to be found by the training.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "is_false"))]
     pub learn: bool,
+    /// What has a value of its own; nothing for one value.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub per: Option<Per>,
+    /// Values that are known, by the names of the trajectories.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "BTreeMap::is_empty"))]
+    pub known: BTreeMap<String, Decimal>,
 }
 
 /// Motions on which a model is tried.
@@ -212,7 +223,10 @@ impl Description {
         };
         let parameter = |(symbol, default, unit, range): (&str, &str, &str, Range)| {
             let (default, unit) = (Decimal(default.to_string()), unit.to_string());
-            (symbol.to_string(), ParameterDescription { default, unit, range, learn: false })
+            (
+                symbol.to_string(),
+                ParameterDescription { default, unit, range, learn: false, per: None, known: BTreeMap::new() },
+            )
         };
         Self {
             name: name.to_string(),
@@ -222,6 +236,7 @@ impl Description {
             dissipation: None,
             forces: BTreeMap::new(),
             inputs: BTreeMap::new(),
+            marks: BTreeSet::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),

@@ -216,6 +216,9 @@ impl Description {
         if timed && !self.time_is_taken() {
             add("lagrangian".to_string(), TIME, Meaning::Position(self.coordinates.len()))?;
         }
+        for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| self.marks.contains(*name)) {
+            add(format!("inputs.{name}"), name, Meaning::Position(self.coordinates.len() + 1 + k))?;
+        }
         // Taken, though without a meaning yet.
         for name in self.definitions.keys() {
             add(format!("definitions.{name}"), name, Meaning::Parameter(usize::MAX))?;
@@ -306,7 +309,7 @@ impl Description {
     /// The names of forces: inputs beside all others.
     fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
         let mut scope = scope.clone();
-        for (k, name) in self.inputs.keys().enumerate() {
+        for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| !self.marks.contains(*name)) {
             let key = || format!("inputs.{name}");
             check_name(key(), name)?;
             if name == TIME || scope.insert(name.clone(), Meaning::Position(self.coordinates.len() + 1 + k)).is_some() {
