@@ -4,6 +4,7 @@
 //! the header of a model file.
 
 mod chain;
+mod events;
 #[cfg(feature = "serde")]
 pub(crate) mod pair;
 mod quantity;
@@ -14,6 +15,7 @@ mod system;
 use super::ExpressionLagrangian;
 use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
+use super::formula_events::FormulaEvent;
 use super::formula_forces::FormulaForces;
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
@@ -24,6 +26,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
+use events::EventDescription;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -49,6 +52,9 @@ pub struct Description {
     /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names and of the time `t`.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub forces: BTreeMap<String, String>,
+    /// Zeros of formulas that a roll-out finds, by name: of the same names and of the time `t`.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    events: BTreeMap<String, EventDescription>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -218,6 +224,7 @@ impl Description {
             lagrangian: Some(lagrangian),
             dissipation: None,
             forces: BTreeMap::new(),
+            events: BTreeMap::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),
@@ -284,6 +291,8 @@ pub struct Described {
     pub dissipation: Option<ExpressionLagrangian>,
     /// Its forces, if there are any; parameters as the Lagrangian's.
     pub(super) forces: Option<FormulaForces>,
+    /// Its events; parameters as the Lagrangian's.
+    pub(super) events: Arc<[FormulaEvent]>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
     /// `true` if these are known to be independent: nothing has to be examined.

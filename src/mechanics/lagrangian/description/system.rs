@@ -88,6 +88,7 @@ impl Description {
         };
         let dissipation = self.friction(&mut compiler, &scope)?;
         let forces = self.forces(&mut compiler, &scope)?;
+        let events = self.compiled_events(&mut compiler, &scope)?.into();
         let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
@@ -121,6 +122,7 @@ impl Description {
                 dissipation: dissipation
                     .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),
                 forces,
+                events,
                 constraints,
                 independent: catalogued,
                 chain,
@@ -164,6 +166,7 @@ impl Description {
             ("parameters", self.parameters.len()),
             ("definitions", self.definitions.len()),
             ("constraints", self.constraints.len()),
+            ("events", self.events.len()),
         ];
         for (key, count) in counts {
             if count > MAX_NAMES {
@@ -271,11 +274,7 @@ impl Description {
     /// The generalized forces; `t` is the time in them, unless it is the name of something else.
     fn forces(&self, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Option<FormulaForces>> {
         let size = (self.coordinates.len(), self.parameters.len());
-        let mut scope = scope.clone();
-        let is_free = !scope.contains_key(TIME);
-        if is_free {
-            scope.insert(TIME.to_string(), Meaning::Parameter(size.1));
-        }
+        let (scope, is_free) = self.with_time(scope);
         let (mut formulas, mut timed) = (Vec::new(), false);
         for (name, text) in &self.forces {
             let key = format!("forces.{name}");
@@ -289,6 +288,16 @@ impl Description {
             formulas.push((place, compiler.formula(value)));
         }
         Ok((!formulas.is_empty()).then(|| FormulaForces::compiled(size, formulas, timed)))
+    }
+
+    /// The names with the time `t` behind the parameters, and whether `t` was not the name of something else.
+    pub(super) fn with_time(&self, scope: &BTreeMap<String, Meaning>) -> (BTreeMap<String, Meaning>, bool) {
+        let mut scope = scope.clone();
+        let is_free = !scope.contains_key(TIME);
+        if is_free {
+            scope.insert(TIME.to_string(), Meaning::Parameter(self.parameters.len()));
+        }
+        (scope, is_free)
     }
 
     /// The formulas that vanish.
