@@ -6,7 +6,7 @@ use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, GivenForces};
 use crate::report::with_unit;
-use crate::rollout::Domain;
+use crate::rollout::{Domain, Event};
 use std::path::{Path, PathBuf};
 
 /// A source of motion with what is known about it.
@@ -21,6 +21,8 @@ pub struct MotionSource {
     pub units: Vec<String>,
     /// Forces of its own that depend on the time.
     pub driving: Option<GivenForces<f64>>,
+    /// Events of the system.
+    pub events: Vec<Event<f64>>,
     /// Names of the external forces, one per coordinate.
     pub forces: Vec<String>,
     /// The states a model was trained on.
@@ -42,6 +44,8 @@ impl MotionSource {
         let learned = Learned::<f64>::load(path)?;
         let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
         let system = learned_system(&learned.header).ok();
+        let events = learned.system(path).map_or_else(|_| Vec::new(), |known| known.events());
+        let events = events.into_iter().map(Event::from).collect();
         let time_unit = system.as_ref().map(|system| system.time_unit.to_string());
         let periodic = learned.header.architecture.periodic.iter();
         let units = match system {
@@ -55,7 +59,7 @@ impl MotionSource {
         let time_like = learned.header.architecture.time_like.is_some();
         let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        Ok(Self { name, model, columns, units, driving: None, forces, domain, time_unit, time_like, file })
+        Ok(Self { name, model, columns, units, driving: None, events, forces, domain, time_unit, time_like, file })
     }
 
     /// A system by name or by file.
@@ -64,11 +68,17 @@ impl MotionSource {
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
-        let (Source { model, columns, forces }, driving) = Source::driven(system.clone(), given)?;
+        let (Source { model, columns, forces }, driving, events) = Source::driven(system.clone(), given)?;
+        let events = events.into_iter().map(Event::from).collect();
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
         let (time_like, units) = (system.time_like.is_some(), system.units(columns.len() / 2));
-        Ok(Self { name, model, columns, units, driving, forces, domain: None, time_unit, time_like, file })
+        Ok(Self { name, model, columns, units, driving, events, forces, domain: None, time_unit, time_like, file })
+    }
+
+    /// Name of the parameter of the motion, `t`, or `tau` beside a coordinate `t`.
+    pub fn parameter_name(&self) -> &'static str {
+        if self.columns.iter().any(|name| name == "t") { "tau" } else { "t" }
     }
 
     /// Label of the parameter of the motion: a time, or the affine parameter of geodesics, which is the proper time of matter.

@@ -99,7 +99,7 @@ impl Probe {
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
         // What is read off a Lagrangian does not depend on what drives it.
-        let (Source { model, columns, .. }, _) = Source::driven(system.clone(), given)?;
+        let (Source { model, columns, .. }, ..) = Source::driven(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
         let n = configured.coordinates;
         require_at_most(MAX_COORDINATES, n)?;

@@ -3,7 +3,7 @@
 use crate::cli::learned::Learned;
 use crate::cli::{CliError, forces, output, system_arg};
 use crate::lagrangian::system::System;
-use crate::lagrangian::{EulerLagrange, GivenForces, SystemInstance, configure_system};
+use crate::lagrangian::{EulerLagrange, GivenEvent, GivenForces, SystemInstance, configure_system};
 use crate::pipeline::usual_force;
 use crate::scalar::Scalar;
 use std::borrow::Cow;
@@ -41,17 +41,17 @@ impl<S: Scalar> Source<S> {
         Ok(Self::of(&configured, model))
     }
 
-    /// A system without those of its forces that depend on the time, and these.
+    /// A system without those of its forces that depend on the time, these, and its events.
     ///
     /// # Errors
     /// A usage error for a wrong parameter.
     pub fn driven(
         system: Cow<'static, System>,
         given: &[(String, String)],
-    ) -> Result<(Self, Option<GivenForces<S>>), CliError> {
+    ) -> Result<(Self, Option<GivenForces<S>>, Vec<GivenEvent<S>>), CliError> {
         let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
         let (model, driving) = configured.build_driven().map_err(CliError::usage)?;
-        Ok((Self::of(&configured, model), driving))
+        Ok((Self::of(&configured, model), driving, configured.events()))
     }
 
     fn of(configured: &SystemInstance<S>, model: Box<dyn EulerLagrange<S>>) -> Self {
