@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import as_json, bounds_of, doubles, doubles_list, names, read_result, real, states, thread_count, whole
-from ._results import Certificate, Formula, Geometry, InverseDynamics, Linearization, OwnConstraints, Surface, Symmetries, Trajectory
+from ._results import Certificate, Event, Formula, Geometry, InverseDynamics, Linearization, OwnConstraints, Surface, Symmetries, Trajectory
 from .reader import files
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
@@ -27,6 +27,11 @@ if TYPE_CHECKING:
     Inputs = Numbers | tuple[Numbers, Numbers] | Callable[[float], Numbers]
 
 TENSORS = {"metric": 2, "inverse": 2, "christoffel": 3, "riemann": 4, "ricci": 2, "einstein": 2, "weyl": 4}
+
+
+def _event(name: str, t: float, q: np.ndarray, v: np.ndarray, impact: tuple[np.ndarray, float, float] | None) -> Event:
+    """What happened, with what an impact changed."""
+    return Event(name, t, q, v, *(impact or ()))
 
 
 class Mechanics:
@@ -265,13 +270,16 @@ class Mechanics:
         # The longest motion has all times that any has.
         t = max((motion[0] for motion in found), key=len, default=np.empty(0))
         parts = [np.full((len(found), len(t), n), np.nan) for _ in range(2)] + [np.full((len(found), len(t)), np.nan)]
-        for k, (_, *motion, _, _) in enumerate(found):
+        for k, (_, *motion, _, _, _) in enumerate(found):
             for part, numbers in zip(parts, motion):
                 rows = numbers.reshape(-1, *part.shape[2:])
                 part[k, : len(rows)] = rows
         along = [part.reshape(shape + part.shape[1:]) for part in parts]
         stop = found[0][4] if shape == () else np.array([motion[4] for motion in found], dtype=object).reshape(shape)
-        return Trajectory(t, along[0], along[1], along[2], stop, self.columns)
+        happened = np.empty(len(found), dtype=object)
+        happened[:] = [tuple(_event(*event) for event in motion[6]) for motion in found]
+        events = happened[0] if shape == () else happened.reshape(shape)
+        return Trajectory(t, along[0], along[1], along[2], stop, self.columns, events)
 
     def _driving(
         self, what: str, force: Drive | Inputs | None, between: str | None, size: tuple[int, tuple[int, ...]]

@@ -18,7 +18,7 @@ use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
 use lnn::pipeline::{CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, trained_on};
 use lnn::report::page;
-use lnn::rollout::{Integrator, Options, Rollout, RolloutError, Start, rollout_each};
+use lnn::rollout::{Event, Integrator, Occurrence, Options, Rollout, RolloutError, Start, rollout_each};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -536,7 +536,9 @@ impl Subject {
             Kind::Model(header, ..) if bounded => Some(trained_on(header)),
             _ => None,
         };
-        let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
+        let events = self.system_instance().map_or_else(|_| Vec::new(), |known| known.events());
+        let events = events.into_iter().map(Event::from).collect();
+        let options = Options { t0, method, rtol, atol, step, domain, events, ..Options::new(t_end, dt) };
         let forces = Forces::of(n, (t0, t_end), "force", forces)?;
         let mut known = None;
         let mut fed = None;
@@ -563,13 +565,14 @@ impl Subject {
             return Err(error);
         }
         let result = PyList::empty(py);
-        for Rollout { trajectory, statistics, stop } in motions {
+        for Rollout { trajectory, statistics, stop, events } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
                 return Err(value(error));
             }
             let energy = trajectory.energy.unwrap_or_default().into_pyarray(py);
             let [t, q, v] = [trajectory.t, trajectory.q, trajectory.v].map(|numbers| numbers.into_pyarray(py));
-            result.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
+            let events: Vec<_> = events.into_iter().map(|event| happened(py, event)).collect();
+            result.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations, events))?;
         }
         Ok(result)
     }
@@ -767,4 +770,13 @@ pub fn degrees_of(text: &str) -> PyResult<Degrees> {
 /// The numbers of an array, row by row.
 pub fn slice<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
     array.as_slice().map_err(value)
+}
+
+/// Name, time and state of an event; velocities and energy before and energy after an impact.
+type Happened<'py> = (String, f64, Numbers<'py>, Numbers<'py>, Option<(Numbers<'py>, f64, f64)>);
+
+fn happened(py: Python<'_>, event: Occurrence<f64>) -> Happened<'_> {
+    let Occurrence { name, t, q, v, impact } = event;
+    let impact = impact.map(|hit| (hit.v_before.into_pyarray(py), hit.energy_before, hit.energy_after));
+    (name, t, q.into_pyarray(py), v.into_pyarray(py), impact)
 }

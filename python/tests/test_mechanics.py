@@ -449,3 +449,23 @@ forces = { theta = "K*u" }
         assert abs(constant.value - truth) < 5 * constant.standard_error
     with pytest.raises(ValueError, match="inputs"):
         lnn.identify(noisy, motor, dt=0.02)
+
+
+def test_events_of_a_system_come_with_its_motion():
+    ground = {"when": "y", "falling": True, "then": {"restitution": "e"}}
+    apex = {"when": "y_dot", "falling": True}
+    ball = lnn.System(
+        lagrangian="y_dot^2/2 - g*y", coordinates=["y"], parameters={"g": 9.81, "e": 0.8}, events={"ground": ground, "apex": apex}
+    )
+    motion = ball.rollout([1.0], [0.0], 1.5, 0.01)
+    fall = np.sqrt(2 / 9.81)
+    assert [event.name for event in motion.events] == ["ground", "apex", "ground", "apex", "ground"][: len(motion.events)]
+    hit, top = motion.events[:2]
+    assert abs(hit.t - fall) < 1e-10 and abs(top.t - 1.8 * fall) < 1e-10 and abs(top.q[0] - 0.64) < 1e-10
+    assert np.allclose(hit.v, -0.8 * hit.v_before) and top.v_before is None
+    assert abs(hit.energy_before - hit.energy_after - 0.36 * 9.81) < 1e-9
+    both = ball.rollout([[1.0], [2.0]], [[0.0], [0.0]], 1.5, 0.01)
+    assert both.events.shape == (2,) and abs(both.events[1][0].t - np.sqrt(2) * fall) < 1e-10
+    assert pickle.loads(pickle.dumps(ball)).rollout([1.0], [0.0], 1.5, 0.01).events[0].t == hit.t
+    ended = ball.rollout([1.0], [0.0], 10, 0.1)
+    assert not ended.complete and "accumulate" in ended.stop

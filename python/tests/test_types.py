@@ -19,6 +19,7 @@ motion: lnn.Trajectory = learned.model.rollout([1.0, 0.0], np.zeros(2), 1.0, 0.1
 error: float | None = lnn.identify(motion.q, system, dt=0.1).constants["mu"].standard_error
 torque = system.inverse_dynamics([1.0, 0.0], [0.0, 1.0], [0.0, 0.0]).external
 driven = system.rollout([1.0, 0.0], [0.0, 1.0], 1.0, 0.1, force=lambda t, q, v: -0.1 * v, friction=False)
+first: lnn.Event = driven.events[0]
 look: str = lnn.check(motion.q, dt=0.1, units={"q1": "mm"}).next
 wrong: int = system.name
 system.terms([1.0, 0.0], [0.0, 1.0], treads=2)

@@ -115,6 +115,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let page = args.page.claim(&inputs, args.overwrite)?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
+    system_arg::note_impacts(&instance);
     let reading = read(args, &instance)?;
     let options = IdentifyOptions {
         constants: args.constants.clone(),

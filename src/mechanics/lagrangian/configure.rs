@@ -3,6 +3,7 @@
 
 use super::derivatives::{StateTerms, evaluate};
 use super::equations::Friction;
+use super::formula_events::GivenEvent;
 use super::formula_forces::{FormulaForces, GivenForces};
 use super::recursion::Recursive;
 use super::system::{Range, Size, System};
@@ -206,6 +207,12 @@ impl<S: Scalar> SystemInstance<S> {
     /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
     pub(crate) fn forces(&self) -> Option<&FormulaForces> {
         self.system.described.as_ref()?.forces.as_ref()
+    }
+    /// The events of a system by its description, in the order of their names.
+    #[doc(hidden)]
+    pub fn events(&self) -> Vec<GivenEvent<S>> {
+        let events = self.system.described.as_ref().map_or(&[][..], |described| &described.events);
+        events.iter().map(|event| GivenEvent::new(event.clone(), self.parameters.clone())).collect()
     }
     /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.
     pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {

@@ -14,6 +14,7 @@ mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
+mod formula_events;
 mod formula_forces;
 #[cfg(feature = "rollout")]
 mod groups;
@@ -71,6 +72,8 @@ pub use expression::ExpressionLagrangian;
 pub(crate) use expression::quantity;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
+#[doc(hidden)]
+pub use formula_events::GivenEvent;
 #[cfg(feature = "rollout")]
 pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]

@@ -4,6 +4,7 @@
 //! the header of a model file.
 
 mod chain;
+mod events;
 #[cfg(feature = "serde")]
 pub(crate) mod pair;
 mod per_trajectory;
@@ -14,6 +15,7 @@ mod system;
 
 use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
+use super::formula_events::FormulaEvent;
 use super::formula_forces::FormulaForces;
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
@@ -25,6 +27,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
+use events::EventDescription;
 pub use per_trajectory::Per;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
@@ -57,6 +60,9 @@ pub struct Description {
     /// Inputs that do not change along a motion, so that all formulas may depend on them.
     #[cfg_attr(feature = "serde", serde(skip))]
     marks: BTreeSet<String>,
+    /// Zeros of formulas that a roll-out finds, by name: of the same names and of the time `t`.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    events: BTreeMap<String, EventDescription>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -237,6 +243,7 @@ impl Description {
             forces: BTreeMap::new(),
             inputs: BTreeMap::new(),
             marks: BTreeSet::new(),
+            events: BTreeMap::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),
@@ -304,6 +311,8 @@ pub struct Described {
     pub dissipation: Option<ExpressionLagrangian>,
     /// Its forces, if there are any; parameters as the Lagrangian's.
     pub(super) forces: Option<FormulaForces>,
+    /// Its events; parameters as the Lagrangian's.
+    pub(super) events: Arc<[FormulaEvent]>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
     /// `true` if these are known to be independent: nothing has to be examined.

@@ -1,5 +1,6 @@
 //! Numbers of a description as a file has them.
 
+use super::events::{Consequence, Word};
 use super::quantity::{Decimal, Quantity};
 use super::{ParameterDescription, Per};
 use crate::lagrangian::expression::quantity;
@@ -8,7 +9,7 @@ use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use core::fmt;
 use serde::Deserialize;
-use serde::de::value::MapAccessDeserializer;
+use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
 
 /// A number or a text, as text.
@@ -108,5 +109,35 @@ fn alone(default: String) -> ParameterDescription {
 impl<'de> Deserialize<'de> for ParameterDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(NumberOrTable)
+    }
+}
+
+/// The table of an impact.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImpactTable {
+    restitution: Decimal,
+}
+
+struct WordOrTable;
+
+impl<'de> Visitor<'de> for WordOrTable {
+    type Value = Consequence;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"mark\", \"stop\", or a table { restitution }")
+    }
+    fn visit_str<E: Error>(self, value: &str) -> Result<Consequence, E> {
+        Word::deserialize(StrDeserializer::new(value)).map(Consequence::Named)
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Consequence, A::Error> {
+        let ImpactTable { restitution } = ImpactTable::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(Consequence::Impact { restitution })
+    }
+}
+
+impl<'de> Deserialize<'de> for Consequence {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WordOrTable)
     }
 }

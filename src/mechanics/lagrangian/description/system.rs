@@ -102,7 +102,8 @@ impl Description {
         };
         let dissipation = self.friction(&mut compiler, &scope)?;
         let forces = self.forces(&mut compiler, &scope, size)?;
-        let constraints = self.constraints(&mut compiler, &scope, timed)?;
+        let events = self.compiled_events(&mut compiler, &scope)?.into();
+        let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
         let validation = self.bounds("validation", &self.validation, base)?;
@@ -134,6 +135,7 @@ impl Description {
                 lagrangian: ExpressionLagrangian::compiled(size, compiler.formula(value)),
                 dissipation: dissipation.map(|value| ExpressionLagrangian::compiled(size, compiler.formula(value))),
                 forces,
+                events,
                 constraints,
                 independent: catalogued,
                 chain,
@@ -180,6 +182,7 @@ impl Description {
             ("definitions", self.definitions.len()),
             ("inputs", self.inputs.len()),
             ("constraints", self.constraints.len()),
+            ("events", self.events.len()),
         ];
         for (key, count) in counts {
             if count > MAX_NAMES {
@@ -189,8 +192,8 @@ impl Description {
         Ok(())
     }
 
-    /// Meaning of the names of coordinates, velocities and parameters, and of `t`, the time, if formulas depend on it and nothing else has
-    /// this name; whether they do.
+    /// Meaning of the names of coordinates, velocities and parameters, and of `t`, the time, if nothing else has this name; whether equations
+    /// of motion depend on it.
     fn scope(&self) -> Outcome<(BTreeMap<String, Meaning>, bool)> {
         let mut scope = BTreeMap::new();
         let mut add = |key: String, name: &str, meaning: Meaning| {
@@ -213,7 +216,7 @@ impl Description {
             add(format!("parameters.{name}"), name, Meaning::Parameter(i))?;
         }
         let timed = self.is_timed();
-        if timed && !self.time_is_taken() {
+        if !self.time_is_taken() {
             add("lagrangian".to_string(), TIME, Meaning::Position(self.coordinates.len()))?;
         }
         for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| self.marks.contains(*name)) {
@@ -364,7 +367,6 @@ impl Description {
         &self,
         compiler: &mut Compiler,
         scope: &BTreeMap<String, Meaning>,
-        timed: bool,
     ) -> Outcome<Option<ExpressionConstraints>> {
         if self.constraints.is_empty() {
             return Ok(None);
@@ -374,7 +376,9 @@ impl Description {
                 return Err(DescriptionError::new("constraints", "expected names of 1 to 100 characters on one line"));
             }
         }
-        if timed && let Some((name, _)) = self.constraints.iter().find(|(_, text)| self.names_time(text)) {
+        if !self.time_is_taken()
+            && let Some((name, _)) = self.constraints.iter().find(|(_, text)| self.names_time(text))
+        {
             let problem = "expected a formula without the time `t`: put what moves by a known law into the Lagrangian";
             return Err(DescriptionError::new(format!("constraints.{name}"), problem));
         }
