@@ -137,24 +137,10 @@ pub(super) fn run<S: Integrable>(
         };
         let node = nodes_are_asked_for.then_some(&mut node as &mut StepNodes<'_, S>);
         let mut scan = |e: S, h: S, dense: &mut Dense<'_, S>| {
-            let watcher = watcher.as_mut()?;
             let elapsed = |share: S| start + (e + share * h);
             let time = |share: S| if backwards { t0 - elapsed(share) } else { t0 + elapsed(share) };
-            let (mut from, mut state) = (zero, vec![zero; 2 * n]);
-            while let Some(crossing) = watcher.first(from, &time, dense) {
-                from = watcher.share(&crossing);
-                if watcher.interrupts(&crossing) {
-                    found = Some((crossing, from));
-                    return Some(from);
-                }
-                dense(from, &mut state);
-                let mut shown = state.clone();
-                let (q, v) = shown.split_at_mut(n);
-                // It stays where it is if the constraints are too far away.
-                let _ = manifold.map(|manifold| project(manifold, q, v));
-                watcher.mark(crossing, time(from), [&state, &shown]);
-            }
-            None
+            found = watcher.as_mut()?.interruption(manifold, &time, dense);
+            found.map(|(_, share)| share)
         };
         let scan = watched.then_some(&mut scan as &mut Scan<'_, S>);
         let mut derivative = |e: S, y: &[S], dy: &mut [S]| motion.derivative(&piece, start + e, y, dy);

@@ -160,19 +160,13 @@ fn advance<'a, S: Scalar>(
             }
         }
         for (from, distance, piece) in legs {
-            let end = from + distance;
-            let mut rest = (from, distance);
-            loop {
-                let counted = (&mut *statistics, nodes.as_deref_mut(), watcher.as_mut());
-                match stretch(phase, stepper, position, options, rest, &piece, counted) {
-                    Stretch::Whole => break,
-                    Stretch::Failed(stop) => return Some(stop),
-                    Stretch::Ended(t, state) => {
-                        let is_taken = keep(t, &state[..phase.n], &state[phase.n..]);
-                        return (!is_taken).then(|| RolloutError::Stopped { t: t.to_f64() });
-                    }
-                    Stretch::Until(elapsed) if end - elapsed <= blur => break,
-                    Stretch::Until(elapsed) => rest = (elapsed, end - elapsed),
+            let counted = (&mut *statistics, nodes.as_deref_mut(), watcher.as_mut());
+            match leg(phase, stepper, position, options, (from, distance, blur), &piece, counted) {
+                Stretch::Whole | Stretch::Until(_) => {}
+                Stretch::Failed(stop) => return Some(stop),
+                Stretch::Ended(t, state) => {
+                    let is_taken = keep(t, &state[..phase.n], &state[phase.n..]);
+                    return (!is_taken).then(|| RolloutError::Stopped { t: t.to_f64() });
                 }
             }
         }
@@ -192,6 +186,29 @@ fn advance<'a, S: Scalar>(
         }
     }
     None
+}
+
+/// What receives counts, nodes and events of steps.
+type Counted<'r, 'n, 'w, S> = (&'r mut StepCounts, Option<&'r mut Nodes<'n, S>>, Option<&'r mut Watcher<'w, S>>);
+
+/// Steps over a distance in elapsed time within one piece, on from events; times closer than `blur` are one.
+fn leg<'a, S: Scalar>(
+    phase: &mut PhaseSpace<'a, S>,
+    stepper: &mut Stepper<S>,
+    position: &mut Position<'a, S>,
+    options: &Options<S>,
+    (from, distance, blur): (S, S, S),
+    piece: &Piece<S>,
+    (statistics, mut nodes, mut watcher): Counted<'_, '_, '_, S>,
+) -> Stretch<S> {
+    let (end, mut rest) = (from + distance, (from, distance));
+    loop {
+        let counted = (&mut *statistics, nodes.as_deref_mut(), watcher.as_deref_mut());
+        match stretch(phase, stepper, position, options, rest, piece, counted) {
+            Stretch::Until(elapsed) if end - elapsed > blur => rest = (elapsed, end - elapsed),
+            ended => return ended,
+        }
+    }
 }
 
 /// How far steps have come.
@@ -214,7 +231,7 @@ fn stretch<'a, S: Scalar>(
     options: &Options<S>,
     (from, distance): (S, S),
     piece: &Piece<S>,
-    (statistics, mut nodes, mut watcher): (&mut StepCounts, Option<&mut Nodes<'_, S>>, Option<&mut Watcher<'_, S>>),
+    (statistics, mut nodes, mut watcher): Counted<'_, '_, '_, S>,
 ) -> Stretch<S> {
     let backwards = options.t_end < options.t0;
     let longest = options.step.unwrap_or(distance);

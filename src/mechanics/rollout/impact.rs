@@ -1,10 +1,10 @@
 //! What a motion does where an event happens: it is recorded, ends, or its velocities change by an impact.
 
-use super::crossing::{Found, Watcher, side};
+use super::crossing::{Dense, Found, Watcher, side};
 use super::event::{Event, Impact, Occurrence, When};
 use super::run::into_error;
 use super::{RolloutError, StepFailure};
-use crate::lagrangian::{MechanicsError, Request, dot};
+use crate::lagrangian::{Manifold, MechanicsError, Request, dot, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 
@@ -28,6 +28,31 @@ impl<S: Scalar> Watcher<'_, S> {
         let Event { restitution, last, .. } = &self.events[found.event];
         let ends = last.is_some_and(|last| self.counts[found.event] + 1 >= last);
         restitution.is_some() || ends || self.happened.len() >= self.most
+    }
+
+    /// The first event within a step that interrupts the motion, and its share of the step. Those before it are marked, their states brought to
+    /// the constraints.
+    pub(super) fn interruption(
+        &mut self,
+        manifold: Option<&dyn Manifold<S>>,
+        time: &dyn Fn(S) -> S,
+        dense: &mut Dense<'_, S>,
+    ) -> Option<(Found<S>, S)> {
+        let (n, mut from) = (self.normal.len(), <S as Real>::zero());
+        while let Some(found) = self.first(from, time, dense) {
+            from = self.share(&found);
+            if self.interrupts(&found) {
+                return Some((found, from));
+            }
+            let mut state = vec![<S as Real>::zero(); 2 * n];
+            dense(from, &mut state);
+            let mut shown = state.clone();
+            let (q, v) = shown.split_at_mut(n);
+            // It stays where it is if the constraints are too far away.
+            let _ = manifold.map(|manifold| project(manifold, q, v));
+            self.mark(found, time(from), [&state, &shown]);
+        }
+        None
     }
 
     /// Lets a crossing happen that does not interrupt the motion, at a state that is recorded as `shown`.
