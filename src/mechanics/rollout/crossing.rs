@@ -18,6 +18,8 @@ const DIVISIONS: usize = 40;
 
 /// The state `(q, v)` at a share of a step, from 0 to 1.
 pub(super) type Dense<'a, S> = dyn FnMut(S, &mut [S]) + 'a;
+/// Writes the state at a share of a step as the method itself computes it.
+type Exact<'a, S> = dyn FnMut(S, &mut [S]) -> Result<(), StepFailure> + 'a;
 
 /// A crossing within a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +90,7 @@ fn close_in<S: Scalar, E>(
             break;
         }
         let radius = room - (b - a) * half;
-        room = room * half;
+        room *= half;
         let straight = if high > zero { (b * high - a * low) / (high - low) } else { middle };
         let toward = if straight < middle { S::of_f64(1.0) } else { S::of_f64(-1.0) };
         let shift = fifth * (b - a) * (b - a) / start;
@@ -275,7 +277,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         &mut self,
         found: Found<S>,
         time: &dyn Fn(S) -> S,
-        exact: &mut dyn FnMut(S, &mut [S]) -> Result<(), StepFailure>,
+        exact: &mut Exact<'_, S>,
     ) -> Result<Option<Found<S>>, StepFailure> {
         let (zero, one, n) = (<S as Real>::zero(), <S as Real>::one(), self.normal.len());
         let Found { event, between, above } = found;

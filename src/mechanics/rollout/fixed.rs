@@ -283,6 +283,9 @@ fn stretch<'a, S: Scalar>(
     Stretch::Whole
 }
 
+/// An event, its share of the step and the state there.
+type Interruption<S> = (Found<S>, S, Vec<S>);
+
 /// The first event that interrupts the last step, made from `before`, with its share of the step and the state there, to which the motion is
 /// taken back. Those before it that do not interrupt it are marked.
 fn interruption<S: Scalar>(
@@ -292,18 +295,21 @@ fn interruption<S: Scalar>(
     before: &(PhasePoint<S>, Vec<S>),
     (t, signed): (S, S),
     watcher: &mut Watcher<'_, S>,
-) -> Result<Option<(Found<S>, S, Vec<S>)>, StepFailure> {
+) -> Result<Option<Interruption<S>>, StepFailure> {
     let (n, zero) = (phase.n, <S as Real>::zero());
     let after = (position.state.clone(), position.near.clone());
+    phase.stop_at(t + signed);
     let (q1, v1) = (after.0.q.high.clone(), position.velocity(phase)?);
     let mut start = vec![zero; 2 * n];
     let mut exact = |share: S, state: &mut [S]| {
         (position.state, position.near) = before.clone();
+        phase.stop_at(t);
         if share > zero {
             stepper.step(phase, &mut position.state, &mut position.near, signed * share)?;
         }
         let (q, v) = state.split_at_mut(n);
         q.copy_from_slice(&position.state.q.high);
+        phase.stop_at(t + share * signed);
         v.copy_from_slice(&position.velocity(phase)?);
         Ok(())
     };
@@ -382,6 +388,7 @@ impl<'a, S: Scalar> Position<'a, S> {
             return Stretch::Ended(t, state);
         }
         let (q, v) = state.split_at(n);
+        phase.stop_at(t);
         match phase.momentum(q, v) {
             Ok(p) => (self.state.p, self.near) = (Compensated::new(p), v.to_vec()),
             Err(failure) => {

@@ -40,8 +40,7 @@ impl Numbers {
     pub fn reading(&mut self, field: &[u8], row: u64) -> Option<f64> {
         self.parse(field, row).or_else(|| {
             let text = unquoted(std::str::from_utf8(field).ok()?.trim());
-            let says = |word: &&str| text.eq_ignore_ascii_case(word);
-            (text.is_empty() || MISSING.iter().any(|word| says(word))).then_some(f64::NAN)
+            (text.is_empty() || MISSING.iter().any(|word| text.eq_ignore_ascii_case(word))).then_some(f64::NAN)
         })
     }
 

@@ -186,7 +186,8 @@ fn missing_readings_leave_out_rows_or_are_marked() {
     let (a, b) = (full.recording.tracks[0].q[2], full.recording.tracks[0].q[8]);
     assert!((track.q[4] - (a + (b - a) / 3.0)).abs() < 1e-12, "{:?}", &track.q[..12]);
     // An angle goes on from its last reading.
-    let turns = |k: usize| if k % 3 == 1 { String::new() } else { (k as f64 * 1.3 % 6.2831853).to_string() };
+    let turns =
+        |k: usize| if k % 3 == 1 { String::new() } else { (k as f64 * 1.3 % std::f64::consts::TAU).to_string() };
     let rows: String = (0..30).map(|k| format!("{k},{},{k}\n", turns(k))).collect();
     let angle = Columns { periodic: list("a"), whole: true, ..coordinates("a,b") };
     let reading = read(format!("t,a,b\n{rows}"), &angle).unwrap();
