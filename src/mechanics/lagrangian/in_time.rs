@@ -105,9 +105,8 @@ impl<S: Scalar, M: EulerLagrange<S>, U: Inputs<S>> EulerLagrange<S> for InTime<M
     }
 
     /// Refused: a state alone has no time.
-    fn terms(&self, _: &[S], _: &[S], _: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        terms.clear();
-        Err(MechanicsError::Timed)
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        self.terms_at(&[], q, v, request, terms)
     }
 
     fn terms_at(
@@ -122,7 +121,8 @@ impl<S: Scalar, M: EulerLagrange<S>, U: Inputs<S>> EulerLagrange<S> for InTime<M
         let batch = v.len() / n.max(1);
         if t.len() != batch {
             terms.clear();
-            return Err(MechanicsError::Shape { what: "times", expected: batch, found: t.len() });
+            let shape = MechanicsError::Shape { what: "times", expected: batch, found: t.len() };
+            return Err(if t.is_empty() { MechanicsError::Timed } else { shape });
         }
         let all = self.model.coordinates();
         let mut states = vec![<S as Real>::zero(); batch * all];

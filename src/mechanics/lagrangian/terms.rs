@@ -185,10 +185,10 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
 
-    /// The same at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; roll-outs ask it for no other terms.
+    /// The same at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; it refuses states without.
     ///
     /// # Errors
-    /// As of [`terms`](Self::terms); [`MechanicsError::Timed`] of a wrapper that does not pass the times on.
+    /// As of [`terms`](Self::terms).
     fn terms_at(
         &self,
         _t: &[S],
@@ -197,10 +197,6 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         request: Request,
         terms: &mut Terms<S>,
     ) -> Result<(), MechanicsError> {
-        if self.is_timed() {
-            terms.clear();
-            return Err(MechanicsError::Timed);
-        }
         self.terms(q, v, request, terms)
     }
 

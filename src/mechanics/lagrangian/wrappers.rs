@@ -183,30 +183,13 @@ pub struct Frictionless<'a, S>(
     pub &'a dyn EulerLagrange<S>,
 );
 
-impl<S: Scalar> Frictionless<'_, S> {
-    /// Empties the forces of the terms of the model, whose evaluation ended so, and solves.
-    fn without_force(
-        &self,
-        outcome: Result<(), MechanicsError>,
-        v: &[S],
-        request: Request,
-        terms: &mut Terms<S>,
-    ) -> Result<(), MechanicsError> {
-        let found = terms.drain_failures(outcome)?;
-        terms.force.clear();
-        terms.dissipation.clear();
-        terms.complete_beside(found, self.coordinates(), v, request)
-    }
-}
-
 impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
     fn coordinates(&self) -> usize {
         self.0.coordinates()
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        let outcome = self.0.terms(q, v, request.without_solution(), terms);
-        self.without_force(outcome, v, request, terms)
+        self.terms_at(&[], q, v, request, terms)
     }
 
     fn terms_at(
@@ -218,7 +201,10 @@ impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
         terms: &mut Terms<S>,
     ) -> Result<(), MechanicsError> {
         let outcome = self.0.terms_at(t, q, v, request.without_solution(), terms);
-        self.without_force(outcome, v, request, terms)
+        let found = terms.drain_failures(outcome)?;
+        terms.force.clear();
+        terms.dissipation.clear();
+        terms.complete_beside(found, self.coordinates(), v, request)
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
@@ -250,11 +236,7 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        if request != Request::ENERGY && self.flag.load(Ordering::Relaxed) {
-            terms.clear();
-            return Err(MechanicsError::Interrupted);
-        }
-        self.model.terms(q, v, request, terms)
+        self.terms_at(&[], q, v, request, terms)
     }
 
     fn terms_at(

@@ -329,15 +329,24 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
     }
 }
 
-impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
-    /// Adds the rows of the constraints to the terms of the model beneath, whose evaluation ended so, and solves.
-    fn add_rows(
+impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constrained<M, C, S> {
+    fn coordinates(&self) -> usize {
+        self.model.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        self.terms_at(&[], q, v, request, terms)
+    }
+
+    fn terms_at(
         &self,
-        outcome: Result<(), MechanicsError>,
-        (q, v): (&[S], &[S]),
+        t: &[S],
+        q: &[S],
+        v: &[S],
         request: Request,
         terms: &mut Terms<S>,
     ) -> Result<(), MechanicsError> {
+        let outcome = self.model.terms_at(t, q, v, request.without_solution(), terms);
         let n = self.model.coordinates();
         let found = terms.drain_failures(outcome)?;
         if terms.constraints > 0 {
@@ -354,29 +363,6 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
             }
         }
         terms.complete_beside(found, n, v, request)
-    }
-}
-
-impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constrained<M, C, S> {
-    fn coordinates(&self) -> usize {
-        self.model.coordinates()
-    }
-
-    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        let outcome = self.model.terms(q, v, request.without_solution(), terms);
-        self.add_rows(outcome, (q, v), request, terms)
-    }
-
-    fn terms_at(
-        &self,
-        t: &[S],
-        q: &[S],
-        v: &[S],
-        request: Request,
-        terms: &mut Terms<S>,
-    ) -> Result<(), MechanicsError> {
-        let outcome = self.model.terms_at(t, q, v, request.without_solution(), terms);
-        self.add_rows(outcome, (q, v), request, terms)
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
