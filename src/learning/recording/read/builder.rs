@@ -161,9 +161,15 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Notes a row that lacks a reading and is left out for it.
+    /// Notes a row that lacks a reading and is left out for it. A trajectory that stays whole keeps rows with some of the positions.
     fn lacks(&mut self, row: u64, values: &[f64]) -> bool {
+        let lacking = |x: &&f64| x.is_nan();
         let Some(first) = values.iter().position(|x| x.is_nan()) else { return false };
+        let (start, n) = (usize::from(self.selection.timed), self.columns.coords.len());
+        let positions = values[start..start + n].iter().filter(lacking).count();
+        if self.columns.whole && positions < n && values.iter().filter(lacking).count() == positions {
+            return false;
+        }
         let column = || self.selection.values[first].name.clone();
         let (count, known) = &mut self.incomplete;
         *count += 1;
