@@ -184,9 +184,10 @@ fn refused(error: IdentifyError) -> CliError {
         }
         IdentifyError::Cancelled(_) => CliError::nothing_written(),
         IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
-        IdentifyError::Description(_) | IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
-            CliError::usage(format_args!("--system: {error}"))
-        }
+        IdentifyError::Description(_)
+        | IdentifyError::System(_)
+        | IdentifyError::Constrained { .. }
+        | IdentifyError::Nothing { .. } => CliError::usage(format_args!("--system: {error}")),
         _ => CliError::data(error),
     }
 }

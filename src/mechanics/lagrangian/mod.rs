@@ -56,6 +56,8 @@ pub use constraints::{
 #[doc(hidden)]
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
+#[cfg(feature = "training")]
+pub(crate) use description::PerTrajectory;
 #[cfg(feature = "serde")]
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};

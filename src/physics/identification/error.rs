@@ -81,6 +81,9 @@ pub enum IdentifyError {
     /// A constant with a value for each trajectory that does not fit the recording.
     #[error(transparent)]
     Description(#[from] crate::lagrangian::DescriptionError),
+    /// A value of such a constant that its range does not allow.
+    #[error(transparent)]
+    System(#[from] crate::lagrangian::SystemError),
     /// Marks of missing readings that are not one for each position.
     #[error("missing readings of {track}: expected {expected} marks, one for each position, found {found}")]
     Missing {

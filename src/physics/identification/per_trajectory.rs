@@ -1,7 +1,7 @@
 //! Constants with a value for each trajectory.
 
 use super::{IdentifyError, IdentifyOptions};
-use crate::lagrangian::{SystemInstance, configure_system};
+use crate::lagrangian::{PerTrajectory, SystemInstance, configure_system};
 use crate::recording::{RecordedTrajectory, Recording};
 use std::borrow::Cow;
 use std::path::Path;
@@ -19,8 +19,7 @@ pub(super) fn per_trajectory(
     let Some(description) = instance.system.description().filter(|own| own.is_per_trajectory()) else {
         return Ok(None);
     };
-    let of_tracks: Vec<String> = recording.tracks.iter().map(label).collect();
-    let mut names = of_tracks.clone();
+    let mut names: Vec<String> = recording.tracks.iter().map(label).collect();
     names.sort();
     names.dedup();
     if names.len() > MOST {
@@ -31,44 +30,27 @@ pub(super) fn per_trajectory(
     for (parameter, value) in instance.system.parameters.iter().zip(&instance.parameters) {
         own.with_default(&parameter.symbol, *value);
     }
-    let (all, marks) = own.per_trajectory(&names)?;
-    let given: Vec<&String> = description.inputs.keys().collect();
+    let PerTrajectory { description: all, marks, unknown } = own.per_trajectory(&names)?;
+    // Every input is the mark of a trajectory, or was measured.
+    let measured: Vec<&String> = description.inputs.keys().collect();
+    let place = |list: &[&String], name: &String| list.iter().position(|own| *own == name);
+    let marks: Vec<&String> = marks.iter().collect();
+    let columns: Vec<_> = all.inputs.keys().map(|name| (place(&marks, name), place(&measured, name))).collect();
     let rows = |(at, track): (usize, &RecordedTrajectory)| -> Vec<f64> {
-        let known = options.inputs.get(at).map_or(&[][..], Vec::as_slice);
-        let value = |sample: usize, name: &String| match given.iter().position(|own| *own == name) {
-            Some(k) => known.get(sample * given.len() + k).copied().unwrap_or(f64::NAN),
-            None => f64::from(u8::from(
-                marks.iter().position(|mark| mark == name) == names.iter().position(|own| *own == of_tracks[at]),
-            )),
+        let own = names.iter().position(|name| *name == label(track));
+        let given = options.inputs.get(at).map_or(&[][..], Vec::as_slice);
+        let value = |sample: usize, column: &(Option<usize>, Option<usize>)| match column {
+            (mark @ Some(_), _) => f64::from(u8::from(*mark == own)),
+            (None, Some(k)) => given.get(sample * measured.len() + k).copied().unwrap_or(f64::NAN),
+            (None, None) => f64::NAN,
         };
-        (0..track.len())
-            .flat_map(|sample| all.inputs.keys().map(move |name| (sample, name)))
-            .map(|(sample, name)| value(sample, name))
-            .collect()
+        let sample = |sample: usize| columns.iter().map(move |column| value(sample, column));
+        (0..track.len()).flat_map(sample).collect()
     };
     let inputs = recording.tracks.iter().enumerate().map(rows).collect();
-    let system = all.system()?;
-    let single = |symbol: &String| -> Vec<String> {
-        let is_one = |own: &&str| own.strip_prefix(symbol.as_str()).is_some_and(|rest| rest.starts_with('_'));
-        let is_per = description.parameters.get(symbol).is_some_and(|own| own.per.is_some());
-        match is_per {
-            true => all
-                .parameters
-                .iter()
-                .filter(|(_, own)| own.learn)
-                .map(|(name, _)| name.as_str())
-                .filter(is_one)
-                .map(str::to_string)
-                .collect(),
-            false => vec![symbol.clone()],
-        }
-    };
-    let constants = options.constants.iter().flat_map(single).collect();
-    let instance = configure_system::<f64>(Cow::Owned(system), &[]).map_err(|error| IdentifyError::Option {
-        what: "per",
-        expected: "constants of every trajectory".to_string(),
-        found: error.to_string(),
-    })?;
+    let each = |symbol: &String| unknown.get(symbol).cloned().unwrap_or_else(|| vec![symbol.clone()]);
+    let constants = options.constants.iter().flat_map(each).collect();
+    let instance = configure_system::<f64>(Cow::Owned(all.system()?), &[])?;
     Ok(Some((instance, IdentifyOptions { constants, inputs, ..options.clone() })))
 }
 

@@ -29,6 +29,7 @@ use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use events::EventDescription;
 pub use per_trajectory::Per;
+pub(crate) use per_trajectory::PerTrajectory;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};

@@ -19,18 +19,27 @@ pub enum Per {
     Trajectory,
 }
 
+/// A description for trajectories of some names.
+pub(crate) struct PerTrajectory {
+    /// The description, with parameters `p_NAME` in place of `p`, and one input for each trajectory that marks it.
+    pub description: Description,
+    /// These inputs, trajectory by trajectory.
+    pub marks: Vec<String>,
+    /// The parameters in place of `p` whose values are not known.
+    pub unknown: BTreeMap<String, Vec<String>>,
+}
+
 impl Description {
     /// `true` if a parameter has a value for each trajectory.
     pub(crate) fn is_per_trajectory(&self) -> bool {
         self.parameters.values().any(|parameter| parameter.per.is_some())
     }
 
-    /// The description for trajectories of these names, its links written out: parameters `p_NAME`, and one input for each trajectory that
-    /// marks it. Values that are known are not learned.
+    /// The description for trajectories of these names, its links written out. Values that are known are not learned.
     ///
     /// # Errors
     /// A known value of a trajectory that there is not; a name that is taken.
-    pub(crate) fn per_trajectory(&self, names: &[String]) -> Result<(Self, Vec<String>), DescriptionError> {
+    pub(crate) fn per_trajectory(&self, names: &[String]) -> Result<PerTrajectory, DescriptionError> {
         let mut all = self.unfolded()?;
         let marks: Vec<String> = (1..=names.len()).map(|k| format!("_trajectory_{k}")).collect();
         let labels = labels(names);
@@ -41,6 +50,7 @@ impl Description {
             .filter(|(_, own)| own.per.is_some())
             .map(|(p, own)| (p.clone(), own.clone()))
             .collect();
+        let mut unknown = BTreeMap::new();
         all.parameters.retain(|_, own| own.per.is_none());
         all.parameters.values_mut().for_each(|own| own.learn |= open);
         for (symbol, own) in each {
@@ -48,7 +58,7 @@ impl Description {
                 let problem = format!("no trajectory {name}, expected one of {}", names.join(", "));
                 return Err(DescriptionError::new(format!("parameters.{symbol}.known"), problem));
             }
-            let mut sum = Vec::new();
+            let (mut sum, mut open) = (Vec::new(), Vec::new());
             for ((name, label), mark) in names.iter().zip(&labels).zip(&marks) {
                 let known = own.known.get(name);
                 let default = known.unwrap_or(&own.default).clone();
@@ -61,15 +71,17 @@ impl Description {
                 };
                 let single = format!("{symbol}_{label}");
                 sum.push(format!("{single}*{mark}"));
+                open.extend(known.is_none().then(|| single.clone()));
                 if all.parameters.insert(single.clone(), of_one).is_some() {
                     return Err(DescriptionError::new(format!("parameters.{single}"), "the name is taken"));
                 }
             }
-            all.definitions.insert(symbol, sum.join(" + "));
+            all.definitions.insert(symbol.clone(), sum.join(" + "));
+            unknown.insert(symbol, open);
         }
         all.inputs.extend(marks.iter().map(|mark| (mark.clone(), super::one())));
         all.marks = marks.iter().cloned().collect::<BTreeSet<_>>();
-        Ok((all, marks))
+        Ok(PerTrajectory { description: all, marks, unknown })
     }
 
     /// Number of inputs that mark trajectories.
