@@ -15,9 +15,11 @@ use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
 use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
+use crate::lagrangian::system::Range;
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::{Filled, Recording, deviation, filled, rms};
+use std::f64::consts::TAU;
 
 /// Smallest share of degrees of freedom that initial states and constants leave.
 const LEAST_LEFT: f64 = 0.25;
@@ -25,6 +27,8 @@ const LEAST_LEFT: f64 = 0.25;
 const PACES: f64 = 2.5;
 /// Largest number of samples that are followed.
 const MOST_SAMPLES: usize = 60_000;
+/// Relative change of the sum of squares up to which a full turn of a constant changes nothing.
+const SAME: f64 = 1e-6;
 /// Smallest noise that is assumed, over the spread of a coordinate: the accuracy of the integration.
 const LEAST_NOISE: f64 = 1e-9;
 /// Error of the integrator over the noise.
@@ -231,7 +235,7 @@ pub fn identify(
     refit(&problem, &mut fitted, LAST_ITERATIONS);
     // Longer segments exclude more of the interpolations.
     (fitted, rivals) = best_between(&mut problem, fitted, &rivals);
-    fitted = released(&problem, fitted, &given);
+    fitted = unturned(&problem, released(&problem, fitted, &given), &given);
     if !problem.sigma_of.is_empty() {
         let own = |i: usize| {
             let squares = recording.tracks.iter().zip(&pieces.noise_of);
@@ -357,6 +361,23 @@ fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     refit(problem, &mut tried, LAST_ITERATIONS);
     let better = tried.normal.square < fitted.normal.square && tried.normal.converged >= fitted.normal.converged;
     if better { tried } else { fitted }
+}
+
+/// The fit with constants that are known up to full turns, such as a phase, brought next to their given values.
+fn unturned(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted {
+    for (k, &parameter) in problem.chosen.iter().enumerate().filter(|(_, k)| problem.ranges[**k] == Range::Any) {
+        let turns = ((fitted.x[k] - given[k]) / TAU).round();
+        let mut tried = fitted.x.clone();
+        tried[k] -= turns * TAU;
+        if turns != 0.0 && turns.is_finite() {
+            let square = problem.normal_at(&tried, &fitted.segments).square;
+            if (square - fitted.normal.square).abs() <= SAME * fitted.normal.square {
+                tracing::debug!(parameter, turns, "full turns");
+                fitted.x = tried;
+            }
+        }
+    }
+    fitted
 }
 
 pub(super) fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {

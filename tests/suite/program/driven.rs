@@ -303,6 +303,9 @@ fn a_frequency_is_found_in_a_long_recording() {
     let om = &found["constants"]["om"];
     assert!((om["value"].as_f64().unwrap() - 2.2).abs() < 5.0 * om["standard_error"].as_f64().unwrap(), "{found}");
     assert_eq!(found["explained"], true, "{found}");
+    // A phase is known up to full turns: it is the one next to the start.
+    let phi = &found["constants"]["phi"];
+    assert!((phi["value"].as_f64().unwrap() - 0.5).abs() < 5.0 * phi["standard_error"].as_f64().unwrap(), "{found}");
     // What is out of reach is not said to be searched.
     let found = identified("om=40");
     let says = found["obstacles"].as_array().unwrap();
