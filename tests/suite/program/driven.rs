@@ -195,6 +195,10 @@ fn a_lagrangian_in_time_is_rolled_out_and_identified() {
         let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{name} {value} {error}");
     }
+    // A rod that does not grow does not fit.
+    let still = lnn(&["identify", &data, "--system", &system, "--json", "--constants", "a,om"]);
+    let found: serde_json::Value = serde_json::from_str(&still.stdout).unwrap();
+    assert_eq!(found["explained"], false, "{}", still.stdout);
     // Where no time is known it is refused, and nothing panics.
     for command in ["symmetries", "certify"] {
         lnn(&[command, "--system", &system]).refused(2, &["time t"]);
@@ -264,6 +268,21 @@ fn inputs_of_forces_are_read_from_recordings() {
         }
     }
     assert!(within >= 9 && explained >= 5, "{within} of 12 within two errors, {explained} of 6 explained");
+    // A motor without friction does not fit the last log, and a wrong column drives nothing.
+    let log = text(&folder.path("log.csv"));
+    let swapped = std::fs::read_to_string(&log).unwrap().replacen("t,theta,u", "t,theta,unused", 1);
+    let wrong = swapped.lines().enumerate().map(|(k, row)| match k {
+        0 => format!("{row},u\n"),
+        _ => format!("{row},{}\n", (k as f64 * 0.37).sin()),
+    });
+    let wrong = folder.file("wrong.csv", wrong.collect::<String>());
+    for (data, more) in
+        [(&log, ["--constants", "K", "--param", "b=0"]), (&wrong, ["--constants", "K,b", "--param", "b=0.01"])]
+    {
+        let run = lnn(&[&["identify", data, "--system", &system, "--json"][..], &more].concat());
+        let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(found["explained"], false, "{}", run.stdout);
+    }
     // What is missing or wrong is named.
     let roll = ["rollout", "--system", &system, "--state", "0,0", "--t-end", "1", "--dt", "0.1", "--out", "-"];
     lnn(&roll).refused(2, &["--force", "u"]);
@@ -353,6 +372,12 @@ fn a_payload_differs_between_logs() {
         let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * error && error < 0.01, "{name} {value} {error}");
     }
+    // One payload for all logs does not fit.
+    let shared =
+        folder.file("shared.toml", LOADED.replace("per = \"trajectory\", known = { empty = 0 }", "learn = true"));
+    let run = lnn(&["identify", &data, "--system", &shared, "--trajectory", "log", "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(found["explained"], false, "{}", run.stdout);
     // Without a known one, nothing but ratios are determined.
     let open = folder.file("open.toml", LOADED.replace(", known = { empty = 0 }", ""));
     let run = lnn(&["identify", &data, "--system", &open, "--trajectory", "log", "--json"]);
