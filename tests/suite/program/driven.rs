@@ -203,8 +203,8 @@ fn a_lagrangian_in_time_is_rolled_out_and_identified() {
     for command in ["symmetries", "certify"] {
         lnn(&[command, "--system", &system]).refused(2, &["time t"]);
     }
-    let net = ["fit", &data, "--known", &system, "--epochs", "1", "--out", &text(&folder.path("run"))];
-    lnn(&net).refused(1, &["time `t`"]);
+    let net = ["fit", &data, "--coords", "theta", "--known", &system, "--epochs", "1", "--out"];
+    lnn(&[&net[..], &[&text(&folder.path("run"))]].concat()).refused(2, &["time `t`"]);
     let held = SHAKEN.replace("[parameters]", "[constraints]\nsupport = \"theta - 0.1*t\"\n[parameters]");
     lnn(&["systems", "--system", &folder.file("held.toml", held)]).refused(2, &["held.toml", "support", "time `t`"]);
     let circle = SHAKEN.replace("1 + rate*t", "1 + rate*t*rod");

@@ -61,6 +61,7 @@ const WORDS: [&str; 52] = [
     "name",
     "observer",
     "out",
+    "events",
     "param",
     "penalty",
     "periodic",
