@@ -39,7 +39,9 @@ def test_the_package_is_typed(tmp_path):
     (tmp_path / "use.py").write_text(USE)
     status, text = run("mypy", *cache, tmp_path / "use.py", cwd=tmp_path)
     found = [line for line in text.splitlines() if "error:" in line]
-    assert status == 1 and len(found) == 2 and "use.py:12" in found[0] and "use.py:13" in found[1] and "treads" in found[1], text
+    wrong = next(number for number, line in enumerate(USE.splitlines(), 1) if line.startswith("wrong"))
+    assert status == 1 and len(found) == 2, text
+    assert f"use.py:{wrong}:" in found[0] and f"use.py:{wrong + 1}:" in found[1] and "treads" in found[1], text
 
 
 def test_stubs_are_those_of_the_extension():
