@@ -218,7 +218,7 @@ fn arm(truth: &Constants, (encoder, repeat): (f64, f64), rng: &mut RandomGenerat
 
 /// What was said in a case: of the form, and of the ranges.
 #[derive(Default)]
-struct Tally {
+pub(super) struct Tally {
     /// What is to be said of the form.
     right: bool,
     /// Seeds of which the other is said, with the verdict.
@@ -231,11 +231,11 @@ struct Tally {
 }
 
 impl Tally {
-    fn of(right: bool) -> Self {
+    pub(super) fn of(right: bool) -> Self {
         Self { right, ..Self::default() }
     }
 
-    fn count(&mut self, seed: u64, found: &Identified, truth: &[(&str, f64)]) {
+    pub(super) fn count(&mut self, seed: u64, found: &Identified, truth: &[(&str, f64)]) {
         self.systems += 1;
         if found.explained != self.right {
             self.missed.push((seed, format!("{} (left to gain {:.1e})", found.verdict, found.decrement)));
@@ -253,7 +253,7 @@ impl Tally {
         }
     }
 
-    fn explained(&self, case: &'static str, limits: RangeInclusive<f64>) -> Rate {
+    pub(super) fn explained(&self, case: &'static str, limits: RangeInclusive<f64>) -> Rate {
         for (seed, says) in &self.missed {
             eprintln!("{case}, seed {seed}: {says}");
         }
@@ -261,7 +261,7 @@ impl Tally {
     }
 
     /// Ranges of 90 %; their number in a table of 20 systems scatters by 3 to 5 %.
-    fn held(&self, case: &'static str, limits: RangeInclusive<f64>) -> Rate {
+    pub(super) fn held(&self, case: &'static str, limits: RangeInclusive<f64>) -> Rate {
         let rms = (self.square / self.ranges.max(1) as f64).sqrt();
         eprintln!("{case}: root mean square of errors over stated ones {rms:.2}");
         Rate { verdict: "90 % range holds", case, said: self.held, of: self.ranges, limits }

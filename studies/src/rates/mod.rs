@@ -1,8 +1,8 @@
 //! How often a verdict is wrong: every word that judges is tried on systems drawn at random whose truth is known, and above all where the
 //! right answer is "no".
 //!
-//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints`, `check`, `columns` or `readings` prints a part of it and `--seeds N`
-//! gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
+//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints`, `check`, `columns`, `machines` or `readings` prints a part of it
+//! and `--seeds N` gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
 mod check;
 mod columns;
@@ -11,6 +11,7 @@ mod convergence;
 mod determined;
 mod formula;
 mod identify;
+mod machines;
 mod readings;
 
 use crate::Outcome;
@@ -60,12 +61,13 @@ enum Part {
     Constraints,
     Check,
     Columns,
+    Machines,
     Readings,
 }
 
 impl Part {
-    const ALL: [Self; 6] =
-        [Self::Identify, Self::Formula, Self::Constraints, Self::Check, Self::Columns, Self::Readings];
+    const ALL: [Self; 7] =
+        [Self::Identify, Self::Formula, Self::Constraints, Self::Check, Self::Columns, Self::Machines, Self::Readings];
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
@@ -77,6 +79,7 @@ impl Part {
             Self::Constraints => constraints::rates(seeds),
             Self::Check => check::rates(seeds),
             Self::Columns => columns::rates(seeds),
+            Self::Machines => machines::rates(seeds),
             Self::Readings => readings::rates(seeds),
         }
     }
