@@ -1,6 +1,7 @@
 //! The system that a command is about: one of the catalogue by its name, or another one by its file.
 
-use crate::cli::{CliError, config};
+use crate::cli::robot::{self, is_robot, parse_robot};
+use crate::cli::{CliError, config, output};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, find, resolve};
 use crate::network::file::Header;
@@ -9,21 +10,32 @@ use std::path::Path;
 
 /// `true` if an argument is the file of a system, not a name of the catalogue.
 pub fn is_file(system: &str) -> bool {
-    Path::new(system).extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
+    let path = Path::new(system);
+    is_robot(path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
 }
 
-/// The system of a name, or of a file whose name ends in `.toml`.
+/// The system of a name, or of a file whose name ends in `.toml`, or in `.urdf` or `.xml` for a robot.
 ///
 /// # Errors
 /// A usage error for an unknown name and for a mistake in a file, a data error for a file that cannot be read.
 pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
+    let path = Path::new(system);
+    if is_robot(path) {
+        let (system, notes) = robot::at_line(path, parse_robot)?;
+        notes.iter().for_each(|note| output::note(&format!("{}: {note}", path.display())));
+        return Ok(Cow::Owned(system));
+    }
     if is_file(system) {
-        let (name, text) = config::read_text(Path::new(system))?;
+        let (name, text) = config::read_text(path)?;
         let refused = |(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}"));
         return parse_system(&text).map(Cow::Owned).map_err(refused);
     }
     resolve(system).map_err(|error| {
-        let file = if Path::new(system).is_file() { "; a file of a system ends in .toml" } else { "" };
+        let file = if Path::new(system).is_file() {
+            "; a file of a system ends in .toml, of a robot in .urdf or .xml"
+        } else {
+            ""
+        };
         CliError::usage(format_args!("{error}{file}"))
     })
 }

@@ -305,9 +305,13 @@ impl System {
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Option<Description> {
         self.described.as_deref().map(|described| described.with_defaults(values))
     }
-    /// `true` for a chain of links.
+    /// `true` for links, a chain or a tree.
     pub(crate) fn is_chain(&self) -> bool {
         self.described.as_ref().is_some_and(|described| described.is_chain())
+    }
+    /// Number of its links.
+    pub(crate) fn links(&self) -> usize {
+        self.described.as_ref().map_or(0, |described| described.links())
     }
     /// Coordinates, in order, of the system of `n` coordinates.
     pub fn coordinates(&self, n: usize) -> Vec<Coordinate> {

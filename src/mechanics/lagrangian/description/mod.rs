@@ -22,11 +22,15 @@ use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+#[cfg(feature = "cli")]
+pub(crate) use chain::turned;
 use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
+#[cfg(feature = "cli")]
+pub(crate) use system::is_free_name;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
 #[derive(Clone, Debug, PartialEq)]
@@ -300,6 +304,11 @@ impl Described {
     /// `true` if it was written as a chain of links.
     pub fn is_chain(&self) -> bool {
         self.written.is_some()
+    }
+
+    /// Number of the links that it was written with.
+    pub(crate) fn links(&self) -> usize {
+        self.written.as_ref().map_or(0, |written| written.links.len())
     }
 
     /// The description as it was given, with other values of parameters, by name.
