@@ -4,6 +4,7 @@ use crate::cli::files::OutputFile;
 use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::result_page::{self, PageArgs};
+use crate::cli::robot::{self, is_robot};
 use crate::cli::source::parameter;
 use crate::cli::watch::search;
 use crate::cli::{CliError, output, parse_system, system_arg};
@@ -62,7 +63,7 @@ pub struct Args {
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write the system with the identified constants, as a file for rollout, train and grey boxes.
+    /// Write the system with the identified constants, as a file for rollout, train and grey boxes; FILE.urdf of a URDF writes that URDF.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -111,7 +112,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let inputs: Vec<&Path> =
         args.recording.data.iter().map(PathBuf::as_path).chain([Path::new(&args.system)]).collect();
-    let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
+    let out = args.out.as_deref().map(|out| claim(args, out, &inputs)).transpose()?;
     let page = args.page.claim(&inputs, args.overwrite)?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
@@ -133,7 +134,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let found = identify(&instance, &reading.recording, &options).map_err(refused)?;
     drop(options);
     if let Some(out) = &out {
-        write(out, &instance, &found)?;
+        write(args, out, &instance, &found)?;
     }
     let found = found.with_rows_of(&reading);
     let title = format!("Constants of {}", instance.system.name);
@@ -187,12 +188,38 @@ fn refused(error: IdentifyError) -> CliError {
     }
 }
 
-/// Writes the description with the values that were found.
-fn write(out: &OutputFile<'_>, instance: &SystemInstance<f64>, found: &Identified) -> Result<(), CliError> {
+/// `true` if the result goes into a robot's file.
+fn is_robot_written(args: &Args) -> bool {
+    args.out.as_deref().is_some_and(is_robot)
+}
+
+/// The file of the result: a system file, or that of a robot if the system is one.
+fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<'a>, CliError> {
+    match is_robot_written(args) && is_robot(Path::new(&args.system)) {
+        true => {
+            // What cannot be written is said before the search.
+            robot::at_line(Path::new(&args.system), |text| robot::rewritten(text, &[]))?;
+            OutputFile::claim(out, inputs, args.overwrite)
+        }
+        false => OutputFile::claim_system(out, inputs, args.overwrite),
+    }
+}
+
+/// Writes the description, or the robot's file, with the values that were found.
+fn write(
+    args: &Args,
+    out: &OutputFile<'_>,
+    instance: &SystemInstance<f64>,
+    found: &Identified,
+) -> Result<(), CliError> {
     let given = instance.system.parameters.iter().zip(&instance.parameters);
     let mut values: Vec<(&str, f64)> = given.map(|(parameter, value)| (parameter.symbol.as_ref(), *value)).collect();
     for constant in &found.constants {
         values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
+    }
+    if is_robot_written(args) {
+        let written = robot::at_line(Path::new(&args.system), |text| robot::rewritten(text, &values))?;
+        return out.write(written.as_bytes());
     }
     let Some(description) = instance.system.with_defaults(&values) else { return Ok(()) };
     let text = toml::to_string(&description).map_err(CliError::data)?;

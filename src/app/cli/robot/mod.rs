@@ -1,7 +1,11 @@
 //! Robots in files of other programs: URDF and MJCF. A file is read as links, and these become the description of a system, as if the
 //! user had written it: `[[links]]` with their constants.
 
+mod geoms;
+mod mjcf;
 mod rigid;
+#[cfg(test)]
+mod tests;
 mod urdf;
 mod write;
 mod xml;
@@ -100,7 +104,8 @@ fn read(text: &str) -> Result<(Robot, usize), Fault> {
     let (line, _) = xml::fault(root, "");
     let robot = match root.tag_name().name() {
         "robot" => urdf::read(root)?,
-        _ => return Err(xml::fault(root, "expected <robot> of a URDF")),
+        "mujoco" => mjcf::read(root)?,
+        _ => return Err(xml::fault(root, "expected <robot> of a URDF or <mujoco> of an MJCF file")),
     };
     match robot.links.len() {
         1..=MAX_LINKS => Ok((robot, line)),

@@ -26,6 +26,12 @@ pub fn rewritten(text: &str, values: &[(&str, f64)]) -> Result<String, Fault> {
     let plain = text.strip_prefix('\u{feff}').unwrap_or(text);
     let document = xml::parse(plain)?;
     let root = document.root_element();
+    if !root.has_tag_name("robot") {
+        return Err(fault(
+            root,
+            "only a URDF is written with other constants; let the name of the result end in .toml",
+        ));
+    }
     let mut edits = Edits(Vec::new());
     let named = |tag: &str, name: &str| children(root, tag).find(|node| node.attribute("name") == Some(name));
     let mut expected = Vec::new();

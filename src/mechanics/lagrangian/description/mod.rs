@@ -22,9 +22,9 @@ use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-#[cfg(feature = "cli")]
-pub(crate) use chain::turned;
 use chain::{ChainDescription, LinkDescription};
+#[cfg(feature = "cli")]
+pub(crate) use chain::{ShownLink, turned};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
@@ -309,6 +309,13 @@ impl Described {
     /// Number of the links that it was written with.
     pub(crate) fn links(&self) -> usize {
         self.written.as_ref().map_or(0, |written| written.links.len())
+    }
+
+    /// Its links as one can show them.
+    #[cfg(feature = "cli")]
+    pub(crate) fn shown_links(&self) -> Vec<ShownLink<'_>> {
+        let names: Vec<&str> = self.description.coordinates.iter().map(|c| c.name.as_str()).collect();
+        self.written.as_ref().map_or_else(Vec::new, |written| written.shown_links(&names))
     }
 
     /// The description as it was given, with other values of parameters, by name.

@@ -91,7 +91,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 fn with_arms(mut show: impl FnMut(&Arm, [&[f64]; 3], &str)) {
     let mut rng = RngStream::Region.generator(17);
     for links in 1..=MOST {
-        for case in 0..12 {
+        for case in 0..9 {
             let arm = arm(links, &mut rng, (case % 2 == 0, case % 3 == 0, case > 5));
             let mut draw =
                 |size: f64| -> Vec<f64> { (0..arm.coordinates).map(|_| rng.random_range(-size..size)).collect() };

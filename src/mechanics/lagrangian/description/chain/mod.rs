@@ -128,6 +128,21 @@ fn is_nothing(x: &Quantity) -> bool {
     x.0 == 0.0
 }
 
+/// A link with the joint that moves it, in words.
+#[cfg(feature = "cli")]
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct ShownLink<'a> {
+    /// Its name, if it has one.
+    pub(crate) name: Option<&'a str>,
+    /// Number of the link that carries it, 0 for the base.
+    pub(crate) parent: usize,
+    /// `true` if its joint slides.
+    pub(crate) prismatic: bool,
+    /// The coordinate that moves it, and how far it moves for each unit of that.
+    pub(crate) coordinate: &'a str,
+    pub(crate) ratio: f64,
+}
+
 /// Symbols of the ten constants of a link, from 1: its mass, first moments and inertia about the origin of its frame.
 pub(crate) fn inertia_symbols(link: usize) -> [String; 10] {
     ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"].map(|what| format!("{what}{link}"))
@@ -167,6 +182,19 @@ impl Description {
             gravity: triple("chain.gravity", &chain.gravity, GRAVITY).ok()?,
             coulomb_speed,
         })
+    }
+
+    /// Its links in words, coordinates by these names.
+    #[cfg(feature = "cli")]
+    pub(super) fn shown_links<'a>(&'a self, names: &[&'a str]) -> Vec<ShownLink<'a>> {
+        let shown = |(link, joint): (&'a LinkDescription, Joint)| ShownLink {
+            name: link.name.as_deref(),
+            parent: joint.parent.map_or(0, |at| at + 1),
+            prismatic: joint.slides,
+            coordinate: names[joint.drive.0],
+            ratio: joint.drive.1,
+        };
+        self.links.iter().zip(self.joints().unwrap_or_default()).map(shown).collect()
     }
 
     /// The same with links written out; as it is if they are wrong, which its compilation says.
