@@ -57,9 +57,9 @@ pub(crate) use derivatives::metric_jets;
 #[cfg(feature = "serde")]
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
+pub(crate) use description::{inertia_symbols, loss_symbols};
 #[cfg(feature = "cli")]
 pub(crate) use description::{is_free_name, turned};
-pub(crate) use description::{inertia_symbols, loss_symbols};
 #[cfg(feature = "training")]
 pub(crate) use equations::{EquationPart, Equations};
 pub use error::MechanicsError;

@@ -123,11 +123,16 @@ impl Body {
     pub fn stretched(parts: &[Self], whole: &Self) -> Option<Vec<Self>> {
         let sum = parts.iter().fold(Self::default(), |sum, part| sum.plus(part, 1.0));
         let (mut inverted, to) = ([0.0; 16], whole.factor()?);
-        inverse(4, &sum.factor()?, &mut inverted, &mut Workspace::new()).ok()?;
-        let map = product4(&to, &inverted);
-        let back: Square = std::array::from_fn(|at| map[at % 4 * 4 + at / 4]);
+        inverse(4, &sum.moments(), &mut inverted, &mut Workspace::new()).ok()?;
+        // The inverse of a factor of `P = C C^T` is `C^T P^-1`.
+        let map = product4(&to, &product4(&transposed4(&sum.factor()?), &inverted));
+        let back = transposed4(&map);
         Some(parts.iter().map(|part| Self::of_moments(&product4(&product4(&map, &part.moments()), &back))).collect())
     }
+}
+
+fn transposed4(a: &Square) -> Square {
+    std::array::from_fn(|at| a[at % 4 * 4 + at / 4])
 }
 
 fn product4(a: &Square, b: &Square) -> Square {
