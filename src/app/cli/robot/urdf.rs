@@ -35,6 +35,9 @@ struct Element<'a, 'i> {
     child: &'a str,
 }
 
+/// Joints by their order in the file, each with the link that carries its parent and the place of the parent in the frame of that.
+type Waiting<'e, 'a, 'i> = BTreeMap<usize, (&'e Element<'a, 'i>, Option<usize>, Place)>;
+
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Fixed,
@@ -56,12 +59,12 @@ pub(super) fn read(root: Node<'_, '_>) -> Outcome<Robot> {
         links: Vec::new(),
         notes: elements.left_out(root),
     };
-    // Joints whose links stand, from the last to the first, each with the link that carries it and the place of its own in that.
-    let mut waiting: Vec<(&Element<'_, '_>, Option<usize>, Place)> = Vec::new();
+    // Joints whose parents are read, by their order in the file, so that coordinates have it as far as a tree allows.
+    let mut waiting = Waiting::new();
     let mut numbers: BTreeMap<&str, Option<usize>> = BTreeMap::new();
     elements.push_children(&mut waiting, (base, None, Place::HERE));
     let mut reached = 1;
-    while let Some((joint, carrier, place)) = waiting.pop() {
+    while let Some((joint, carrier, place)) = waiting.pop_first().map(|(_, joint)| joint) {
         reached += 1;
         let place = place.then(&origin(joint.node)?);
         let part =
@@ -150,14 +153,14 @@ impl<'a, 'i> Elements<'a, 'i> {
         }
     }
 
-    /// Puts the joints of a link on the stack, so that the first one comes off first.
+    /// Lets the joints of a link wait.
     fn push_children<'e>(
         &'e self,
-        waiting: &mut Vec<(&'e Element<'a, 'i>, Option<usize>, Place)>,
+        waiting: &mut Waiting<'e, 'a, 'i>,
         (name, carrier, place): (&str, Option<usize>, Place),
     ) {
-        waiting
-            .extend(self.joints.iter().rev().filter(|joint| joint.parent == name).map(|joint| (joint, carrier, place)));
+        let own = self.joints.iter().enumerate().filter(|(_, joint)| joint.parent == name);
+        waiting.extend(own.map(|(at, joint)| (at, (joint, carrier, place))));
     }
 
     /// What is not read, by its elements.
