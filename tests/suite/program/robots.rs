@@ -59,7 +59,7 @@ fn log(folder: &Folder, robot: &str, joints: usize, seconds: f64) -> String {
     let mut csv = String::new();
     for (own, forces) in motion.lines().zip(run.stdout.lines()) {
         let own: Vec<&str> = own.split(',').take(joints + 1).collect();
-        let forces: Vec<&str> = forces.split(',').take(joints).collect();
+        let forces: Vec<&str> = forces.split(',').skip(1).take(joints).collect();
         let forces = match csv.is_empty() {
             true => (1..=joints).map(|k| format!("tau{k}")).collect::<Vec<_>>().join(","),
             false => forces.join(","),

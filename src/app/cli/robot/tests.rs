@@ -215,7 +215,7 @@ fn what_is_not_changed_stays_byte_by_byte() {
     let other = rewritten(PICKER, &[("Fc3", 0.5)]).unwrap();
     assert_eq!(changed(PICKER, &other).map(str::trim), ["", "friction=\"0.5\""]);
     let other = rewritten(PICKER, &[("Fv4", 0.5)]).unwrap();
-    assert_eq!(changed(PICKER, &other)[1].trim(), "<dynamics damping=\"0.5\"/>");
+    assert_eq!(other.replacen("\n    <dynamics damping=\"0.5\"/>", "", 1), PICKER);
 }
 
 #[test]
