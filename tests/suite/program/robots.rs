@@ -1,6 +1,9 @@
 //! Robots in URDF files: listed, rolled out, identified from torques, and written back.
 
 use crate::common::program::{Folder, lnn, text};
+use lnn::random::RngStream;
+use rand::Rng;
+use rand_distr::StandardNormal;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::fs;
@@ -50,22 +53,26 @@ fn motion(joints: usize, seconds: f64) -> String {
     csv
 }
 
-/// A log of positions and torques of that motion, torques by the program itself.
+/// A log of positions and torques of that motion with noise, torques by the program itself.
 fn log(folder: &Folder, robot: &str, joints: usize, seconds: f64) -> String {
     let motion = motion(joints, seconds);
     let states = folder.file("motion.csv", &motion);
     let run = lnn(&["inspect", "--system", robot, "--states", &states, "--inverse", "--format", "csv"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
-    let mut csv = String::new();
-    for (own, forces) in motion.lines().zip(run.stdout.lines()) {
-        let own: Vec<&str> = own.split(',').take(joints + 1).collect();
-        let forces: Vec<&str> = forces.split(',').skip(1).take(joints).collect();
-        let forces = match csv.is_empty() {
-            true => (1..=joints).map(|k| format!("tau{k}")).collect::<Vec<_>>().join(","),
-            false => forces.join(","),
-        };
-        let _ = writeln!(csv, "{},{forces}", own.join(","));
+    let mut csv = ["j", "tau"].map(|what| (1..=joints).map(|k| format!(",{what}{k}")).collect::<String>()).concat();
+    csv.insert(0, 't');
+    let mut rng = RngStream::Region.generator(1);
+    let mut noisy = |text: &str, size: f64| {
+        let noise: f64 = rng.sample(StandardNormal);
+        format!(",{}", text.parse::<f64>().unwrap() + size * noise)
+    };
+    for (own, forces) in motion.lines().zip(run.stdout.lines()).skip(1) {
+        let (time, own) = own.split_once(',').unwrap();
+        let own: String = own.split(',').take(joints).map(|x| noisy(x, 1e-4)).collect();
+        let forces: String = forces.split(',').skip(1).take(joints).map(|x| noisy(x, 0.02)).collect();
+        let _ = write!(csv, "\n{time}{own}{forces}");
     }
+    csv.push('\n');
     folder.file("log.csv", csv)
 }
 
