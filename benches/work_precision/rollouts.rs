@@ -182,7 +182,7 @@ fn points(
             Options { rtol: setting, atol: setting, ..base }
         };
         let run = || rollout(&*problem.model, black_box(&problem.q), &problem.v, &options);
-        let Rollout { trajectory, statistics, stop } = run();
+        let Rollout { trajectory, statistics, stop, .. } = run();
         if let Some(stop) = stop {
             section.failed(case(), stop.to_string());
             continue;

@@ -21,7 +21,10 @@ pub fn run(bytes: &[u8]) {
         ..Columns::default()
     };
     let wide = Columns { wide: true, ..named.clone() };
-    for columns in [named, numbered, full, wide] {
+    // Readings may be missing, and whatever else is measured is an input.
+    let whole =
+        Columns { whole: true, coords: list(&["x", "v"]), input: list(&["t"]), rate: Some(10.0), ..Columns::default() };
+    for columns in [named, numbered, full, wide, whole] {
         read(&path, &columns);
     }
 }
@@ -34,8 +37,15 @@ fn read(path: &PathBuf, columns: &Columns) {
     let recording = &reading.recording;
     assert!(!recording.tracks.is_empty());
     assert_eq!(recording.tracks.len(), reading.rows.len());
+    let marked = reading.missing.iter().zip(&recording.tracks);
+    assert!(marked.clone().all(|(missing, track)| missing.is_empty() || missing.len() == track.q.len()));
+    assert!(reading.inputs.iter().zip(&recording.tracks).all(|(own, track)| own.len() == track.len()));
     for (track, rows) in recording.tracks.iter().zip(&reading.rows) {
-        track.validate(recording.n()).expect("what was read makes sense");
+        match columns.whole {
+            true => track.validate_repeated(recording.n()),
+            false => track.validate(recording.n()),
+        }
+        .expect("what was read makes sense");
         assert!((1..track.len()).all(|k| rows.row(k) > rows.row(k - 1)));
     }
 }

@@ -32,6 +32,7 @@ _Receiver = Callable[[str, float, float, str], None] | None
 _Numbers = Sequence[float]
 _Track = tuple[str, _Numbers, _Numbers, _Numbers, _Numbers, _Numbers]
 _Motion = tuple[Sequence[str], Sequence[_Track], str]
+_Happened = tuple[str, float, _Doubles, _Doubles, tuple[_Doubles, float, float] | None]
 _Learned = tuple[list[Subject], str, str, tuple[str, str], str | None]
 
 @final
@@ -63,8 +64,9 @@ class Subject:
         accuracy: tuple[float, float, float | None],
         acting: tuple[bool, bool],
         forces: _Driving,
+        inputs: _Driving,
         threads: int,
-    ) -> list[tuple[_Doubles, _Doubles, _Doubles, _Doubles, str | None, int]]: ...
+    ) -> list[tuple[_Doubles, _Doubles, _Doubles, _Doubles, str | None, int, list[_Happened]]]: ...
     def linearize(
         self, q: _Doubles, v: _Doubles, force: _Doubles | None, friction: bool
     ) -> list[_Doubles]: ...

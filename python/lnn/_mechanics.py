@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import as_json, bounds_of, doubles, doubles_list, names, read_result, real, states, thread_count, whole
-from ._results import Certificate, Formula, Geometry, InverseDynamics, Linearization, OwnConstraints, Surface, Symmetries, Trajectory
+from ._results import Certificate, Event, Formula, Geometry, InverseDynamics, Linearization, OwnConstraints, Surface, Symmetries, Trajectory
 from .reader import files
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
@@ -24,8 +24,14 @@ if TYPE_CHECKING:
     from ._progress import Progress
 
     Drive = Numbers | tuple[Numbers, Numbers] | Callable[[float, np.ndarray, np.ndarray], Numbers]
+    Inputs = Numbers | tuple[Numbers, Numbers] | Callable[[float], Numbers]
 
 TENSORS = {"metric": 2, "inverse": 2, "christoffel": 3, "riemann": 4, "ricci": 2, "einstein": 2, "weyl": 4}
+
+
+def _event(name: str, t: float, q: np.ndarray, v: np.ndarray, impact: tuple[np.ndarray, float, float] | None) -> Event:
+    """What happened, with what an impact changed."""
+    return Event(name, t, q, v, *(impact or ()))
 
 
 class Mechanics:
@@ -50,6 +56,11 @@ class Mechanics:
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates."""
         return self.columns[: self._n]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the measured quantities on which the forces of a system depend."""
+        return tuple(self._facts.get("inputs", ()))
 
     @property
     def angles(self) -> tuple[str, ...]:
@@ -130,13 +141,13 @@ class Mechanics:
         given = None if force is None else self._forces(force, shape)
         return self._subject.term("acceleration", q, v, threads, given, bool(friction)).reshape(*shape, self._n)
 
-    def _forces(self, force: Numbers, shape: tuple[int, ...]) -> np.ndarray:
+    def _forces(self, force: Numbers, shape: tuple[int, ...], n: int | None = None, what: str = "force") -> np.ndarray:
         """Forces on states, one for each or one for all of them, ``(b, n)``."""
-        given, n = doubles("force", force), self._n
+        given, n = doubles(what, force), self._n if n is None else n
         try:
             return np.ascontiguousarray(np.broadcast_to(given, (*shape, n)).reshape(-1, n))
         except ValueError:
-            raise ValueError(f"force: expected an array (..., {n}) for states {shape}, found the shape {given.shape}") from None
+            raise ValueError(f"{what}: expected an array (..., {n}) for states {shape}, found the shape {given.shape}") from None
 
     def inverse_dynamics(self, q: Numbers, v: Numbers, a: Numbers) -> InverseDynamics:
         """Forces that give states their accelerations: the torques that an arm's motors need, or a controller sends ahead.
@@ -217,6 +228,7 @@ class Mechanics:
         force: Drive | None = None,
         between: str | None = None,
         friction: bool = True,
+        inputs: Inputs | None = None,
         threads: int | None = None,
     ) -> Trajectory:
         """Motion from one start, or from a batch of them.
@@ -239,51 +251,64 @@ class Mechanics:
             Values of forces between their times: ``"held"``, ``"linear"``, the default, ``"cubic"`` or ``"band-limited"``.
         friction : bool
             Whether its own friction acts.
+        inputs : array_like (k,), pair of array_like, or callable, optional
+            The `inputs` of a system, in their order: constants, times ``(m,)`` with values ``(m, k)``, or a function of t that returns
+            them, ``(k,)``.
         """
         n = self._n
         starts, velocities, shape = states(q, v, n)
         times = real("t0", t0), real("t_end", t_end), real("dt", dt, positive=True)
         accuracy = real("rtol", rtol), real("atol", atol), None if step is None else real("step", step, positive=True)
         acting = bool(bounded), bool(friction)
-        forces = self._driving(force, between, shape)
-        found = self._subject.rollout(starts, velocities, times, method, accuracy, acting, forces, thread_count(threads))
+        if self.inputs and inputs is None:
+            raise ValueError(f"inputs: expected values of {', '.join(self.inputs)}")
+        if inputs is not None and not self.inputs:
+            raise ValueError(f"inputs: {self.name} has none")
+        forces = self._driving("force", force, between if force is not None or inputs is None else None, (n, shape))
+        known = self._driving("inputs", inputs, between if force is None else None, (len(self.inputs), ()))
+        found = self._subject.rollout(starts, velocities, times, method, accuracy, acting, forces, known, thread_count(threads))
         # The longest motion has all times that any has.
         t = max((motion[0] for motion in found), key=len, default=np.empty(0))
         parts = [np.full((len(found), len(t), n), np.nan) for _ in range(2)] + [np.full((len(found), len(t)), np.nan)]
-        for k, (_, *motion, _, _) in enumerate(found):
+        for k, (_, *motion, _, _, _) in enumerate(found):
             for part, numbers in zip(parts, motion):
                 rows = numbers.reshape(-1, *part.shape[2:])
                 part[k, : len(rows)] = rows
         along = [part.reshape(shape + part.shape[1:]) for part in parts]
         stop = found[0][4] if shape == () else np.array([motion[4] for motion in found], dtype=object).reshape(shape)
-        return Trajectory(t, along[0], along[1], along[2], stop, self.columns)
+        happened = np.empty(len(found), dtype=object)
+        happened[:] = [tuple(_event(*event) for event in motion[6]) for motion in found]
+        events = happened[0] if shape == () else happened.reshape(shape)
+        return Trajectory(t, along[0], along[1], along[2], stop, self.columns, events)
 
-    def _driving(self, force: Drive | None, between: str | None, shape: tuple[int, ...]) -> _lnn._Driving:
-        """Forces that drive motions as the library takes them: samples, or a function."""
-        n, pair = self._n, None
+    def _driving(
+        self, what: str, force: Drive | Inputs | None, between: str | None, size: tuple[int, tuple[int, ...]]
+    ) -> _lnn._Driving:
+        """Forces or inputs that drive motions as the library takes them: samples, or a function."""
+        (n, shape), pair = size, None
         if isinstance(force, tuple) and len(force) == 2:
-            times, values = (doubles("force", part) for part in force)
+            times, values = (doubles(what, part) for part in force)
             if times.ndim == 1 and (values.ndim > 1 or n == 1 < len(times)):
                 pair = times, values[:, None] if values.ndim == 1 else values
         if between is not None and pair is None:
-            raise ValueError("between: expected forces at times, (times, values)")
+            raise ValueError(f"between: expected {what} at times, (times, values)")
         if force is None:
             return None, None
         if callable(force):
-            function = force
+            function = cast("Callable[..., Numbers]", force)
 
             def call(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-                found = doubles("force", function(t, q, v))
+                found = doubles(what, function(t, q, v) if what == "force" else function(t))
                 if found.size != n:
-                    raise ValueError(f"force: expected {n} numbers, found the shape {found.shape}")
+                    raise ValueError(f"{what}: expected {n} numbers, found the shape {found.shape}")
                 return np.ascontiguousarray(found.reshape(n))
 
             return None, call
         if pair is None:
-            return ([0.0], [row.tolist() for row in self._forces(cast("Numbers", force), shape)], None), None
+            return ([0.0], [row.tolist() for row in self._forces(cast("Numbers", force), shape, n, what)], None), None
         times, values = pair
         if values.shape[-2:] != (len(times), n):
-            raise ValueError(f"force: expected values (..., {len(times)}, {n}) at {len(times)} times, found the shape {values.shape}")
+            raise ValueError(f"{what}: expected values (..., {len(times)}, {n}) at {len(times)} times, found the shape {values.shape}")
         if values.ndim > 2:
             values = np.broadcast_to(values, (*shape, len(times), n))
         return (times.tolist(), values.reshape(-1, len(times) * n).tolist(), between), None

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
-from ._recorded import errors_beside, recorded
+from ._recorded import errors_beside, inputs_beside, recorded
 from ._mechanics import System
 from ._results import Bodies, Checked, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
@@ -176,6 +176,7 @@ def identify(
     delays: Sequence[str] = (),
     noise: Sequence[float] | None = None,
     error: Beside | None = None,
+    inputs: Beside | None = None,
     targets: str | None = None,
     between: str | None = None,
     segment: float | None = None,
@@ -201,6 +202,9 @@ def identify(
     error : optional
         Standard deviations of the positions, sample by sample: an array like the data, or a list of them; of files and DataFrames the names of
         their columns. Residuals are weighed by them.
+    inputs : optional
+        The `inputs` of the system at the samples, in their order: an array ``(samples, k)``, or a list of them; of files and DataFrames the
+        names of their columns, by default those of the inputs.
     targets : str, optional
         What is met, ``"motion"`` or ``"forces"``; the forces of a chain of links, else the motion by default.
     between : str, optional
@@ -228,6 +232,8 @@ def identify(
     if noise is not None and error is not None:
         raise ValueError("error: expected either errors sample by sample or the noise of every coordinate, found both")
     beside, errors = errors_beside(data, error, trajectory, coordinates, units)
+    more, measured = inputs_beside(data, inputs, trajectory, system.inputs)
+    beside |= more
     motion = recorded(
         data, coordinates, angles, dt=dt, t=t, v=v, force=force, trajectory=trajectory, columns={**(columns or {}), **beside}, units=units
     )
@@ -235,7 +241,7 @@ def identify(
     choices: dict[str, object] = {key: names(key, given) for key, given in named.items()}
     choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
     choices["segment"] = None if segment is None else real("segment", segment, positive=True)
-    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors}
+    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors, "inputs": measured}
     found = read_result(_lnn.identify(motion, system._subject, as_json(choices)))
     found["constants"] = {symbol: IdentifiedConstant(**constant) for symbol, constant in found["constants"].items()}
     found["obstacles"] = tuple(found["obstacles"])

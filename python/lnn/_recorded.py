@@ -112,6 +112,27 @@ def errors_beside(
     return {}, [np.ravel(_scaled(doubles("error", x), factors)).tolist() for x in given]
 
 
+def inputs_beside(
+    data: Any, inputs: Any, trajectory: str | None, names: Sequence[str]
+) -> tuple[dict[str, Any], list[list[float]]]:
+    """Inputs of a system: their columns in files, or numbers of every trajectory in memory."""
+    if not names:
+        if inputs is not None:
+            raise ValueError("inputs: the system has none")
+        return {}, []
+    if _is_path(data) or (isinstance(data, (list, tuple)) and data and all(map(_is_path, data))):
+        return {"inputs": [str(name) for name in (names if inputs is None else inputs)]}, []
+    if hasattr(data, "columns") and hasattr(data, "loc"):
+        groups = [data] if trajectory is None else [group for _, group in data.groupby(trajectory, sort=False)]
+        given = [group[list(names if inputs is None else inputs)].to_numpy(float) for group in groups]
+    elif inputs is None:
+        raise ValueError(f"inputs: expected values of {', '.join(names)}")
+    else:
+        several = isinstance(data, (list, tuple)) and len(data) > 0 and np.ndim(data[0]) == 2
+        given = list(inputs) if several else [inputs]
+    return {}, [np.ravel(doubles("inputs", x)).tolist() for x in given]
+
+
 def _is_path(x: object) -> bool:
     return isinstance(x, (str, os.PathLike))
 

@@ -91,6 +91,33 @@ class InverseDynamics:
 
 
 @dataclass(frozen=True)
+class Event:
+    """An event of the system that happened along a motion.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the table ``events`` of the system.
+    t : float
+        Its time.
+    q, v : (n,)
+        Coordinates and velocities there; velocities after an impact.
+    v_before : (n,), or None
+        Velocities before an impact.
+    energy_before, energy_after : float, or None
+        E before and after an impact, in the unit of the Lagrangian.
+    """
+
+    name: str
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    v_before: np.ndarray | None = None
+    energy_before: float | None = None
+    energy_after: float | None = None
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Motion at ``t``, of one start or of a batch of them.
 
@@ -106,6 +133,8 @@ class Trajectory:
         Why a motion ended early, of every start.
     columns : tuple of str
         Names of the coordinates, then of the velocities.
+    events : tuple of Event, or an array of them
+        What happened of the events of the system, in the order of time, of every start.
     """
 
     t: np.ndarray
@@ -114,6 +143,7 @@ class Trajectory:
     energy: np.ndarray
     stop: str | None | np.ndarray
     columns: tuple[str, ...]
+    events: tuple[Event, ...] | np.ndarray = ()
 
     @property
     def complete(self) -> bool:

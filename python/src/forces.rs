@@ -2,7 +2,7 @@
 
 use crate::errors::value;
 use crate::subject::{Subject, slice};
-use lnn::lagrangian::{ForceParts, GivenForces, InverseDynamics, force_parts, inverse_dynamics};
+use lnn::lagrangian::{ForceParts, Inputs, InverseDynamics, force_parts, inverse_dynamics};
 use lnn::rollout::{Between, Force, SampledForce};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -52,8 +52,8 @@ impl Forces {
     pub fn of(
         n: usize,
         (from, to): (f64, f64),
-        samples: Option<Samples>,
-        function: Option<Py<PyAny>>,
+        what: &str,
+        (samples, function): (Option<Samples>, Option<Py<PyAny>>),
     ) -> PyResult<Self> {
         let mut forces = Self::default();
         if let Some((times, values, between)) = samples {
@@ -69,7 +69,7 @@ impl Forces {
                 let slack = 1e-9 * (to - from).abs();
                 if from.min(to) < first - slack || from.max(to) > last + slack {
                     let known = format_args!(
-                        "force: known from t = {first} to {last}, and the motion runs from {from} to {to}"
+                        "{what}: known from t = {first} to {last}, and the motion runs from {from} to {to}"
                     );
                     return Err(value(known));
                 }
@@ -89,15 +89,15 @@ impl Forces {
         Ok(forces)
     }
 
-    /// The same beside forces of the system that depend on the time.
-    pub fn beside(mut self, own: GivenForces<f64>) -> Self {
-        if self.each.is_empty() {
-            self.each.push(Box::new(own));
-        } else {
-            let both = |one: Box<dyn Force<f64>>| Box::new((one, own.clone())) as Box<dyn Force<f64>>;
-            self.each = self.each.into_iter().map(both).collect();
-        }
-        self
+    /// So many of them as inputs of a system.
+    pub fn inputs(this: &Arc<Self>, count: usize) -> Box<dyn Inputs<f64>> {
+        let this = Arc::clone(this);
+        Box::new((count, move |t: f64, values: &mut [f64]| {
+            values.fill(0.0);
+            if let Some(given) = this.on(0) {
+                given.force(t, &[], &[], values);
+            }
+        }))
     }
 
     /// The force on a start.

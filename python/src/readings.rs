@@ -90,6 +90,10 @@ pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str)
         if options.errors.is_empty() {
             options.errors = std::mem::take(&mut loaded.errors);
         }
+        if options.inputs.is_empty() {
+            options.inputs = std::mem::take(&mut loaded.inputs);
+        }
+        options.missing = std::mem::take(&mut loaded.missing);
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?.with_rows_of(&loaded);
         shown(&found, &found.findings())
     })?

@@ -70,6 +70,7 @@ impl Source {
                 "velocities" => columns.velocity = serde_json::from_value(given).map_err(bad)?,
                 "accelerations" => columns.acceleration = serde_json::from_value(given).map_err(bad)?,
                 "errors" => columns.error = serde_json::from_value(given).map_err(bad)?,
+                "inputs" => columns.input = serde_json::from_value(given).map_err(bad)?,
                 "forces" => columns.force = serde_json::from_value(given).map_err(bad)?,
                 "time" => columns.time = serde_json::from_value(given).map_err(bad)?,
                 "trajectory" => columns.trajectory = serde_json::from_value(given).map_err(bad)?,

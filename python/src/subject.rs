@@ -18,7 +18,7 @@ use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
 use lnn::pipeline::{CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, trained_on};
 use lnn::report::page;
-use lnn::rollout::{Integrator, Options, Rollout, RolloutError, Start, rollout_each};
+use lnn::rollout::{Event, Integrator, Occurrence, Options, Rollout, RolloutError, Start, rollout_each};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -28,6 +28,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// States whose terms are computed at a time.
@@ -237,6 +238,7 @@ impl Subject {
                 json!({
                     "name": system.name, "title": system.title, "time_unit": system.time_unit,
                     "parameters": values(configured), "description": system.description(),
+                    "inputs": configured.inputs().collect::<Vec<_>>(),
                 })
             }
             Kind::Model(header, ..) => json!({ "name": header.system, "header": header }),
@@ -277,8 +279,7 @@ impl Subject {
         threads: usize,
     ) -> PyResult<Vec<(Terms<f64>, usize)>> {
         if let Kind::System(configured, _) = &self.kind
-            && configured.is_driven()
-            && request.includes(Request::FORCE)
+            && configured.is_timed()
         {
             return Err(value(MechanicsError::Timed));
         }
@@ -524,6 +525,7 @@ impl Subject {
         accuracy: (f64, f64, Option<f64>),
         acting: (bool, bool),
         forces: (Option<Samples>, Option<Py<PyAny>>),
+        inputs: (Option<Samples>, Option<Py<PyAny>>),
         threads: usize,
     ) -> PyResult<Bound<'py, PyList>> {
         let (q, v) = self.states(&q, &v)?;
@@ -534,14 +536,18 @@ impl Subject {
             Kind::Model(header, ..) if bounded => Some(trained_on(header)),
             _ => None,
         };
-        let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
-        let mut forces = Forces::of(n, (t0, t_end), forces.0, forces.1)?;
-        let mut driven = None;
+        let events = self.system_instance().map_or_else(|_| Vec::new(), |known| known.events());
+        let events = events.into_iter().map(Event::from).collect();
+        let options = Options { t0, method, rtol, atol, step, domain, events, ..Options::new(t_end, dt) };
+        let forces = Forces::of(n, (t0, t_end), "force", forces)?;
+        let mut known = None;
+        let mut fed = None;
         if let Kind::System(configured, _) = &self.kind
-            && configured.is_driven()
-            && let (model, Some(own)) = configured.build_driven().map_err(value)?
+            && configured.inputs().next().is_some()
         {
-            (forces, driven) = (forces.beside(own), Some(model));
+            let given = Arc::new(Forces::of(configured.inputs().count(), (t0, t_end), "inputs", inputs)?);
+            fed = Some(configured.build_with(Forces::inputs(&given, configured.inputs().count())).map_err(value)?);
+            known = Some(given);
         }
         let starts = q.chunks(n).zip(v.chunks(n)).enumerate();
         let starts: Vec<_> = starts.map(|(k, (q, v))| Start { q, v, force: forces.on(k) }).collect();
@@ -549,23 +555,24 @@ impl Subject {
             let follow = |model: &dyn EulerLagrange<f64>| {
                 rollout_each(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads)
             };
-            match (&driven, friction) {
+            match (&fed, friction) {
                 (Some(model), true) => follow(model.as_ref()),
                 (Some(model), false) => follow(&Frictionless(model.as_ref())),
                 (None, _) => self.with_friction(friction, follow),
             }
         })?;
-        if let Some(error) = forces.raised() {
+        if let Some(error) = forces.raised().or_else(|| known.and_then(|known| known.raised())) {
             return Err(error);
         }
         let result = PyList::empty(py);
-        for Rollout { trajectory, statistics, stop } in motions {
+        for Rollout { trajectory, statistics, stop, events } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
                 return Err(value(error));
             }
             let energy = trajectory.energy.unwrap_or_default().into_pyarray(py);
             let [t, q, v] = [trajectory.t, trajectory.q, trajectory.v].map(|numbers| numbers.into_pyarray(py));
-            result.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
+            let events: Vec<_> = events.into_iter().map(|event| happened(py, event)).collect();
+            result.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations, events))?;
         }
         Ok(result)
     }
@@ -763,4 +770,13 @@ pub fn degrees_of(text: &str) -> PyResult<Degrees> {
 /// The numbers of an array, row by row.
 pub fn slice<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
     array.as_slice().map_err(value)
+}
+
+/// Name, time and state of an event; velocities and energy before and energy after an impact.
+type Happened<'py> = (String, f64, Numbers<'py>, Numbers<'py>, Option<(Numbers<'py>, f64, f64)>);
+
+fn happened(py: Python<'_>, event: Occurrence<f64>) -> Happened<'_> {
+    let Occurrence { name, t, q, v, impact } = event;
+    let impact = impact.map(|hit| (hit.v_before.into_pyarray(py), hit.energy_before, hit.energy_after));
+    (name, t, q.into_pyarray(py), v.into_pyarray(py), impact)
 }

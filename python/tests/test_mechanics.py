@@ -415,3 +415,57 @@ forces = { x = "F*cos(om*t)" }
     assert np.allclose(beside.q, 0.0, atol=1e-6)
     with pytest.raises(ValueError, match="time t"):
         spring.acceleration([0.0], [0.0])
+
+
+def test_inputs_drive_and_are_read():
+    text = """
+name = "motor"
+lagrangian = "J*theta_dot^2/2"
+dissipation = "b*theta_dot^2/2"
+coordinates = [{ name = "theta", bounds = [-9, 9], velocity_bounds = [-20, 20] }]
+parameters = { J = 0.02, b = { default = 0.01, learn = true }, K = { default = 0.1, learn = true } }
+inputs = { u = "V" }
+forces = { theta = "K*u" }
+"""
+    motor = lnn.System.from_toml(text)
+    assert motor.inputs == ("u",) and lnn.System("kepler").inputs == ()
+    steady = motor.rollout([0.0], [0.0], t_end=3.0, dt=0.1, inputs=[2.0], rtol=1e-10, atol=1e-12)
+    assert np.allclose(motor.rollout([0.0], [0.0], t_end=3.0, dt=0.1, inputs=lambda t: 2.0).q, steady.q, atol=1e-4)
+    # J v' = K u - b v
+    assert np.allclose(steady.v[:, 0], 20.0 * (1.0 - np.exp(-0.5 * steady.t)), atol=1e-6)
+    with pytest.raises(ValueError, match="inputs: expected values of u"):
+        motor.rollout([0.0], [0.0], t_end=1.0, dt=0.1)
+    with pytest.raises(ValueError, match="has none"):
+        lnn.System("kepler").rollout([1.0, 0.0], [0.0, 1.0], t_end=1.0, dt=0.1, inputs=[1.0])
+    t = np.linspace(0.0, 8.0, 401)
+    u = 3.0 * np.sin(1.7 * t) + np.sin(4.0 * t)
+    real = lnn.System.from_toml(text, K=0.13, b=0.015)
+    motion = real.rollout([0.0], [0.0], t_end=8.0, dt=0.02, inputs=(t, u), rtol=1e-10, atol=1e-12)
+    noisy = motion.q + 1e-3 * np.random.default_rng(0).standard_normal(motion.q.shape)
+    found = lnn.identify(noisy, motor, dt=0.02, inputs=u[:, None])
+    assert found.explained
+    for name, truth in (("K", 0.13), ("b", 0.015)):
+        constant = found.constants[name]
+        assert abs(constant.value - truth) < 5 * constant.standard_error
+    with pytest.raises(ValueError, match="inputs"):
+        lnn.identify(noisy, motor, dt=0.02)
+
+
+def test_events_of_a_system_come_with_its_motion():
+    ground = {"when": "y", "falling": True, "then": {"restitution": "e"}}
+    apex = {"when": "y_dot", "falling": True}
+    ball = lnn.System(
+        lagrangian="y_dot^2/2 - g*y", coordinates=["y"], parameters={"g": 9.81, "e": 0.8}, events={"ground": ground, "apex": apex}
+    )
+    motion = ball.rollout([1.0], [0.0], 1.5, 0.01)
+    fall = np.sqrt(2 / 9.81)
+    assert [event.name for event in motion.events] == ["ground", "apex", "ground", "apex", "ground"][: len(motion.events)]
+    hit, top = motion.events[:2]
+    assert abs(hit.t - fall) < 1e-10 and abs(top.t - 1.8 * fall) < 1e-10 and abs(top.q[0] - 0.64) < 1e-10
+    assert np.allclose(hit.v, -0.8 * hit.v_before) and top.v_before is None
+    assert abs(hit.energy_before - hit.energy_after - 0.36 * 9.81) < 1e-9
+    both = ball.rollout([[1.0], [2.0]], [[0.0], [0.0]], 1.5, 0.01)
+    assert both.events.shape == (2,) and abs(both.events[1][0].t - np.sqrt(2) * fall) < 1e-10
+    assert pickle.loads(pickle.dumps(ball)).rollout([1.0], [0.0], 1.5, 0.01).events[0].t == hit.t
+    ended = ball.rollout([1.0], [0.0], 10, 0.1)
+    assert not ended.complete and "accumulate" in ended.stop

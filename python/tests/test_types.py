@@ -19,6 +19,7 @@ motion: lnn.Trajectory = learned.model.rollout([1.0, 0.0], np.zeros(2), 1.0, 0.1
 error: float | None = lnn.identify(motion.q, system, dt=0.1).constants["mu"].standard_error
 torque = system.inverse_dynamics([1.0, 0.0], [0.0, 1.0], [0.0, 0.0]).external
 driven = system.rollout([1.0, 0.0], [0.0, 1.0], 1.0, 0.1, force=lambda t, q, v: -0.1 * v, friction=False)
+first: lnn.Event = driven.events[0]
 look: str = lnn.check(motion.q, dt=0.1, units={"q1": "mm"}).next
 wrong: int = system.name
 system.terms([1.0, 0.0], [0.0, 1.0], treads=2)
@@ -38,7 +39,9 @@ def test_the_package_is_typed(tmp_path):
     (tmp_path / "use.py").write_text(USE)
     status, text = run("mypy", *cache, tmp_path / "use.py", cwd=tmp_path)
     found = [line for line in text.splitlines() if "error:" in line]
-    assert status == 1 and len(found) == 2 and "use.py:12" in found[0] and "use.py:13" in found[1] and "treads" in found[1], text
+    wrong = next(number for number, line in enumerate(USE.splitlines(), 1) if line.startswith("wrong"))
+    assert status == 1 and len(found) == 2, text
+    assert f"use.py:{wrong}:" in found[0] and f"use.py:{wrong + 1}:" in found[1] and "treads" in found[1], text
 
 
 def test_stubs_are_those_of_the_extension():

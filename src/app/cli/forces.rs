@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 pub struct ForceArgs {
     /// External generalized forces that drive the motion: a constant NAME=VALUE (N, N m), or a CSV with a column of time and
     /// columns of forces, joined as --between says; may be repeated, one CSV at most. NAME is the column of the data that
-    /// the model was fitted to, or COORDINATE_force. Forces that are not named are 0.
+    /// the model was fitted to, or COORDINATE_force. Forces that are not named are 0. Inputs of a system file are given in the same way, by
+    /// their names, all of them.
     #[arg(long, value_name = "FILE.csv|NAME=VALUE", allow_hyphen_values = true)]
     force: Vec<String>,
     /// Column of time of the forces' CSV; if not given, the one called t or time.
@@ -57,14 +58,19 @@ pub fn names(header: &Header) -> Vec<String> {
     }
 }
 
+/// The error of an input that was not given.
+fn missing(input: &str) -> CliError {
+    CliError::usage(format_args!("--force: expected the input {input}, as {input}=VALUE or a column of a CSV"))
+}
+
 impl ForceArgs {
     /// Arguments that are files.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.force.iter().map(Path::new).filter(|path| path.exists())
     }
 
-    /// The force on a motion from one time to another, its components `known` by name, one per coordinate; none if none was
-    /// asked for.
+    /// The force on a motion from one time to another, its components `known` by name, one per coordinate and then the inputs; none if none
+    /// was asked for.
     ///
     /// # Errors
     /// A usage error for names and numbers that make no sense, a data error for a file that is not as said or does not
@@ -76,8 +82,12 @@ impl ForceArgs {
         from: f64,
         to: f64,
     ) -> Result<Option<SampledForce<f64>>, CliError> {
+        let inputs = &known[coordinates.len()..];
         if self.force.is_empty() {
-            return Ok(None);
+            return match inputs.first() {
+                None => Ok(None),
+                Some(name) => Err(missing(name)),
+            };
         }
         let mut constants: Vec<Option<f64>> = vec![None; known.len()];
         let mut file: Option<PathBuf> = None;
@@ -85,7 +95,9 @@ impl ForceArgs {
             match given.split_once('=') {
                 Some((name, value)) if !Path::new(given).exists() => {
                     let name = name.trim();
-                    let usual = |i: &usize| known[*i] == name || usual_force(&coordinates[*i]) == name;
+                    let usual = |i: &usize| {
+                        known[*i] == name || coordinates.get(*i).is_some_and(|own| usual_force(own) == name)
+                    };
                     let Some(i) = (0..known.len()).find(usual) else {
                         let problem = unknown("force", name, known.iter().map(String::as_str));
                         return Err(CliError::usage(format_args!("--force: {problem}")));
@@ -111,6 +123,9 @@ impl ForceArgs {
                 Err(CliError::usage("--force-time, --force-units and --between need a CSV of forces"))
             }
             None => {
+                if let Some(k) = (0..inputs.len()).find(|k| constants[coordinates.len() + k].is_none()) {
+                    return Err(missing(&inputs[k]));
+                }
                 let values = constants.iter().map(|force| force.unwrap_or(0.0)).collect();
                 SampledForce::constant(values).map(Some).map_err(CliError::data)
             }
@@ -144,14 +159,19 @@ impl ForceArgs {
         // The column of every coordinate's force, if the file has one.
         let mut columns = vec![time];
         let mut places: Vec<Option<usize>> = Vec::with_capacity(known.len());
-        for ((name, coordinate), constant) in known.iter().zip(coordinates).zip(constants) {
-            let column = [name.clone(), usual_force(coordinate)].into_iter().find(there);
+        for (i, (name, constant)) in known.iter().zip(constants).enumerate() {
+            let usual = coordinates.get(i).map(|coordinate| usual_force(coordinate));
+            let column = [name.clone()].into_iter().chain(usual).find(there);
             if let (Some(column), Some(_)) = (&column, constant) {
                 let problem = format!("--force: {column} is a constant and a column of {}", path.display());
                 return Err(CliError::usage(problem));
             }
             places.push(column.as_ref().map(|_| columns.len()));
             columns.extend(column);
+        }
+        let lacks = |i: &usize| places[*i].is_none() && constants[*i].is_none();
+        if let Some(i) = (coordinates.len()..known.len()).find(lacks) {
+            return Err(missing(&known[i]));
         }
         if columns.len() == 1 {
             let problem = format!("no column of forces, expected {}", known.join(", "));
@@ -193,10 +213,10 @@ impl ForceArgs {
             );
             return Err(CliError::file(path, problem));
         }
-        for ((name, place), constant) in known.iter().zip(&places).zip(constants) {
-            if place.is_none() && constant.is_none() {
-                output::note(&format!("{} has no column {name}: this force is 0", path.display()));
-            }
+        let forces = 0..coordinates.len();
+        let only_inputs = known.len() > forces.len() && forces.clone().all(|i| lacks(&i));
+        for i in forces.filter(|i| lacks(i) && !only_inputs) {
+            output::note(&format!("{} has no column {}: this force is 0", path.display(), known[i]));
         }
         Ok(force)
     }

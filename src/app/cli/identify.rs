@@ -116,6 +116,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let page = args.page.claim(&inputs, args.overwrite)?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
+    system_arg::note_impacts(&instance);
     let reading = read(args, &instance)?;
     let options = IdentifyOptions {
         constants: args.constants.clone(),
@@ -124,6 +125,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         delays: args.delay.clone(),
         noise: args.noise.clone(),
         errors: reading.errors.clone(),
+        inputs: reading.inputs.clone(),
+        missing: reading.missing.clone(),
         targets: args.targets.map(Targets::from),
         between: args.between,
         segment: args.segment,
@@ -161,7 +164,8 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
         let angles = recording.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
         recording.periodic = angles.map(|(column, _)| column.clone()).collect();
     }
-    let columns = Columns { error: args.error.clone(), whole: true, ..recording.meaning() };
+    let (error, input) = (args.error.clone(), instance.inputs().map(str::to_string).collect());
+    let columns = Columns { error, input, whole: true, ..recording.meaning() };
     read_files(&recording.data, &columns)
 }
 
@@ -181,9 +185,10 @@ fn refused(error: IdentifyError) -> CliError {
         }
         IdentifyError::Cancelled(_) => CliError::nothing_written(),
         IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
-        IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
-            CliError::usage(format_args!("--system: {error}"))
-        }
+        IdentifyError::Description(_)
+        | IdentifyError::System(_)
+        | IdentifyError::Constrained { .. }
+        | IdentifyError::Nothing { .. } => CliError::usage(format_args!("--system: {error}")),
         _ => CliError::data(error),
     }
 }

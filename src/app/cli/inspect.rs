@@ -5,7 +5,8 @@ use crate::cli::format::{Field, Format, Shape, chunk, explain, report_failures, 
 use crate::cli::inverse::inverse;
 use crate::cli::number::{Precision, list};
 use crate::cli::source::{Source, SystemOrModel};
-use crate::cli::{CliError, States, input, output, parse_states, states};
+use crate::cli::states::parse_states_at;
+use crate::cli::{CliError, States, input, output, states};
 use crate::lagrangian::{
     EulerLagrange, LeastNorm, Linearizer, ManifoldRows, MechanicsError, ReducedMass, Request, Terms,
 };
@@ -83,6 +84,10 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let Some(file) = &args.states else { return structure(args, &source) };
     let format = args.format.unwrap_or(Format::Json);
+    let more = args.inverse || args.linearize || args.least_norm || args.canonical.is_some();
+    if source.model.is_timed() && (more || args.constraints.is_some()) {
+        return Err(CliError::usage("the system depends on the time: its states have their terms and nothing else"));
+    }
     if args.inverse {
         return inverse(file, format, &source);
     }
@@ -91,8 +96,9 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     }
     let place = input::name(file);
     let bytes = input::read(file, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
-    let states: States<S> =
-        parse_states(&bytes, &source.columns).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
+    let time: &[String] = if source.model.is_timed() { &["t".to_string()] } else { &[] };
+    let found = parse_states_at(&bytes, &source.columns, time);
+    let (states, times): (States<S>, Vec<S>) = found.map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
     drop(bytes);
 
     let n = source.columns.len() / 2;
@@ -114,9 +120,13 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let mut terms = Terms::default();
     let mut linearizer = args.linearize.then(|| Linearizer::new(model.as_ref()));
     let size = chunk(n);
+    let mut times = times.chunks(size);
     for ((q, v), rows) in states.q.chunks(size * n).zip(states.v.chunks(size * n)).zip(states.rows.chunks(size)) {
         let mut text = String::new();
-        let outcome = model.terms(q, v, Request::ALL, &mut terms);
+        let outcome = match times.next() {
+            Some(t) => model.terms_at(t, q, v, Request::ALL, &mut terms),
+            None => model.terms(q, v, Request::ALL, &mut terms),
+        };
         let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let held = ConstrainedState::of(model.as_ref(), q, v, &terms);

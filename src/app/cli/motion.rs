@@ -10,9 +10,11 @@ use crate::rollout::{Domain, Trajectory};
 use crate::storage::{AtomicWriter, Disk, remove_leftovers};
 use crate::symmetry::Invariant;
 use serde::Serialize;
+use serde_json::{Map, Value};
 use std::ops::Range;
 use std::path::Path;
 
+pub mod events;
 pub mod pictures;
 
 /// Points of a curve beyond which every second one is left out.
@@ -50,6 +52,8 @@ pub struct Watch {
     columns: Vec<String>,
     /// Where it left the training range.
     pub leaving: Option<Leaving>,
+    /// Time of the last sample.
+    pub end: f64,
     /// Value of `p.v - L` at the start, and its largest distance from that.
     pub energy: (f64, f64),
     /// Times, and values of every column and of the energy, of every `stride`-th sample.
@@ -65,7 +69,7 @@ impl Watch {
         let values = vec![Vec::new(); columns.len() + 1];
         let columns = columns.to_vec();
         let energy = (f64::NAN, 0.0);
-        Self { domain, columns, leaving: None, energy, times: Vec::new(), values, stride: 1, seen: 0 }
+        Self { domain, columns, leaving: None, end: f64::NAN, energy, times: Vec::new(), values, stride: 1, seen: 0 }
     }
 
     /// Takes the next samples.
@@ -80,6 +84,7 @@ impl Watch {
                 self.leaving =
                     Some(Leaving { t: piece.t[k], column, value: state[component], trained_on: [low, high] });
             }
+            self.end = piece.t[k];
             let energy = piece.energy.as_ref().and_then(|energy| energy.get(k)).copied().unwrap_or(f64::NAN);
             match self.seen {
                 0 => self.energy.0 = energy,
@@ -146,11 +151,20 @@ pub struct Facts<'a> {
     pub work: Option<f64>,
     /// Energy taken by friction.
     pub dissipated: Option<f64>,
+    /// What took it, in words.
+    #[serde(skip)]
+    pub taken_by: &'static str,
+    /// Energy taken by impacts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub impacts: Option<f64>,
     /// Energy that is not accounted for.
     pub energy_defect: Option<f64>,
     /// What the motion conserves without friction and forces, as far as it is kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conserved: Option<Kept>,
+    /// The events that happened, of a system that has some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub events: Option<Vec<Map<String, Value>>>,
     /// Where the motion left the training range.
     pub left_training_range: Option<&'a Leaving>,
     /// Charges of the symmetries along the motion, if requested.
@@ -244,10 +258,12 @@ impl Facts<'_> {
             .iterations
             .map_or(String::new(), |count| format!(" in {}", pluralize(count, "iteration", "iterations")));
         let work = self.work.map_or(String::new(), |work| format!("forces added {}, ", rounded(work, 10)));
+        let impacts = self.impacts.map_or(String::new(), |lost| format!("impacts removed {}, ", rounded(lost, 10)));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
-                "energy changed by {}, {work}friction removed {}, defect {}\n",
+                "energy changed by {}, {work}{impacts}{} removed {}, defect {}\n",
                 rounded(change, 10),
+                self.taken_by,
                 rounded(dissipated, 10),
                 rounded(defect, 2)
             ),

@@ -4,9 +4,9 @@ use crate::cli::learned::{Learned, model_file};
 use crate::cli::source::Source;
 use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, forces};
-use crate::lagrangian::{EulerLagrange, GivenForces};
+use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::report::with_unit;
-use crate::rollout::Domain;
+use crate::rollout::{Domain, Event, SampledForce};
 use std::path::{Path, PathBuf};
 
 /// A source of motion with what is known about it.
@@ -19,10 +19,12 @@ pub struct MotionSource {
     pub columns: Vec<String>,
     /// Their units; of a system that was only recorded `rad` of angles, `SI` of others.
     pub units: Vec<String>,
-    /// Forces of its own that depend on the time.
-    pub driving: Option<GivenForces<f64>>,
-    /// Names of the external forces, one per coordinate.
+    /// Events of the system.
+    pub events: Vec<Event<f64>>,
+    /// Names of the external forces, one per coordinate, and then of inputs.
     pub forces: Vec<String>,
+    /// A system that it is.
+    pub instance: Option<SystemInstance<f64>>,
     /// The states a model was trained on.
     pub domain: Option<Domain<f64>>,
     /// Unit of times; a system that was only recorded has none, nor has one of another version.
@@ -42,6 +44,8 @@ impl MotionSource {
         let learned = Learned::<f64>::load(path)?;
         let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
         let system = learned_system(&learned.header).ok();
+        let events = learned.system(path).map_or_else(|_| Vec::new(), |known| known.events());
+        let events = events.into_iter().map(Event::from).collect();
         let time_unit = system.as_ref().map(|system| system.time_unit.to_string());
         let periodic = learned.header.architecture.periodic.iter();
         let units = match system {
@@ -55,7 +59,8 @@ impl MotionSource {
         let time_like = learned.header.architecture.time_like.is_some();
         let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        Ok(Self { name, model, columns, units, driving: None, forces, domain, time_unit, time_like, file })
+        let instance = None;
+        Ok(Self { name, model, columns, units, events, forces, instance, domain, time_unit, time_like, file })
     }
 
     /// A system by name or by file.
@@ -64,11 +69,37 @@ impl MotionSource {
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
-        let (Source { model, columns, forces }, driving) = Source::driven(system.clone(), given)?;
+        let instance = configure_system::<f64>(system.clone(), given).map_err(CliError::usage)?;
+        let Source { model, columns, mut forces } = Source::of(&instance)?;
+        let events = instance.events().into_iter().map(Event::from).collect();
+        forces.extend(instance.inputs().map(str::to_string));
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
         let (time_like, units) = (system.time_like.is_some(), system.units(columns.len() / 2));
-        Ok(Self { name, model, columns, units, driving, forces, domain: None, time_unit, time_like, file })
+        let instance = Some(instance);
+        Ok(Self { name, model, columns, units, events, forces, instance, domain: None, time_unit, time_like, file })
+    }
+
+    /// Splits what `--force` gave: forces from outside stay, inputs become the model's.
+    ///
+    /// # Errors
+    /// A usage error for constraints that leave no motion.
+    pub fn take_inputs(&mut self, given: Option<SampledForce<f64>>) -> Result<Option<SampledForce<f64>>, CliError> {
+        let n = self.columns.len() / 2;
+        let (Some(given), true) = (given.clone(), self.forces.len() > n) else { return Ok(given) };
+        let inputs = given.components(n..self.forces.len());
+        if let Some(instance) = &self.instance {
+            let count = instance.inputs().count();
+            let values = move |t: f64, values: &mut [f64]| inputs.at(t, values);
+            self.model = instance.build_with(Box::new((count, values))).map_err(CliError::usage)?;
+        }
+        let forces = given.components(0..n);
+        Ok((!forces.is_zero()).then_some(forces))
+    }
+
+    /// Name of the parameter of the motion, `t`, or `tau` beside a coordinate `t`.
+    pub fn parameter_name(&self) -> &'static str {
+        if self.columns.iter().any(|name| name == "t") { "tau" } else { "t" }
     }
 
     /// Label of the parameter of the motion: a time, or the affine parameter of geodesics, which is the proper time of matter.

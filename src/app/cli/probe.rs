@@ -11,6 +11,7 @@ use crate::network::file::MAX_COORDINATES;
 use crate::symmetry::{
     Basis, Chart, Degrees, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states, most_symmetries,
 };
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -97,10 +98,17 @@ impl Probe {
     /// # Errors
     /// As [`Probe::system`].
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
-        let system = system_arg::system(name)?;
+        let configure = |system| configure_system::<f64>(system, given).map_err(CliError::usage);
+        let mut configured = configure(system_arg::system(name)?)?;
         // What is read off a Lagrangian does not depend on what drives it.
-        let (Source { model, columns, .. }, _) = Source::driven(system.clone(), given)?;
-        let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
+        if let Some(driven) = configured.system.description().filter(|_| configured.is_timed()) {
+            let mut free = driven.clone();
+            free.forces.clear();
+            free.inputs.clear();
+            configured = configure(Cow::Owned(free.system().map_err(CliError::usage)?))?;
+        }
+        configured.require_states().map_err(CliError::usage)?;
+        let Source { model, columns, .. } = Source::of(&configured)?;
         let n = configured.coordinates;
         require_at_most(MAX_COORDINATES, n)?;
         let (bounds, coordinates) = (configured.system.validation(n), configured.system.coordinates(n));

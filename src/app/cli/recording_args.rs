@@ -2,6 +2,7 @@
 
 use crate::cli::spool::read_spooled;
 use crate::cli::{CliError, number, output};
+use crate::names::pluralize;
 use crate::recording::read::{DataError, Problem, read_recording};
 use crate::recording::{ColumnGuess, Columns, Guess, LoadedRecording, guess};
 use std::path::PathBuf;
@@ -169,7 +170,18 @@ fn note(columns: &Columns, table: &[ColumnGuess]) {
 /// # Errors
 /// A usage error for columns that contradict each other, a data error for the first file that is not as said.
 pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, CliError> {
-    read_spooled(files, |files| read_recording(files, columns)).map_err(|error| refused(&error, columns))
+    let reading =
+        read_spooled(files, |files| read_recording(files, columns)).map_err(|error| refused(&error, columns))?;
+    note_incomplete(&reading);
+    Ok(reading)
+}
+
+/// Says how many rows are left out because a reading is missing.
+fn note_incomplete(reading: &LoadedRecording) {
+    if reading.incomplete > 0 {
+        let rows = pluralize(reading.incomplete, "row with an empty field is", "rows with an empty field are");
+        output::note(&format!("{rows} left out"));
+    }
 }
 
 /// A mistake in files or in the meaning of their columns.

@@ -5,7 +5,7 @@ use crate::cli::constraints::constrained;
 use crate::cli::files::{OutputFile, require_free};
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::pictures::{Texts, picture_file};
-use crate::cli::motion::{Facts, Kept, Target, Watch, place};
+use crate::cli::motion::{Facts, Kept, Target, Watch, events, place};
 use crate::cli::motion_source::MotionSource;
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::probe::Probe;
@@ -14,8 +14,9 @@ use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
+use crate::report::DataTable;
 use crate::rollout::{
-    Driven, Ending, EnergyBalance, Force, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
+    Driven, Ending, EnergyBalance, Event, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
 };
 use crate::symmetry::Invariant;
 use clap::builder::PossibleValue;
@@ -82,6 +83,9 @@ pub struct Args {
     /// also shows velocities and energy.
     #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
+    /// CSV of the events of the system: name, t, state, and the energies of impacts.
+    #[arg(long, value_name = "FILE.csv")]
+    events: Option<PathBuf>,
     /// Report the charges of the model's symmetries along the motion, with the parts of their drift due to the model and to
     /// the integrator.
     #[arg(long)]
@@ -142,6 +146,7 @@ impl Args {
             atol: self.atol,
             step: self.step,
             domain: source.domain.clone().filter(|_| !self.beyond_range),
+            events: source.events.clone(),
             ..Options::new(self.t_end, self.dt)
         };
         options.check(source.columns.len() / 2).map_err(|e| refused(&e))?;
@@ -158,11 +163,14 @@ impl Args {
         if !input::is_standard(&self.out) {
             require_free(&self.out, &inputs, self.overwrite)?;
         }
-        let Some(plot) = &self.plot else { return Ok(()) };
-        if *plot == self.out {
-            return Err(CliError::usage("--plot: the trajectory goes into this file (--out)"));
+        let beside = [("--plot", &self.plot), ("--events", &self.events)];
+        for (option, file) in beside.iter().filter_map(|(option, file)| Some((option, file.as_ref()?))) {
+            if *file == self.out || (self.plot == self.events && *option == "--events") {
+                return Err(CliError::usage(format_args!("{option}: another result goes into this file")));
+            }
+            OutputFile::claim(file, &inputs, self.overwrite)?;
         }
-        OutputFile::claim(plot, &inputs, self.overwrite).map(|_| ())
+        Ok(())
     }
 
     /// Charges of the symmetries along a motion.
@@ -181,25 +189,22 @@ impl Args {
 /// A usage error for a state of the wrong length; a data error for a bad model, a file that cannot be written, or a
 /// motion that ends before its time, the samples up to there being written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let source = args.source()?;
+    let mut source = args.source()?;
+    let span = (args.t_start, args.t_end);
+    let coordinates = &source.columns[..source.columns.len() / 2];
+    let force = args.forces.force(coordinates, &source.forces, span.0, span.1)?;
+    let force = source.take_inputs(force)?;
     let (columns, standard) = (&source.columns, input::is_standard(&args.out));
     if args.json && standard {
         return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
     }
     let (q, v) = args.state.split_at(columns.len() / 2);
+    events::check(args.events.as_deref(), args.charges, &source.events)?;
     let options = args.options(&source)?;
     args.require_room(&source)?;
-    let recorded = args.forces.force(&columns[..q.len()], &source.forces, args.t_start, args.t_end)?;
-    let force: Option<Box<dyn Force<f64>>> = match (recorded, source.driving.clone()) {
-        (None, None) => None,
-        (Some(recorded), None) => Some(Box::new(recorded)),
-        (None, Some(own)) => Some(Box::new(own)),
-        (Some(recorded), Some(own)) => Some(Box::new((recorded, own))),
-    };
-    if args.charges && force.is_some() {
-        return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
+    if args.charges && (force.is_some() || source.model.is_timed()) {
+        return Err(CliError::usage("--charges: forces from outside and the time change them; leave these out"));
     }
-    let span = (args.t_start, args.t_end);
     let tube = args.tube.tube((source.model.as_ref(), args.model.as_deref()), &columns[..q.len()], span)?;
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
@@ -212,7 +217,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let moving = Interruptible::new(network, &stop);
-    let driven = force.as_deref().map(|force| Driven::new(&moving, force));
+    let driven = force.as_ref().map(|force| Driven::new(&moving, force));
     let mut watch = Watch::new(source.range(), columns);
     let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
     let mut take = |piece: &Trajectory<f64>| {
@@ -241,6 +246,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         args.require_room(&source)?;
     }
     target.finish()?;
+    let table = events::table(&source, &result.events);
+    if let (Some(file), Some(table)) = (&args.events, &table) {
+        OutputFile::claim(file, &[], args.overwrite)?.write(table.to_csv().as_bytes())?;
+    }
     if let Some(plot) = &args.plot {
         let (title, parameter) = (format!("{}: roll-out", source.name), source.parameter());
         let energy = watch.invariant(network).map_or("energy", Invariant::charge);
@@ -251,11 +260,14 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
     }
     if let Some(stop) = &result.stop {
+        if let Some(table) = table.filter(|table| !args.json && !table.rows.is_empty()) {
+            args.tell(&events::text(&table))?;
+        }
         let names = network.manifold().map_or(&[][..], |manifold| manifold.names());
         return Err(args.ended_early(stop, result.samples, (columns, names)));
     }
     let charges = sampled.map(|motion| args.charges(&motion)).transpose()?;
-    args.say((&source, &watch), &result, driven.is_some(), (charges.as_ref(), tube.as_ref()))
+    args.say((&source, &watch), &result, driven.is_some(), (charges.as_ref(), tube.as_ref(), table.as_ref()))
 }
 
 impl Args {
@@ -275,7 +287,7 @@ impl Args {
         (source, watch): (&MotionSource, &Watch),
         result: &Ending<f64>,
         is_driven: bool,
-        (charges, tube): (Option<&Charges>, Option<&MotionTube>),
+        (charges, tube, table): (Option<&Charges>, Option<&MotionTube>, Option<&DataTable>),
     ) -> Result<(), CliError> {
         let (statistics, balance) = (&result.statistics, result.balance.as_ref());
         let model = source.model.as_ref();
@@ -285,16 +297,19 @@ impl Args {
         let facts = Facts {
             system: &source.name,
             samples: result.samples,
-            t_end: self.t_end,
+            t_end: watch.end,
             time_unit: source.time_unit.as_deref(),
-            parameter: if source.columns.iter().any(|name| name == "t") { "tau" } else { "t" },
+            parameter: source.parameter_name(),
             steps: statistics.accepted,
             evaluations: statistics.evaluations,
             iterations: self.method.is_structure_preserving().then_some(statistics.iterations),
             energy_change: balance.map(|balance| balance.change),
             work: balance.filter(|_| is_driven).map(|balance| balance.work),
             dissipated: balance.map(|balance| balance.dissipated),
+            taken_by: if model.is_timed() { "friction, own forces and time" } else { "friction" },
+            impacts: balance.filter(|_| source.events.iter().any(Event::is_impact)).map(|balance| balance.impacts),
             energy_defect: balance.map(EnergyBalance::defect),
+            events: table.map(DataTable::objects),
             conserved: invariant.map(|invariant| Kept::new(invariant, watch.energy)),
             left_training_range: watch.leaving.as_ref(),
             charges,
@@ -304,12 +319,17 @@ impl Args {
         if self.json {
             return output::print(&facts.json()?);
         }
-        let text = facts.text() + &tube.map_or_else(String::new, MotionTube::text);
+        let events = table.map_or_else(String::new, events::text);
+        self.tell(&(facts.text() + &tube.map_or_else(String::new, MotionTube::text) + &events))
+    }
+
+    /// Prints a text where the samples are not.
+    fn tell(&self, text: &str) -> Result<(), CliError> {
         if input::is_standard(&self.out) {
             text.lines().for_each(output::note);
             return Ok(());
         }
-        output::print(&text)
+        output::print(text)
     }
 }
 

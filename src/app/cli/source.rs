@@ -3,7 +3,7 @@
 use crate::cli::learned::Learned;
 use crate::cli::{CliError, forces, output, system_arg};
 use crate::lagrangian::system::System;
-use crate::lagrangian::{EulerLagrange, GivenForces, SystemInstance, configure_system};
+use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::pipeline::usual_force;
 use crate::scalar::Scalar;
 use std::borrow::Cow;
@@ -37,30 +37,28 @@ impl<S: Scalar> Source<S> {
     /// A usage error for a wrong parameter.
     pub fn configured(system: Cow<'static, System>, given: &[(String, String)]) -> Result<Self, CliError> {
         let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
-        let model = configured.build().map_err(CliError::usage)?;
-        Ok(Self::of(&configured, model))
+        if let Some(input) = configured.inputs().next() {
+            let problem = "depend on the input";
+            return Err(CliError::usage(format_args!(
+                "the forces of {} {problem} {input}: roll its motion out, or identify its constants",
+                configured.system.name
+            )));
+        }
+        Self::of(&configured)
     }
 
-    /// A system without those of its forces that depend on the time, and these.
+    /// A system with values of its parameters.
     ///
     /// # Errors
-    /// A usage error for a wrong parameter.
-    pub fn driven(
-        system: Cow<'static, System>,
-        given: &[(String, String)],
-    ) -> Result<(Self, Option<GivenForces<S>>), CliError> {
-        let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
-        let (model, driving) = configured.build_driven().map_err(CliError::usage)?;
-        Ok((Self::of(&configured, model), driving))
-    }
-
-    fn of(configured: &SystemInstance<S>, model: Box<dyn EulerLagrange<S>>) -> Self {
+    /// A usage error for constraints that leave no motion.
+    pub fn of(configured: &SystemInstance<S>) -> Result<Self, CliError> {
+        let model = configured.build().map_err(CliError::usage)?;
         for name in model.manifold().map_or(&[][..], |manifold| manifold.redundant()) {
             output::note(&format!("the constraint `{name}` follows from the others and is left out"));
         }
         let columns = configured.system.columns(configured.coordinates);
         let forces = columns[..configured.coordinates].iter().map(|name| usual_force(name)).collect();
-        Self { model, columns, forces }
+        Ok(Self { model, columns, forces })
     }
 
     /// A trained model; its weights are converted to the precision of `S`.

@@ -99,14 +99,29 @@ pub enum StatesError {
 /// # Errors
 /// [`StatesError`] naming the first offending row and column.
 pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<States<S>, StatesError> {
-    let Table { values, rows } = parse_table::<S>(bytes, columns)?;
+    Ok(parse_states_at(bytes, columns, &[])?.0)
+}
+
+/// The same beside a column of times, if one is named; the times are empty if none is.
+///
+/// # Errors
+/// As [`parse_states`].
+pub fn parse_states_at<S: Scalar>(
+    bytes: &[u8],
+    columns: &[String],
+    time: &[String],
+) -> Result<(States<S>, Vec<S>), StatesError> {
+    let all = [columns, time].concat();
+    let Table { values, rows } = parse_table::<S>(bytes, &all)?;
     let n = columns.len() / 2;
     let (mut q, mut v) = (Vec::with_capacity(values.len() / 2), Vec::with_capacity(values.len() / 2));
-    for state in values.chunks_exact(columns.len()) {
+    let mut t = Vec::new();
+    for state in values.chunks_exact(all.len()) {
         q.extend_from_slice(&state[..n]);
-        v.extend_from_slice(&state[n..]);
+        v.extend_from_slice(&state[n..2 * n]);
+        t.extend_from_slice(&state[2 * n..]);
     }
-    Ok(States { q, v, rows })
+    Ok((States { q, v, rows }, t))
 }
 
 /// Columns of a file, in the order they were requested.

@@ -3,7 +3,7 @@
 use crate::cli::robot::{self, is_robot, parse_robot};
 use crate::cli::{CliError, config, output};
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Description, find, resolve};
+use crate::lagrangian::{Description, SystemInstance, find, resolve};
 use crate::network::file::Header;
 use std::borrow::Cow;
 use std::path::Path;
@@ -61,5 +61,17 @@ pub fn learned_system(header: &Header) -> Result<Cow<'static, System>, String> {
     match &header.description {
         Some(description) => description.system().map(Cow::Owned).map_err(|error| error.to_string()),
         None => find(&header.system).map(Cow::Borrowed).map_err(|error| error.to_string()),
+    }
+}
+
+/// Says of a system with impacts that nothing learns them.
+pub fn note_impacts(system: &SystemInstance<f64>) {
+    let events = system.events();
+    let impacts = events.iter().filter(|given| given.event.is_impact()).map(|given| format!("`{}`", given.event.name));
+    let names = impacts.collect::<Vec<_>>().join(", ");
+    if !names.is_empty() {
+        output::note(&format!(
+            "impacts ({names}) are not learned, only the motion between them; cut recordings where one happens"
+        ));
     }
 }

@@ -68,6 +68,7 @@ fn describe(system: &System) -> Value {
         "constraints": system.description().map(|description| &description.constraints),
         "links": Some(system.shown_links()).filter(|links| !links.is_empty()),
         "parameters": parameters,
+        "inputs": system.description().map(|description| &description.inputs),
         "bounds": { "training": box_of(system.training(n)), "validation": box_of(system.validation(n)) },
     })
 }
@@ -103,6 +104,9 @@ fn table(system: &System) -> String {
     }
     for [symbol, default, unit, range] in parameters(system) {
         text += &format!("  --param {:<12} {unit:<6} {range}\n", format!("{symbol}={default}"));
+    }
+    for (name, unit) in system.description().iter().flat_map(|description| &description.inputs) {
+        text += &format!("  input {name:<14} {unit}\n");
     }
     text
 }

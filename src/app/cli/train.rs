@@ -2,6 +2,7 @@
 
 use crate::cli::learn::{Learned, Session, open};
 use crate::cli::resume::{Learner, Text, parse, reopen, require_same};
+use crate::cli::system_arg::note_impacts;
 use crate::cli::train_config::Args;
 use crate::cli::{CliError, output};
 use crate::configuration::{Config, Penalty, Regularizer};
@@ -40,6 +41,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             (saved, system, folder, Begin::Resume)
         }
     };
+    note_impacts(&system);
     let forbidden = forbidden_share(&config, &system).filter(|share| *share > 0.0);
     if let (Some(share), Regularizer::LorentzianSylvester { time, .. }) = (forbidden, &config.penalty) {
         let place = "as inside of a horizon or of an ergosphere: choose --penalty signature, or other bounds";

@@ -129,6 +129,9 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, PageError> {
             Listing::record::<f64, _>(2 * n, parameters, |x, p| lagrangian.lagrangian(p, &x[..n], &x[n..]))
         }
     }
+    if system.is_timed() {
+        return Ok(None);
+    }
     let list = || List { n: system.coordinates, parameters: system.parameters.len() };
     let Some(listing) = system.visit_unconstrained(list()).transpose()? else { return Ok(None) };
     let dissipation = match system.dissipation() {

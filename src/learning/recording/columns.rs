@@ -19,6 +19,8 @@ pub struct Columns {
     pub force: Vec<String>,
     /// Standard deviations of the positions, sample by sample, one per coordinate and in its unit; empty if there are none.
     pub error: Vec<String>,
+    /// Other measured quantities, such as the voltage of a motor; empty if there are none.
+    pub input: Vec<String>,
     /// Time; without it and without a rate, the column called `t` or `time`.
     pub time: Option<String>,
     /// Samples per second of data without times.
@@ -53,6 +55,7 @@ impl Columns {
             ("acceleration", self.acceleration.as_slice()),
             ("force", self.force.as_slice()),
             ("error", self.error.as_slice()),
+            ("input", self.input.as_slice()),
             ("time", self.time.as_slice()),
             ("trajectory", self.trajectory.as_slice()),
         ]

@@ -33,6 +33,19 @@ pub(crate) struct Filled {
 }
 
 impl Filled {
+    /// The same with readings that are missing, which `recording` has filled in.
+    pub fn without(this: Option<Self>, recording: &Recording, missing: &[Vec<bool>]) -> Option<Self> {
+        if !missing.iter().flatten().any(|missing| *missing) {
+            return this;
+        }
+        let none = || recording.tracks.iter().map(|track| vec![false; track.q.len()]).collect();
+        let mut filled = this.unwrap_or_else(|| Self { recording: recording.clone(), held: none() });
+        for (held, missing) in filled.held.iter_mut().zip(missing) {
+            held.iter_mut().zip(missing).for_each(|(held, missing)| *held |= missing);
+        }
+        Some(filled)
+    }
+
     /// Number of held readings of coordinate `i`.
     pub fn count(&self, i: usize) -> usize {
         let n = self.recording.n();

@@ -90,6 +90,11 @@ pub struct LoadedRecording {
     pub time: Option<String>,
     /// Rows left out because they repeat the row before, digit by digit.
     pub duplicates: usize,
+    /// Rows left out because a field is empty or `NaN`.
+    pub incomplete: usize,
+    /// Readings of positions that are missing in rows of trajectories that stay whole, `(samples, n)` of each; those of the recording lie on
+    /// lines between their neighbours. Empty if none is missing.
+    pub missing: Vec<Vec<bool>>,
     /// Gaps in time.
     pub cuts: Vec<Cut>,
     /// Stretches left out.
@@ -98,6 +103,8 @@ pub struct LoadedRecording {
     pub bridged: Bridged,
     /// Standard deviations of the positions of every trajectory, `(samples, n)` each; empty if they are in no columns.
     pub errors: Vec<Vec<f64>>,
+    /// Inputs of every trajectory, `(samples, inputs)` each, in the order of their columns; empty if there are none.
+    pub inputs: Vec<Vec<f64>>,
     /// Number of the take of every trajectory: those that gaps cut out of one have the same.
     pub takes: Vec<usize>,
     /// Meaning of the columns, which have the names of the first file's header without units; without files it is empty.
@@ -123,7 +130,7 @@ impl From<Recording> for LoadedRecording {
     fn from(recording: Recording) -> Self {
         let rows = vec![Rows::default(); recording.tracks.len()];
         let takes = (0..recording.tracks.len()).collect();
-        let (cuts, dropped, errors) = (Vec::new(), Vec::new(), Vec::new());
+        let (cuts, dropped, errors, inputs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let bridged = Bridged::default();
         let (columns, formats) = (Columns::default(), Vec::new());
         Self {
@@ -132,10 +139,13 @@ impl From<Recording> for LoadedRecording {
             files: 0,
             time: None,
             duplicates: 0,
+            incomplete: 0,
+            missing: Vec::new(),
             cuts,
             dropped,
             bridged,
             errors,
+            inputs,
             takes,
             columns,
             formats,

@@ -78,6 +78,30 @@ impl RecordedTrajectory {
         self.times.is_empty()
     }
 
+    /// Fills in readings of positions that are missing, `NaN`, on lines between their neighbours; says which they were, `(samples, n)`, nothing if
+    /// none was.
+    ///
+    /// # Errors
+    /// A coordinate of which every reading is missing.
+    pub(crate) fn fill_missing(&mut self, n: usize) -> Result<Vec<bool>, usize> {
+        let missing: Vec<bool> = self.q.iter().map(|q| q.is_nan()).collect();
+        if !missing.contains(&true) {
+            return Ok(Vec::new());
+        }
+        for i in 0..n {
+            let known: Vec<usize> = (0..self.len()).filter(|k| !missing[k * n + i]).collect();
+            let (Some(first), Some(last)) = (known.first(), known.last()) else { return Err(i) };
+            for k in (0..self.len()).filter(|k| missing[k * n + i]) {
+                let after = known.partition_point(|known| *known < k);
+                let [a, b] = [known.get(after.wrapping_sub(1)).unwrap_or(first), known.get(after).unwrap_or(last)];
+                let (qa, qb, width) = (self.q[a * n + i], self.q[b * n + i], self.times[*b] - self.times[*a]);
+                let share = if width > 0.0 { (self.times[k] - self.times[*a]) / width } else { 0.0 };
+                self.q[k * n + i] = qa + share * (qb - qa);
+            }
+        }
+        Ok(missing)
+    }
+
     /// Checks shapes for `n` coordinates, finiteness and the order of times.
     ///
     /// # Errors

@@ -3,13 +3,14 @@
 
 use super::derivatives::{StateTerms, evaluate};
 use super::equations::Friction;
-use super::formula_forces::{FormulaForces, GivenForces, NeedsTime};
+use super::formula_events::GivenEvent;
+use super::formula_forces::{FormulaForces, GivenForces};
 use super::recursion::Recursive;
 use super::system::{Range, Size, System};
 use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, unconstrained, visit_lagrangian};
 use super::{
-    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
-    Lagrangian, MechanicsError, Rayleigh, Request, Terms, WithForces, constrained_description,
+    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce, InTime,
+    Inputs, Lagrangian, MechanicsError, Rayleigh, Request, Terms, WithForces, constrained_description,
     constrained_descriptions,
 };
 use crate::linalg::Workspace;
@@ -62,7 +63,7 @@ pub enum SystemError {
         /// The text given.
         found: String,
     },
-    /// Forces that depend on the time, where states are needed.
+    /// A dependence on the time, where states are needed.
     Timed {
         /// The system.
         system: String,
@@ -123,9 +124,6 @@ pub struct SystemInstance<S> {
     pub parameters: Vec<S>,
 }
 
-/// A model, and those of its forces that depend on the time.
-type ModelAndDrive<S> = (Box<dyn EulerLagrange<S>>, Option<GivenForces<S>>);
-
 /// A function of the Lagrangian of a system, generic in the type of the Lagrangian.
 pub trait LagrangianVisitor {
     /// Result of the visit.
@@ -169,41 +167,52 @@ impl<S: Scalar> SystemInstance<S> {
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
     /// [`Dd`](crate::scalar::Dd).
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        Ok(match self.build_driven()? {
-            (model, None) => model,
-            (model, Some(_)) => Box::new(NeedsTime(model)),
-        })
+        let count = self.inputs().count();
+        self.build_with(Box::new((count, |_: S, values: &mut [S]| values.fill(<S as Real>::zero()))))
     }
-    /// The model without those forces of its description that depend on the time, and these. What [`build`](Self::build) gives of a system
-    /// with such forces refuses to evaluate states.
+    /// The same with values for its inputs, which are otherwise 0.
     ///
     /// # Errors
     /// As of [`build`](Self::build).
     #[doc(hidden)]
-    pub fn build_driven(&self) -> Result<ModelAndDrive<S>, SystemError> {
-        let model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
-        let Some(forces) = self.forces() else { return Ok((self.constrain(model)?, None)) };
-        let given = GivenForces::new(forces.clone(), self.parameters.clone());
-        match forces.is_timed() {
-            true => Ok((self.constrain(model)?, Some(given))),
-            false => Ok((self.constrain(Box::new(WithForces::new(model, given)))?, None)),
+    pub fn build_with(&self, inputs: Box<dyn Inputs<S>>) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+        let mut model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
+        if let Some(forces) = self.forces() {
+            let given = GivenForces { forces: forces.clone(), parameters: self.parameters.clone() };
+            model = Box::new(WithForces::new(model, given));
         }
+        self.constrain(if self.is_timed() { Box::new(InTime::with_inputs(model, inputs)) } else { model })
+    }
+    /// `true` if its forces depend on measured inputs.
+    pub(crate) fn has_inputs(&self) -> bool {
+        self.system.description().is_some_and(|own| own.inputs.len() > own.marks())
+    }
+    /// Names of the inputs of its forces.
+    #[doc(hidden)]
+    pub fn inputs(&self) -> impl Iterator<Item = &str> {
+        self.system.description().into_iter().flat_map(|own| own.inputs.keys().map(String::as_str))
     }
     /// Refuses a system whose states alone have no accelerations.
     ///
     /// # Errors
     /// [`SystemError::Timed`].
     pub(crate) fn require_states(&self) -> Result<(), SystemError> {
-        if self.is_driven() { Err(SystemError::Timed { system: self.system.name.to_string() }) } else { Ok(()) }
+        if self.is_timed() { Err(SystemError::Timed { system: self.system.name.to_string() }) } else { Ok(()) }
     }
-    /// `true` if forces of its description depend on the time.
+    /// `true` if the Lagrangian or forces of its description depend on the time or on inputs, which are then their last coordinates.
     #[doc(hidden)]
-    pub fn is_driven(&self) -> bool {
-        self.forces().is_some_and(FormulaForces::is_timed)
+    pub fn is_timed(&self) -> bool {
+        self.system.described.as_ref().is_some_and(|described| described.is_timed())
     }
     /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
     pub(crate) fn forces(&self) -> Option<&FormulaForces> {
         self.system.described.as_ref()?.forces.as_ref()
+    }
+    /// The events of a system by its description, in the order of their names.
+    #[doc(hidden)]
+    pub fn events(&self) -> Vec<GivenEvent<S>> {
+        let events = self.system.described.as_ref().map_or(&[][..], |described| &described.events);
+        events.iter().map(|event| GivenEvent::new(event.clone(), self.parameters.clone())).collect()
     }
     /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.
     pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {
@@ -214,7 +223,7 @@ impl<S: Scalar> SystemInstance<S> {
         };
         let chain = self.system.described.as_ref().and_then(|described| described.chain.as_ref());
         // The rows of a chain are numbers of double precision.
-        match chain.filter(|_| S::epsilon().to_f64() >= f64::EPSILON) {
+        match chain.filter(|_| S::epsilon().to_f64() >= f64::EPSILON && !self.is_timed()) {
             Some(shape) => Box::new(Recursive::new(model, shape, &self.parameters)),
             None => model,
         }
@@ -250,7 +259,8 @@ impl<S: Scalar> SystemInstance<S> {
     }
     /// The same with the values of the parameters, and whether these take all friction away.
     fn friction(&self) -> Option<(Friction<S>, bool)> {
-        let (function, n, mut vanishes) = (self.dissipation()?, self.coordinates, false);
+        let (function, mut vanishes) = (self.dissipation()?, false);
+        let n = function.coordinates();
         // Products with a constant 0 are 0 for a tracer.
         let _ = tape::Program::<S>::record(2 * n, 0, |x, _| {
             let values: Vec<_> = self.parameters.iter().map(|value| tape::Tracer::constant(*value)).collect();
@@ -271,7 +281,7 @@ impl<S: Scalar> SystemInstance<S> {
         };
         (draw(&bounds.positions), draw(&bounds.velocities))
     }
-    /// Shows the Lagrangian to a visitor; `None` if the description is not of the catalogue, and of a system with constraints, whose
+    /// Shows the Lagrangian to a visitor, with the time as its last coordinate if the system depends on it; `None` if the description is not of the catalogue, and of a system with constraints, whose
     /// Lagrangian alone does not tell its motion.
     pub(crate) fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         if self.constraints().is_some() { None } else { self.visit_unconstrained(visitor) }
@@ -289,7 +299,7 @@ impl<S: Scalar> SystemInstance<S> {
     #[doc(hidden)]
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
-        if self.forces().is_some() {
+        if self.forces().is_some() || self.is_timed() {
             return Ok(self.build()?.acceleration(q, v).unwrap_or_else(|_| vec![S::nan(); q.len()]));
         }
         if self.constraints().is_some() {

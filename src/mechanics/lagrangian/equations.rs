@@ -18,8 +18,8 @@ use alloc::vec::Vec;
 pub struct Equations {
     /// Number of coordinates.
     pub n: usize,
-    /// `true` if forces depend on the time `t`, a number of each state that both programs then take last.
-    pub timed: bool,
+    /// How many known functions of the time they depend on, numbers of each state that both programs take last: the time itself, then inputs.
+    pub known: usize,
     /// Of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv + Q`, `(n)`.
     pub motion: Arc<Program<f64>>,
     /// Of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
@@ -39,13 +39,13 @@ impl Equations {
             parts.push(EquationPart::record(dissipation, count, true)?);
         }
         if let Some(forces) = instance.forces() {
-            parts.push(EquationPart::Forces { programs: forces.programs()?, timed: forces.is_timed() });
+            parts.push(EquationPart::Forces(forces.programs()?));
         }
         Self::of(n, count, &parts, (chosen, &[])).map(Some)
     }
 
     /// Records the equations of a sum of parts of `count` parameters, with slopes by chosen parameters and then by the factors of
-    /// `terms` that the sum may get.
+    /// `terms` that the sum may get. The time and inputs are coordinates of the parts behind `n` others.
     ///
     /// # Errors
     /// [`TapeError`] for parts that branch on their data.
@@ -55,31 +55,31 @@ impl Equations {
         parts: &[EquationPart],
         (chosen, terms): (&[usize], &[EquationPart]),
     ) -> Result<Self, TapeError> {
-        let timed = parts.iter().any(|part| matches!(part, EquationPart::Forces { timed: true, .. }));
-        let time = usize::from(timed);
-        let motion = Program::record_within(ROWS, (2 * n + time, count), |x, p| {
+        let all = parts.iter().find_map(EquationPart::coordinates).unwrap_or(n);
+        let known = all - n;
+        let motion = Program::record_within(ROWS, (2 * n + known, count), |x, p| {
             let zero = Tracer::zero();
-            let (state, time) = x.split_at(2 * n);
+            let state = with_known(x, (n, 2));
             let (mut mass_matrix, mut rest) = (vec![zero; n * n], vec![zero; n]);
             for part in parts {
                 match part {
                     EquationPart::Dissipation { value, .. } => {
-                        let first = value.derivatives(state, p, None)?.first;
-                        rest.iter_mut().zip(&first[n..]).for_each(|(rest, &force)| *rest -= force);
+                        let first = value.derivatives(&state, p, None)?.first;
+                        rest.iter_mut().zip(&first[all..]).for_each(|(rest, &force)| *rest -= force);
                     }
-                    EquationPart::Forces { programs, timed } => {
-                        let inputs = [state, p, if *timed { time } else { &[] }].concat();
+                    EquationPart::Forces(programs) => {
+                        let inputs = [&state, p].concat();
                         for (i, program) in programs {
                             rest[*i] += program.interpret(&inputs, &[]).ok()?[0];
                         }
                     }
                     EquationPart::Lagrangian { value, .. } => {
-                        let found = derivatives(value, state, p, Request::ACCELERATION)?;
+                        let found = derivatives(value, &state, p, Request::ACCELERATION)?;
                         for (rest, (g, c)) in rest.iter_mut().zip(found.dl_dq.into_iter().zip(found.coriolis)) {
                             *rest += g - c;
                         }
-                        for (i, row) in found.mass_matrix.into_iter().enumerate() {
-                            for (j, m) in row {
+                        for (i, row) in found.mass_matrix.into_iter().enumerate().take(n) {
+                            for (j, m) in row.into_iter().filter(|(j, _)| *j < n) {
                                 mass_matrix[i * n + j] += m;
                                 if j < i {
                                     mass_matrix[j * n + i] += m;
@@ -93,27 +93,41 @@ impl Equations {
             Some(mass_matrix)
         })?;
         // The residual r is less the equations f.
-        let slopes = Program::record_within(ROWS, (3 * n + time, count), |x, p| {
-            let mut rows = vec![BTreeMap::new(); n];
-            let (x, time) = x.split_at(3 * n);
+        let slopes = Program::record_within(ROWS, (3 * n + known, count), |x, p| {
+            let mut rows = vec![BTreeMap::new(); all];
+            let x = with_known(x, (n, 3));
             for part in parts {
-                for (row, own) in rows.iter_mut().zip(part.slopes((x, time), p, chosen)?) {
+                for (row, own) in rows.iter_mut().zip(part.slopes(&x, p, chosen)?) {
                     own.into_iter().for_each(|(column, f)| add(row, column, -f));
                 }
             }
-            let width = 2 * n + chosen.len();
+            let width = 2 * all + chosen.len();
             for (k, term) in terms.iter().enumerate() {
                 let (EquationPart::Lagrangian { rate, .. } | EquationPart::Dissipation { rate, .. }) = term else {
                     continue;
                 };
-                let column = rate.equations(x, p)?;
+                let column = rate.equations(&x, p)?;
                 rows.iter_mut().zip(column).for_each(|(row, f)| add(row, width + k, -f));
             }
             let element = |row: &BTreeMap<_, _>, column| row.get(&column).copied().unwrap_or_else(Tracer::zero);
-            Some(rows.iter().flat_map(|row| (0..width + terms.len()).map(move |column| element(row, column))).collect())
+            let columns = || (0..n).chain(all..all + n).chain(2 * all..width + terms.len());
+            Some(rows[..n].iter().flat_map(|row| columns().map(move |column| element(row, column))).collect())
         })?;
-        Ok(Self { n, timed, motion: Arc::new(motion), slopes: Arc::new(slopes) })
+        Ok(Self { n, known, motion: Arc::new(motion), slopes: Arc::new(slopes) })
     }
+}
+
+/// Vectors of `n` coordinates, `q`, `v` and perhaps `a`, as vectors of these, of the time and of inputs, which come last in `x`: behind `q`
+/// stand their values, behind the others their derivatives, which are 0 but the rate of the time.
+fn with_known<'a>(x: &[Tracer<'a, f64>], (n, vectors): (usize, usize)) -> Vec<Tracer<'a, f64>> {
+    let (moving, known) = x.split_at(n * vectors);
+    let last = |order: usize| -> Vec<Tracer<'a, f64>> {
+        match order {
+            0 => known.to_vec(),
+            _ => (0..known.len()).map(|k| Tracer::constant(if order == 1 && k == 0 { 1.0 } else { 0.0 })).collect(),
+        }
+    };
+    moving.chunks_exact(n).enumerate().flat_map(|(order, vector)| [vector, &last(order)].concat()).collect()
 }
 
 /// A part of the equations of motion, recorded.
@@ -133,13 +147,8 @@ pub enum EquationPart {
         /// Its rate.
         rate: Rate<f64>,
     },
-    /// Generalized forces, functions of state, parameters and, if they are `timed`, of the time; with their coordinates.
-    Forces {
-        /// Coordinates, and their forces.
-        programs: Vec<(usize, Program<f64>)>,
-        /// `true` if the programs take the time.
-        timed: bool,
-    },
+    /// Coordinates, and generalized forces on them, functions of state and parameters.
+    Forces(Vec<(usize, Program<f64>)>),
 }
 
 impl EquationPart {
@@ -158,13 +167,21 @@ impl EquationPart {
         })
     }
 
+    /// Number of coordinates; forces may be none.
+    fn coordinates(&self) -> Option<usize> {
+        match self {
+            Self::Lagrangian { value, .. } | Self::Dissipation { value, .. } => Some(value.inputs() / 2),
+            Self::Forces(_) => None,
+        }
+    }
+
     /// Derivatives of the equations `f` by state and chosen parameters, what is not zero of each row; `x` holds `q`, `v`, `a`.
-    fn slopes<R: Real>(&self, (x, time): (&[R], &[R]), p: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
+    fn slopes<R: Real>(&self, x: &[R], p: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         match self {
             Self::Lagrangian { rate, .. } | Self::Dissipation { rate, .. } => rate.slopes(x, p, chosen),
-            Self::Forces { programs, timed } => {
+            Self::Forces(programs) => {
                 let n = x.len() / 3;
-                let inputs = [&x[..2 * n], p, if *timed { time } else { &[] }].concat();
+                let inputs = [&x[..2 * n], p].concat();
                 let mut rows = vec![BTreeMap::new(); n];
                 for (i, program) in programs {
                     let first = program.derivatives(&inputs, &[], None)?.first;
@@ -254,31 +271,49 @@ mod tests {
     }
 
     #[test]
-    fn forces_in_time_have_slopes_by_state_and_parameters() {
+    fn equations_in_time_have_slopes_by_state_and_parameters() {
         let mut description = damped();
+        let own = description.lagrangian.clone().unwrap();
+        // A mass, a moment of its rotation and a loss that change with the time.
+        description.lagrangian = Some(format!("{own} + (1 + t^2/9)*a_dot^2/2 + t*a*b_dot"));
+        description.dissipation = Some("(c + e*t)*(b_dot - a_dot)^2/2".to_string());
         let forces = [("a", "k*cos(m*t + a) - e*b_dot*abs(a_dot)"), ("b", "c*t^2")];
         description.forces = forces.map(|(name, text)| (name.to_string(), text.to_string())).into();
         let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         let p = instance.parameters.clone();
         let equations = Equations::record(&instance, &[4, 3, 0]).unwrap().unwrap();
-        assert!(equations.timed && instance.is_driven());
+        assert!(equations.known == 1 && instance.is_timed());
         let (x, a, t) = ([0.3, 1.1, 0.7, -0.4], [0.2, -0.9], [2.5]);
         let residual = |x: &[f64], t: f64, p: &[f64]| -> Vec<f64> {
             let found = evaluated(&equations.motion, &[&x[..2], &x[2..], &[t]], p, 6);
             (0..2).map(|i| found[2 * i] * a[0] + found[2 * i + 1] * a[1] - found[4 + i]).collect()
         };
-        // Beside the same equations without forces.
-        description.forces.clear();
-        let free = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        // Beside equations without the time.
+        let free = configure_system::<f64>(Cow::Owned(damped().system().unwrap()), &[]).unwrap();
         let free = Equations::record(&free, &[4, 3, 0]).unwrap().unwrap();
         let [own, other] = [
             evaluated(&equations.motion, &[&x[..2], &x[2..], &t], &p, 6),
             evaluated(&free.motion, &[&x[..2], &x[2..]], &p, 6),
         ];
         let [c, e, _, k, m] = p[..] else { panic!("five parameters") };
+        let (rate, dry) = (x[3] - x[2], e * x[2] / (x[2].powi(2) + 1e-4).sqrt());
         let q = [k * (m * t[0] + x[0]).cos() - e * x[3] * x[2].abs(), c * t[0].powi(2)];
-        assert!((own[4] - other[4] - q[0]).abs() < 1e-12 && (own[5] - other[5] - q[1]).abs() < 1e-12);
-        assert_eq!((own[..4].to_vec(), free.timed), (other[..4].to_vec(), false));
+        // d/dt of (1 + t^2/9) a_dot and of t a, less t b_dot.
+        let by_time =
+            [e * t[0] * rate + dry - 2.0 * t[0] / 9.0 * x[2] + t[0] * x[3], -e * t[0] * rate - x[0] - t[0] * x[2]];
+        for i in 0..2 {
+            assert!((own[4 + i] - other[4 + i] - q[i] - by_time[i]).abs() < 1e-12, "{i} {own:?} {other:?}");
+        }
+        assert!((own[0] - other[0] - 1.0 - t[0].powi(2) / 9.0).abs() < 1e-12 && own[1..4] == other[1..4]);
+        // The model says the same.
+        let mut terms = crate::lagrangian::Terms::default();
+        let model = instance.build().unwrap();
+        model.terms_at(&t, &x[..2], &x[2..], Request::ACCELERATION, &mut terms).unwrap();
+        assert!(residual(&x, t[0], &p).len() == 2 && free.known == 0 && !model.conserves_energy());
+        for i in 0..2 {
+            let lacking = own[2 * i] * terms.acceleration[0] + own[2 * i + 1] * terms.acceleration[1] - own[4 + i];
+            assert!(lacking.abs() < 1e-12, "{lacking}");
+        }
         let slopes = evaluated(&equations.slopes, &[&x[..2], &x[2..], &a, &t], &p, 14);
         const H: f64 = 1e-5;
         for column in 0..7 {

@@ -55,7 +55,7 @@ pub enum MechanicsError {
     },
     /// A model that a flag has ended.
     Interrupted,
-    /// Forces that depend on the time, which a state does not tell.
+    /// A system that depends on the time, which a state does not tell.
     Timed,
     /// Derivatives that a model does not have.
     Derivatives {
@@ -82,7 +82,7 @@ impl core::fmt::Display for MechanicsError {
             Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
             Self::Interrupted => f.write_str("interrupted"),
             Self::Timed => f.write_str(
-                "the forces of this system depend on the time t, which a state does not tell: roll its motion out, or identify its constants",
+                "this system depends on the time t, which a state does not tell: roll its motion out, or identify its constants",
             ),
             Self::Derivatives { what } => write!(f, "{what}: this model has no such derivatives"),
         }

@@ -14,9 +14,11 @@ mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
+mod formula_events;
 mod formula_forces;
 #[cfg(feature = "rollout")]
 mod groups;
+mod in_time;
 mod linearization;
 mod mechanics;
 mod pattern;
@@ -54,6 +56,8 @@ pub use constraints::{
 #[doc(hidden)]
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
+#[cfg(feature = "training")]
+pub(crate) use description::PerTrajectory;
 #[cfg(feature = "serde")]
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
@@ -73,11 +77,12 @@ pub(crate) use expression::quantity;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
 #[doc(hidden)]
-pub use formula_forces::GivenForces;
+pub use formula_events::GivenEvent;
 #[cfg(feature = "rollout")]
 pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]
 pub(crate) use groups::{group_factors, groups};
+pub use in_time::{InTime, Inputs};
 pub use linearization::{Gradient, Linearization, Linearizer};
 #[doc(hidden)]
 pub use linearization::{Held, Products, Slopes};

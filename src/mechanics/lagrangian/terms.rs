@@ -92,7 +92,8 @@ pub struct Terms<S> {
     /// Generalized force `Q` beside those of `L`, friction `-dD/dv` for a dissipation `D`, `(batch, n)`; empty for a model that
     /// [conserves its energy](EulerLagrange::conserves_energy).
     pub force: Vec<S>,
-    /// Power that `Q` takes away, `-v.Q = v.dD/dv`, `(batch)`, in the unit of `L` per unit of time; empty as `force`.
+    /// Power that leaves the motion: what `Q` takes, `-v.Q = v.dD/dv`, and `dL/dt` of a Lagrangian that depends on the time; `(batch)`, in
+    /// the unit of `L` per unit of time; empty as `force`.
     pub dissipation: Vec<S>,
     /// `a = M^-1 (g - c + Q + A^T lambda)`, `(batch, n)`.
     pub acceleration: Vec<S>,
@@ -183,6 +184,26 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// acceleration are filled even when a mass matrix is singular, and the accelerations of the other rows are right; those of
     /// failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
+
+    /// The same at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; it refuses states without.
+    ///
+    /// # Errors
+    /// As of [`terms`](Self::terms).
+    fn terms_at(
+        &self,
+        _t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        self.terms(q, v, request, terms)
+    }
+
+    /// `true` if the Lagrangian or its forces depend on the time, such as [`InTime`](super::InTime): a state alone has no terms.
+    fn is_timed(&self) -> bool {
+        self.inner().is_some_and(|inner| inner.is_timed())
+    }
 
     /// The wrapped model of a type that wraps one. The methods below answer as it does, so that a wrapper cannot forget one of them;
     /// it overrides those that it changes.
@@ -302,6 +323,17 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
         (**self).terms(q, v, request, terms)
     }
 
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        (**self).terms_at(t, q, v, request, terms)
+    }
+
     fn solved(&self) -> Option<Solved<'_, S>> {
         (**self).solved()
     }
@@ -326,6 +358,17 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         (**self).terms(q, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        (**self).terms_at(t, q, v, request, terms)
     }
 
     fn solved(&self) -> Option<Solved<'_, S>> {

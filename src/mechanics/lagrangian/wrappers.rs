@@ -189,7 +189,18 @@ impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        let outcome = self.0.terms(q, v, request.without_solution(), terms);
+        self.terms_at(&[], q, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let outcome = self.0.terms_at(t, q, v, request.without_solution(), terms);
         let found = terms.drain_failures(outcome)?;
         terms.force.clear();
         terms.dissipation.clear();
@@ -225,11 +236,26 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        self.terms_at(&[], q, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
         if request != Request::ENERGY && self.flag.load(Ordering::Relaxed) {
             terms.clear();
             return Err(MechanicsError::Interrupted);
         }
-        self.model.terms(q, v, request, terms)
+        self.model.terms_at(t, q, v, request, terms)
+    }
+
+    fn is_timed(&self) -> bool {
+        self.model.is_timed()
     }
 
     fn solved(&self) -> Option<Solved<'_, S>> {

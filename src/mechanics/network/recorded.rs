@@ -138,6 +138,10 @@ impl Radial {
 /// The system that a known part describes.
 pub(super) fn system(description: &Description, n: usize) -> Result<System, String> {
     let system = description.system().map_err(|error| error.to_string())?;
+    if !description.forces.is_empty() || system.described.as_ref().is_some_and(|described| described.is_timed()) {
+        let problem = "expected a system without `[forces]` and without the time `t`; `lnn identify` finds the constants of such a system";
+        return Err(problem.to_string());
+    }
     match description.coordinates.len() {
         found if found == n => Ok(system),
         found => Err(format!("expected {n} coordinates, found {found}")),

@@ -1,9 +1,10 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
+use super::crossing::{Dense, Watcher};
 use super::force::{Piece, pieces};
-use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran, StepNodes};
+use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran, Scan, StepNodes};
 use super::regular::Regularity;
-use super::run::{Keep, Nodes, into_error};
+use super::run::{Receivers, into_error};
 use super::trajectory::{Part, Samples, Times};
 use super::{Domain, Force, Integrable, Options, RolloutError, StepCounts, StepFailure, UnderflowCause};
 use crate::lagrangian::{Accelerations, EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
@@ -19,9 +20,11 @@ struct MotionEquations<'a, S> {
     force: Option<&'a dyn Force<S>>,
     options: &'a Options<S>,
     n: usize,
-    /// The model that moves without a force from outside.
+    /// `true` if the accelerations depend on the time: by the model, or by a force from outside.
+    timed: bool,
+    /// The model if they do not.
     accelerations: Accelerations<'a, S>,
-    /// The model to which a force from outside is added.
+    /// The terms of the model if they do.
     terms: Terms<S>,
     external: Vec<S>,
     workspace: Workspace<S>,
@@ -44,14 +47,16 @@ impl<S: Scalar> MotionEquations<'_, S> {
         let (q, v) = y.split_at(n);
         let (speed, a) = dy.split_at_mut(n);
         speed.copy_from_slice(v);
-        match self.force {
-            None => self.accelerations.at(q, v, a).map_err(StepFailure::Model)?,
-            Some(force) => {
-                self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
-                force.force(piece.time(self.time(elapsed)), q, v, &mut self.external);
+        if self.timed {
+            let t = piece.time(self.time(elapsed));
+            self.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
+            if let Some(force) = self.force {
+                force.force(t, q, v, &mut self.external);
                 self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(StepFailure::Model)?;
-                a.copy_from_slice(&self.terms.acceleration);
             }
+            a.copy_from_slice(&self.terms.acceleration);
+        } else {
+            self.accelerations.at(q, v, a).map_err(StepFailure::Model)?;
         }
         if a.iter().any(|a| !a.is_finite()) {
             return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
@@ -70,20 +75,28 @@ pub(super) fn run<S: Integrable>(
     method: Adaptive,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    (keep, mut nodes): (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
+    (keep, mut nodes, events): Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let mut total = StepCounts::default();
     let (n, zero) = (model.coordinates(), <S as Real>::zero());
     let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
     let accelerations = Accelerations::new(model);
-    let mut motion = MotionEquations { model, force, options, n, accelerations, terms, external, workspace };
+    let timed = force.is_some() || model.is_timed();
+    let mut motion = MotionEquations { model, force, options, n, timed, accelerations, terms, external, workspace };
     let all = Samples::new(options);
     let (domain, manifold) = (options.domain.as_ref(), model.manifold());
     let mut state: Vec<S> = q.iter().chain(v).copied().collect();
     let mut regular = manifold.map(|manifold| Regularity::new(manifold, (q, v), motion.backwards()));
     let (mut start, mut first, mut first_step) = (zero, 0, zero);
     let nodes_are_asked_for = nodes.is_some();
-    for piece in pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end) {
+    let mut watcher = match Watcher::new(model, (q, v), options, events) {
+        Ok(watcher) => watcher,
+        Err(error) => return (total, Some(error)),
+    };
+    let watched = watcher.is_some();
+    let cuts = pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end);
+    let mut passed = 0_usize;
+    while let Some(piece) = cuts.get(passed) {
         // The samples of this piece; it is integrated to its end even if that is not a sample.
         let last = piece.end >= all.elapsed(all.len() - 1);
         let after = if last { all.len() } else { all.count_until(piece.end) };
@@ -96,13 +109,14 @@ pub(super) fn run<S: Integrable>(
             atol: options.atol,
             max_steps: options.max_steps.saturating_sub(attempts),
             first_step: S::min(first_step, piece.end - start),
-            timed: force.is_some(),
+            timed,
             start: &state,
             samples: &samples,
         };
-        let mut valid = true;
+        let (mut valid, mut delivered, mut found) = (true, 0, None);
         let mut on = Vec::with_capacity(2 * n);
         let mut sample = |k: usize, y: &[S]| {
+            delivered = k + 1;
             on.clear();
             on.extend_from_slice(y);
             // Between two states it is off by the error of the interpolation.
@@ -122,22 +136,48 @@ pub(super) fn run<S: Integrable>(
             nodes.iter_mut().for_each(|nodes| nodes(t, weight, &y[..n], &y[n..]));
         };
         let node = nodes_are_asked_for.then_some(&mut node as &mut StepNodes<'_, S>);
+        let mut scan = |e: S, h: S, dense: &mut Dense<'_, S>| {
+            let elapsed = |share: S| start + (e + share * h);
+            let time = |share: S| if backwards { t0 - elapsed(share) } else { t0 + elapsed(share) };
+            found = watcher.as_mut()?.interruption(manifold, &time, dense);
+            found.map(|(_, share)| share)
+        };
+        let scan = watched.then_some(&mut scan as &mut Scan<'_, S>);
         let mut derivative = |e: S, y: &[S], dy: &mut [S]| motion.derivative(&piece, start + e, y, dy);
         let mut back = |h: S, y: &mut [S]| {
             let drift = returned(manifold, options, n, y)?;
             regular.as_mut().map_or(Ok(()), |regular| regular.step(h, &y[..n], &y[n..]))?;
             Ok(drift)
         };
-        let back = manifold.is_some().then_some(&mut back as &mut Project<'_, S, StepFailure>);
-        let Ran { statistics, elapsed: reached, state: reached_state, step, ended } =
-            S::integrate(&task, &mut derivative, back, (&mut sample, node));
+        let project = manifold.is_some().then_some(&mut back as &mut Project<'_, S, StepFailure>);
+        let Ran { statistics, elapsed: reached, state: mut reached_state, step, ended } =
+            S::integrate(&task, &mut derivative, project, (&mut sample, node, scan));
         total += statistics;
+        let returned = match found {
+            Some((_, share)) if manifold.is_some() && share > zero => back(share * step, &mut reached_state),
+            _ => Ok(zero),
+        };
+        let ended = returned.err().map(EarlyEnd::Failed).or(ended);
         let stop = stopped(&mut motion, &piece, ended, valid, (start + reached, &reached_state, step));
         if stop.is_some() {
             return (total, stop);
         }
-        first_step = S::of_f64(GROWTH) * step;
-        (start, first, state) = (piece.end, after, reached_state);
+        let (Some((found, _)), Some(watcher)) = (found, &mut watcher) else {
+            first_step = S::of_f64(GROWTH) * step;
+            (start, first, state, passed) = (piece.end, after, reached_state, passed + 1);
+            continue;
+        };
+        (start, first, state, first_step) = (start + reached, first + delivered, reached_state, step);
+        let t = motion.time(start);
+        if let Err(error) = watcher.strike(found, t, &mut state) {
+            return (total, Some(error));
+        }
+        let (q, v) = state.split_at(n);
+        if watcher.over {
+            let is_taken = keep(t, q, v);
+            return (total, (!is_taken).then(|| RolloutError::Stopped { t: t.to_f64() }));
+        }
+        regular = manifold.map(|manifold| Regularity::new(manifold, (q, v), backwards));
     }
     (total, None)
 }
@@ -170,8 +210,8 @@ fn stopped<S: Integrable>(
     let state: Vec<f64> = reached.iter().map(|x| x.to_f64()).collect();
     let step = step.to_f64();
     match ended {
-        None if valid => None,
-        None => left(motion.options.domain.as_ref(), reached, t, state),
+        None | Some(EarlyEnd::Event) if valid => None,
+        None | Some(EarlyEnd::Event) => left(motion.options.domain.as_ref(), reached, t, state),
         Some(EarlyEnd::Stopped) => Some(RolloutError::Stopped { t }),
         Some(EarlyEnd::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: motion.options.max_steps }),
         Some(EarlyEnd::Failed(failure)) => Some(into_error(failure, t, state, step)),

@@ -211,6 +211,21 @@ impl<S: Scalar> Interpolant<S> {
     }
 }
 
+/// The number at the share `x` of a step of signed length `h`, by Hermite's polynomial of its values and slopes `[q0, v0, q1, v1]` at both
+/// ends.
+pub(super) fn cubic<S: Scalar>(x: S, h: S, [q0, v0, q1, v1]: [S; 4]) -> S {
+    let one = <S as Real>::one();
+    let (y, all) = (one - x, x * x * (S::of_f64(3.0) - S::of_f64(2.0) * x));
+    q0 * (one - all) + q1 * all + h * x * y * (v0 * y - v1 * x)
+}
+
+/// Its slope.
+pub(super) fn cubic_slope<S: Scalar>(x: S, h: S, [q0, v0, q1, v1]: [S; 4]) -> S {
+    let (one, three) = (<S as Real>::one(), S::of_f64(3.0));
+    let y = one - x;
+    S::of_f64(6.0) * x * y * ((q1 - q0) / h) + v0 * y * (one - three * x) + v1 * x * (one - three * y)
+}
+
 /// `sum weight * k_stage` of component `i`; stages count from 1.
 fn combine<S: Scalar>(slopes: &[S], dim: usize, i: usize, weights: &[(usize, f64)]) -> S {
     let mut sum = <S as Real>::zero();

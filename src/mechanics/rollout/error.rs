@@ -143,6 +143,18 @@ pub enum RolloutError {
         /// Attempts made.
         steps: usize,
     },
+    /// An event whose impact is not determined, or whose impacts accumulate.
+    #[error("event `{event}` at t = {t}: {problem}")]
+    Event {
+        /// Its time.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Its name.
+        event: String,
+        /// The problem in words.
+        problem: String,
+    },
     /// The receiver of the samples takes no more, or a flag ended the model.
     #[error("stopped at t = {t}")]
     Stopped {
@@ -166,6 +178,7 @@ impl RolloutError {
             | Self::StepUnderflow { t, .. }
             | Self::NotConverged { t, .. }
             | Self::TooManySteps { t, .. }
+            | Self::Event { t, .. }
             | Self::Stopped { t } => Some(*t),
         }
     }

@@ -1,10 +1,12 @@
 //! Fixed steps from sample to sample in phase space.
 
+use super::crossing::{Found, Watcher};
+use super::dense::{cubic, cubic_slope};
 use super::force::{Piece, pieces};
 use super::gauss::{Gauss, Tableau};
 use super::phase::{Compensated, PhasePoint, PhaseSpace};
 use super::regular::Regularity;
-use super::run::{Keep, Nodes, into_error};
+use super::run::{Keep, Nodes, Receivers, into_error};
 use super::spark::Spark;
 use super::trajectory::{Samples, Times};
 use super::variational::Variational;
@@ -88,7 +90,7 @@ pub(super) fn run<S: Scalar>(
     stepper: &mut Stepper<S>,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    (keep, nodes): (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
+    (keep, nodes, events): Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let mut statistics = StepCounts::default();
     let mut phase = PhaseSpace::new(model, force);
@@ -96,6 +98,11 @@ pub(super) fn run<S: Scalar>(
     let zero = <S as Real>::zero();
     let domain = options.domain.as_ref();
     let start: Vec<S> = q.iter().chain(v).copied().collect();
+    phase.stop_at(options.t0);
+    let watcher = match Watcher::new(model, (q, v), options, events) {
+        Ok(watcher) => watcher,
+        Err(error) => return (statistics, Some(error)),
+    };
     let moving = StepFailure::check(domain, &start).and_then(|()| phase.momentum(q, v));
     let stop = match moving {
         Err(failure) => Some(into_error(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
@@ -105,7 +112,8 @@ pub(super) fn run<S: Scalar>(
             let regular = phase.manifold().map(|manifold| Regularity::new(manifold, (q, v), backwards));
             let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero, regular };
             if keep(options.t0, q, v) {
-                advance(&mut phase, stepper, &mut position, options, &cuts, (&mut statistics, keep, nodes))
+                let receivers = (&mut statistics, keep, nodes, watcher);
+                advance(&mut phase, stepper, &mut position, options, &cuts, receivers)
             } else {
                 Some(RolloutError::Stopped { t: options.t0.to_f64() })
             }
@@ -116,13 +124,17 @@ pub(super) fn run<S: Scalar>(
     (statistics, stop)
 }
 
-fn advance<S: Scalar>(
-    phase: &mut PhaseSpace<'_, S>,
+/// What receives counts, samples, nodes and events.
+type AllReceivers<'r, 'a, 'w, S> =
+    (&'r mut StepCounts, &'r mut Keep<'a, S>, Option<&'r mut Nodes<'a, S>>, Option<Watcher<'w, S>>);
+
+fn advance<'a, S: Scalar>(
+    phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
-    position: &mut Position<'_, S>,
+    position: &mut Position<'a, S>,
     options: &Options<S>,
     cuts: &[Piece<S>],
-    (statistics, keep, mut nodes): (&mut StepCounts, &mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
+    (statistics, keep, mut nodes, mut watcher): AllReceivers<'_, '_, '_, S>,
 ) -> Option<RolloutError> {
     let samples = Samples::new(options);
     let domain = options.domain.as_ref();
@@ -148,12 +160,17 @@ fn advance<S: Scalar>(
             }
         }
         for (from, distance, piece) in legs {
-            let counted = (&mut *statistics, nodes.as_deref_mut());
-            let stop = stretch(phase, stepper, position, options, (from, distance), &piece, counted);
-            if stop.is_some() {
-                return stop;
+            let counted = (&mut *statistics, nodes.as_deref_mut(), watcher.as_mut());
+            match leg(phase, stepper, position, options, (from, distance, blur), &piece, counted) {
+                Stretch::Whole | Stretch::Until(_) => {}
+                Stretch::Failed(stop) => return Some(stop),
+                Stretch::Ended(t, state) => {
+                    let is_taken = keep(t, &state[..phase.n], &state[phase.n..]);
+                    return (!is_taken).then(|| RolloutError::Stopped { t: t.to_f64() });
+                }
             }
         }
+        phase.stop_at(position.time(options, options.t_end < options.t0));
         let arrived = position.velocity(phase).and_then(|v| {
             let sample: Vec<S> = position.state.q.high.iter().copied().chain(v).collect();
             StepFailure::check(domain, &sample).map(|()| sample)
@@ -171,16 +188,51 @@ fn advance<S: Scalar>(
     None
 }
 
-/// Steps over a distance in elapsed time within one piece.
-fn stretch<S: Scalar>(
-    phase: &mut PhaseSpace<'_, S>,
+/// What receives counts, nodes and events of steps.
+type Counted<'r, 'n, 'w, S> = (&'r mut StepCounts, Option<&'r mut Nodes<'n, S>>, Option<&'r mut Watcher<'w, S>>);
+
+/// Steps over a distance in elapsed time within one piece, on from events; times closer than `blur` are one.
+fn leg<'a, S: Scalar>(
+    phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
-    position: &mut Position<'_, S>,
+    position: &mut Position<'a, S>,
+    options: &Options<S>,
+    (from, distance, blur): (S, S, S),
+    piece: &Piece<S>,
+    (statistics, mut nodes, mut watcher): Counted<'_, '_, '_, S>,
+) -> Stretch<S> {
+    let (end, mut rest) = (from + distance, (from, distance));
+    loop {
+        let counted = (&mut *statistics, nodes.as_deref_mut(), watcher.as_deref_mut());
+        match stretch(phase, stepper, position, options, rest, piece, counted) {
+            Stretch::Until(elapsed) if end - elapsed > blur => rest = (elapsed, end - elapsed),
+            ended => return ended,
+        }
+    }
+}
+
+/// How far steps have come.
+enum Stretch<S> {
+    /// Over the whole distance.
+    Whole,
+    /// Until an event at an elapsed time, from which the motion goes on.
+    Until(S),
+    /// Until an event at a time and state that ends the motion.
+    Ended(S, Vec<S>),
+    /// Not over the whole distance.
+    Failed(RolloutError),
+}
+
+/// Steps over a distance in elapsed time within one piece.
+fn stretch<'a, S: Scalar>(
+    phase: &mut PhaseSpace<'a, S>,
+    stepper: &mut Stepper<S>,
+    position: &mut Position<'a, S>,
     options: &Options<S>,
     (from, distance): (S, S),
     piece: &Piece<S>,
-    (statistics, mut nodes): (&mut StepCounts, Option<&mut Nodes<'_, S>>),
-) -> Option<RolloutError> {
+    (statistics, mut nodes, mut watcher): Counted<'_, '_, '_, S>,
+) -> Stretch<S> {
     let backwards = options.t_end < options.t0;
     let longest = options.step.unwrap_or(distance);
     // A longest step beyond the distance is cut to it.
@@ -192,7 +244,7 @@ fn stretch<S: Scalar>(
     while (position.steps as f64) < count {
         if statistics.accepted == options.max_steps {
             let t = position.time(options, backwards).to_f64();
-            return Some(RolloutError::TooManySteps { t, steps: options.max_steps });
+            return Stretch::Failed(RolloutError::TooManySteps { t, steps: options.max_steps });
         }
         let t = position.time(options, backwards);
         phase.begin(t, piece);
@@ -206,15 +258,93 @@ fn stretch<S: Scalar>(
             });
         if let Err(failure) = stepped {
             (position.state, position.near) = before;
-            return Some(position.failed(phase, failure, options, backwards));
-        }
-        if let Some(nodes) = &mut nodes {
-            visit_stages(stepper, phase.n, (t, signed), *nodes);
+            return Stretch::Failed(position.failed(phase, failure, options, backwards));
         }
         statistics.accepted += 1;
+        let watched = watcher.as_mut();
+        let found = watched.map(|watcher| interruption(phase, stepper, position, &before, (t, signed), watcher));
+        let found = match found.transpose() {
+            Ok(found) => found.flatten(),
+            Err(failure) => {
+                (position.state, position.near) = before;
+                return Stretch::Failed(position.failed(phase, failure, options, backwards));
+            }
+        };
+        let share = found.as_ref().map_or(<S as Real>::one(), |(_, share, _)| *share);
+        if let Some(nodes) = nodes.as_mut().filter(|_| share > <S as Real>::zero()) {
+            visit_stages(stepper, phase.n, (t, signed * share), *nodes);
+        }
+        if let (Some((found, share, state)), Some(watcher)) = (found, &mut watcher) {
+            let elapsed = position.since + (S::of_f64(position.steps as f64) + share) * h;
+            return position.strike(phase, watcher, found, (t + share * signed, elapsed), state);
+        }
         position.steps += 1;
     }
-    None
+    Stretch::Whole
+}
+
+/// An event, its share of the step and the state there.
+type Interruption<S> = (Found<S>, S, Vec<S>);
+
+/// The first event that interrupts the last step, made from `before`, with its share of the step and the state there, to which the motion is
+/// taken back. Those before it that do not interrupt it are marked.
+fn interruption<S: Scalar>(
+    phase: &mut PhaseSpace<'_, S>,
+    stepper: &mut Stepper<S>,
+    position: &mut Position<'_, S>,
+    before: &(PhasePoint<S>, Vec<S>),
+    (t, signed): (S, S),
+    watcher: &mut Watcher<'_, S>,
+) -> Result<Option<Interruption<S>>, StepFailure> {
+    let (n, zero) = (phase.n, <S as Real>::zero());
+    let after = (position.state.clone(), position.near.clone());
+    phase.stop_at(t + signed);
+    let (q1, v1) = (after.0.q.high.clone(), position.velocity(phase)?);
+    let mut start = vec![zero; 2 * n];
+    let mut exact = |share: S, state: &mut [S]| {
+        (position.state, position.near) = before.clone();
+        phase.stop_at(t);
+        if share > zero {
+            stepper.step(phase, &mut position.state, &mut position.near, signed * share)?;
+        }
+        let (q, v) = state.split_at_mut(n);
+        q.copy_from_slice(&position.state.q.high);
+        phase.stop_at(t + share * signed);
+        v.copy_from_slice(&position.velocity(phase)?);
+        Ok(())
+    };
+    exact(zero, &mut start)?;
+    let time = |share: S| t + share * signed;
+    let (mut from, one) = (zero, <S as Real>::one());
+    while from < one {
+        // From the last state that is known.
+        let rest = one - from;
+        let mut dense = |share: S, state: &mut [S]| {
+            for i in 0..n {
+                let (x, h, ends) = ((share - from) / rest, signed * rest, [start[i], start[n + i], q1[i], v1[i]]);
+                (state[i], state[n + i]) = (cubic(x, h, ends), cubic_slope(x, h, ends));
+            }
+        };
+        let Some(found) = watcher.first(from, &time, &mut dense) else { break };
+        let Some(found) = watcher.sharpened(found, &time, &mut exact)? else {
+            watcher.follow(time(one), &[&q1[..], &v1[..]].concat());
+            from = one;
+            break;
+        };
+        let (share, mut state) = (watcher.share(&found), vec![zero; 2 * n]);
+        exact(share, &mut state)?;
+        if watcher.interrupts(&found) {
+            return Ok(Some((found, share, state)));
+        }
+        watcher.mark(found, time(share), [&state, &state]);
+        (from, start) = (share, state);
+    }
+    if from > zero {
+        // The stages of the whole step again.
+        exact(one, &mut start)?;
+    }
+    (position.state, position.near) = after;
+    Ok(None)
 }
 
 /// Hands over the stages of the last step, of length `h` from `t`, as the nodes of a quadrature.
@@ -240,7 +370,37 @@ fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Re
     Ok(())
 }
 
-impl<S: Scalar> Position<'_, S> {
+impl<'a, S: Scalar> Position<'a, S> {
+    /// Lets an event happen at a time, an elapsed time and a state, and goes on from there.
+    fn strike(
+        &mut self,
+        phase: &mut PhaseSpace<'a, S>,
+        watcher: &mut Watcher<'_, S>,
+        found: Found<S>,
+        (t, elapsed): (S, S),
+        mut state: Vec<S>,
+    ) -> Stretch<S> {
+        let n = phase.n;
+        if let Err(error) = watcher.strike(found, t, &mut state) {
+            return Stretch::Failed(error);
+        }
+        if watcher.over {
+            return Stretch::Ended(t, state);
+        }
+        let (q, v) = state.split_at(n);
+        phase.stop_at(t);
+        match phase.momentum(q, v) {
+            Ok(p) => (self.state.p, self.near) = (Compensated::new(p), v.to_vec()),
+            Err(failure) => {
+                let state = state.iter().map(|x| x.to_f64()).collect();
+                return Stretch::Failed(into_error(failure, t.to_f64(), state, self.h.to_f64()));
+            }
+        }
+        // Impacts are of motions that run forwards.
+        self.regular = phase.manifold().map(|manifold| Regularity::new(manifold, (q, v), false));
+        Stretch::Until(elapsed)
+    }
+
     fn velocity(&self, phase: &mut PhaseSpace<'_, S>) -> Result<Vec<S>, StepFailure> {
         let mut v = self.near.clone();
         let (q, p) = (&self.state.q.high, &self.state.p.high);
@@ -263,6 +423,7 @@ impl<S: Scalar> Position<'_, S> {
         options: &Options<S>,
         backwards: bool,
     ) -> RolloutError {
+        phase.stop_at(self.time(options, backwards));
         let v = self.velocity(phase).unwrap_or_else(|_| self.near.clone());
         let state = self.state.q.high.iter().chain(&v).map(|x| x.to_f64()).collect();
         let step = if self.steps == 0 && self.since == <S as Real>::zero() { 0.0 } else { self.h.to_f64() };

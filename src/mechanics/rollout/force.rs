@@ -3,7 +3,7 @@
 use super::pieces::{Ending, hand_over};
 use super::run::{adaptive_or_fixed, fixed};
 use super::{Between, EnergyBalance, Integrable, Options, Rollout, RolloutError, Trajectory};
-use crate::lagrangian::{EulerLagrange, GivenForces, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 use std::cmp::Ordering;
@@ -27,37 +27,6 @@ pub trait Force<S: Scalar>: Send + Sync {
 impl<S: Scalar, F: Fn(S, &[S], &[S], &mut [S]) + Send + Sync> Force<S> for F {
     fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
         self(t, q, v, force);
-    }
-}
-
-/// The sum of two forces, one of which may have breaks.
-impl<S: Scalar, A: Force<S>, B: Force<S>> Force<S> for (A, B) {
-    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
-        self.0.force(t, q, v, force);
-        let mut other = vec![<S as Real>::zero(); force.len()];
-        self.1.force(t, q, v, &mut other);
-        force.iter_mut().zip(other).for_each(|(force, other)| *force += other);
-    }
-
-    fn breaks(&self) -> &[S] {
-        if self.0.breaks().is_empty() { self.1.breaks() } else { self.0.breaks() }
-    }
-}
-
-impl<S: Scalar> Force<S> for Box<dyn Force<S>> {
-    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
-        (**self).force(t, q, v, force);
-    }
-
-    fn breaks(&self) -> &[S] {
-        (**self).breaks()
-    }
-}
-
-impl<S: Scalar> Force<S> for GivenForces<S> {
-    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
-        force.fill(<S as Real>::zero());
-        self.add(t, (q, v), force);
     }
 }
 
@@ -107,6 +76,19 @@ impl<S: Scalar> SampledForce<S> {
     #[doc(hidden)]
     pub fn constant(values: Vec<S>) -> Result<Self, RolloutError> {
         Self::new(values.len(), vec![<S as Real>::zero()], values)
+    }
+
+    /// Some of the components, in order.
+    #[cfg(feature = "cli")]
+    pub(crate) fn components(&self, of: core::ops::Range<usize>) -> Self {
+        let values = self.values.chunks_exact(self.n).flat_map(|row| &row[of.clone()]).copied().collect();
+        Self { n: of.len(), values, ..self.clone() }
+    }
+
+    /// `true` if it is 0 at all times.
+    #[cfg(feature = "cli")]
+    pub(crate) fn is_zero(&self) -> bool {
+        self.values.iter().all(|value| *value == <S as Real>::zero())
     }
 
     /// First and last time.
@@ -260,7 +242,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
     #[doc(hidden)]
     pub fn acceleration(&self, t: S, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         let (mut terms, mut force) = (Terms::default(), vec![<S as Real>::zero(); q.len()]);
-        self.model.terms(q, v, Request::ACCELERATION, &mut terms)?;
+        self.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut terms)?;
         self.force.force(t, q, v, &mut force);
         terms.add_force(self.model.coordinates(), v, &force, &mut Workspace::new())?;
         Ok(terms.acceleration)

@@ -11,6 +11,9 @@
 //! Of a model under constraints the motion stays on them: the adaptive methods project their states and samples, the symplectic ones have
 //! their constrained forms. A start is projected onto the constraints if it lies within a thousandth of its size, and refused otherwise.
 //!
+//! An [`Event`] is a zero of some number along the motion: it is recorded with its time and state, may end the motion, or is an impact on a
+//! surface. The samples stay where they are.
+//!
 //! [`rollout_in_pieces`] hands the samples over instead of keeping them, for motions longer than the memory.
 //!
 //! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`; fixed steps in
@@ -18,13 +21,16 @@
 
 mod adaptive;
 mod between;
+mod crossing;
 mod dense;
 mod ensemble;
 mod error;
+mod event;
 mod fixed;
 mod flow;
 mod force;
 mod gauss;
+mod impact;
 mod ode;
 mod options;
 mod phase;
@@ -43,6 +49,7 @@ pub use ensemble::{rollout_each, rollout_together};
 pub use error::RolloutError;
 #[doc(hidden)]
 pub use error::UnderflowCause;
+pub use event::{Event, Impact, Occurrence};
 pub use flow::{Flow, FlowGradient, FlowJacobian};
 pub use force::{Driven, Force, SampledForce};
 #[doc(hidden)]

@@ -10,9 +10,10 @@
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
 //! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the previous one.
 
+use super::crossing::Dense;
 use super::dense::{Interpolant, Rhs, Step};
 use super::gauss::Tableau;
-use super::run::{self, Keep, Nodes};
+use super::run;
 use super::trajectory::Times;
 use super::{Force, Options, RolloutError, StepCounts};
 use crate::lagrangian::EulerLagrange;
@@ -29,8 +30,12 @@ pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 /// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
 pub(super) type StepNodes<'a, S> = dyn FnMut(S, S, &[S]) + 'a;
 
-/// The receiver of an integration's results.
-pub(super) type Receivers<'a, 'f, S> = (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>);
+/// Looks through a step for events, by its elapsed time, size and dense output; says at which share of it the first one happens.
+pub(super) type Scan<'a, S> = dyn FnMut(S, S, &mut Dense<'_, S>) -> Option<S> + 'a;
+
+/// The receivers of an integration's results.
+pub(super) type Receivers<'a, 'f, S> =
+    (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>, Option<&'a mut Scan<'f, S>>);
 
 /// Parts of a step that have three nodes of Gauss each.
 const PANELS: usize = 2;
@@ -74,13 +79,15 @@ pub enum EarlyEnd<E> {
     TooManySteps,
     /// The receiver accepts no more samples.
     Stopped,
+    /// An event happens.
+    Event,
 }
 
 /// Result of an integration.
 #[doc(hidden)]
 pub struct Ran<S, E> {
     pub(super) statistics: StepCounts,
-    /// Elapsed time, state and size of the last accepted step.
+    /// Elapsed time and state at the end of the last accepted step or at the event within it, and the size of the step.
     pub(super) elapsed: S,
     pub(super) state: Vec<S>,
     pub(super) step: S,
@@ -95,7 +102,7 @@ pub trait Integrable: Scalar {
         force: Option<&dyn Force<Self>>,
         start: (&[Self], &[Self]),
         options: &Options<Self>,
-        receivers: (&mut Keep<'_, Self>, Option<&mut Nodes<'_, Self>>),
+        receivers: run::Receivers<'_, '_, Self>,
     ) -> (StepCounts, Option<RolloutError>);
 
     #[doc(hidden)]
@@ -116,7 +123,7 @@ macro_rules! integrable {
                     force: Option<&dyn Force<Self>>,
                     start: (&[Self], &[Self]),
                     options: &Options<Self>,
-                    receivers: (&mut Keep<'_, Self>, Option<&mut Nodes<'_, Self>>),
+                    receivers: run::Receivers<'_, '_, Self>,
                 ) -> (StepCounts, Option<RolloutError>) {
                     run::integrate(model, force, start, options, receivers)
                 }
@@ -164,6 +171,7 @@ struct Observer<'a, 'f, S, E> {
     project: Option<&'a mut Project<'f, S, E>>,
     output: &'a mut Output<'f, S>,
     nodes: Option<&'a mut StepNodes<'f, S>>,
+    scan: Option<&'a mut Scan<'f, S>>,
     rule: Tableau<S>,
     /// Stages of the last calls, the newest at `calls - 1`, in a ring of `ring` rows.
     recent: Vec<S>,
@@ -190,6 +198,8 @@ struct Observer<'a, 'f, S, E> {
     stuck: bool,
     /// The receiver of the samples takes no more.
     stopped: bool,
+    /// An event happens at the state.
+    event: bool,
     interpolant: Interpolant<S>,
     slopes: Vec<S>,
     sample: Vec<S>,
@@ -245,12 +255,16 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
             return true;
         }
         let rejected = self.failure.take();
-        let inside = self.nodes.is_some() || self.task.samples.get(self.next).is_some_and(|t| t < x);
+        let looked_at = self.nodes.is_some() || self.scan.is_some();
+        let inside = looked_at || self.task.samples.get(self.next).is_some_and(|t| t < x);
         if inside && !self.interpolate(h, y) {
             self.retry = Some(h);
             return true;
         }
         self.earlier = rejected;
+        if self.ends_at_event(h) {
+            return true;
+        }
         let projected = self.project.as_mut().map(|project| {
             let mut moved = y.to_vec();
             project(h, &mut moved).map(|drift| (drift, moved))
@@ -262,7 +276,7 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
                 return true;
             }
         };
-        self.visit_nodes(h);
+        self.visit_nodes(h, <S as Real>::one());
         while let Some(t) = self.task.samples.get(self.next) {
             if t > x {
                 break;
@@ -302,15 +316,33 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         true
     }
 
-    /// Hands over the nodes of a quadrature within the step that the interpolant stands for.
-    fn visit_nodes(&mut self, h: S) {
+    /// Ends the step that the interpolant stands for where an event happens within it, if one does.
+    fn ends_at_event(&mut self, h: S) -> bool {
+        let (Some(scan), interpolant) = (&mut self.scan, &self.interpolant) else { return false };
+        let Some(share) = scan(self.elapsed, h, &mut |share, state| interpolant.evaluate(share, state)) else {
+            return false;
+        };
+        self.visit_nodes(h, share);
+        let at = self.elapsed + share * h;
+        while let Some(t) = self.task.samples.get(self.next).filter(|t| *t < at) {
+            self.interpolant.evaluate((t - self.elapsed) / h, &mut self.sample);
+            self.stopped |= !(self.output)(self.next, &self.sample);
+            self.next += 1;
+        }
+        self.interpolant.evaluate(share, &mut self.state);
+        (self.elapsed, self.step, self.event) = (at, h, true);
+        true
+    }
+
+    /// Hands over the nodes of a quadrature within the first share of the step that the interpolant stands for.
+    fn visit_nodes(&mut self, h: S, whole: S) {
         let Some(nodes) = &mut self.nodes else { return };
         let part = S::ratio(1, PANELS as i32);
         for panel in 0..PANELS {
             for (&node, &weight) in self.rule.nodes.iter().zip(&self.rule.weights) {
-                let share = (S::of_f64(panel as f64) + node) * part;
+                let share = (S::of_f64(panel as f64) + node) * part * whole;
                 self.interpolant.evaluate(share, &mut self.sample);
-                nodes(self.elapsed + share * h, weight * part * h, &self.sample);
+                nodes(self.elapsed + share * h, weight * part * whole * h, &self.sample);
             }
         }
     }
@@ -367,7 +399,7 @@ fn integrate<S, D, E>(
     vector: impl Fn(&[S]) -> OVector<S, D>,
     f: &mut Rhs<'_, S, E>,
     project: Option<&mut Project<'_, S, E>>,
-    (output, nodes): Receivers<'_, '_, S>,
+    (output, nodes, scan): Receivers<'_, '_, S>,
 ) -> Ran<S, E>
 where
     S: Scalar + FloatNumber,
@@ -406,6 +438,7 @@ where
         project: project.map(|project| project as &mut Project<'_, S, E>),
         output,
         nodes: nodes.map(|nodes| nodes as &mut StepNodes<'_, S>),
+        scan: scan.map(|scan| scan as &mut Scan<'_, S>),
         rule: Tableau::new(3),
         recent: vec![zero; ring * dim],
         calls: 0,
@@ -423,6 +456,7 @@ where
         restart: None,
         stuck: false,
         stopped: false,
+        event: false,
         interpolant: Interpolant::default(),
         slopes: Vec::with_capacity((ring + 1) * dim),
         sample: vec![zero; dim],
@@ -468,6 +502,7 @@ where
         }
         ran.ended = match result {
             _ if watch.stopped => Some(EarlyEnd::Stopped),
+            _ if watch.event => Some(EarlyEnd::Event),
             _ if watch.stuck => Some(watch.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
             Ok(()) => {
                 // The last step may end one rounding short of the end.
@@ -576,6 +611,7 @@ mod tests {
                     got.push(y[0]);
                     true
                 },
+                None,
                 None,
             ),
         );

@@ -1,6 +1,6 @@
 //! Options of a roll-out.
 
-use super::RolloutError;
+use super::{Event, RolloutError};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -109,6 +109,7 @@ impl<S: Scalar> Domain<S> {
 /// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
 /// | `domain` | none | where the trajectory must stay | `2n` components |
 /// | `energy` | true | store `E` at every sample | |
+/// | `events` | none | zeros along the motion that are recorded, end it, or are impacts | |
 ///
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options<S> {
@@ -133,6 +134,8 @@ pub struct Options<S> {
     pub domain: Option<Domain<S>>,
     /// `true` to store the energy of every sample.
     pub energy: bool,
+    /// Zeros along the motion that are recorded, end it, or are impacts.
+    pub events: Vec<Event<S>>,
 }
 
 /// More samples than this are refused: their memory would be in the tens of gigabytes.
@@ -152,6 +155,7 @@ impl<S: Scalar> Options<S> {
             max_steps: 1_000_000,
             domain: None,
             energy: true,
+            events: Vec::new(),
         }
     }
 

@@ -25,6 +25,10 @@ pub(super) struct PhaseSpace<'a, S> {
     external: Vec<S>,
     /// `true` if forces beside those of `L` act.
     damped: bool,
+    /// `true` if the model depends on the time.
+    timed: bool,
+    /// Times of the states that are evaluated.
+    times: Vec<S>,
     force: Option<&'a dyn Force<S>>,
     /// Time at the start of the current step, and the times at which the force may be evaluated.
     start: S,
@@ -114,6 +118,8 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             points: Vec::new(),
             external: Vec::new(),
             damped: !model.conserves_energy() || force.is_some(),
+            timed: model.is_timed(),
+            times: Vec::new(),
             force,
             start: <S as Real>::zero(),
             piece: None,
@@ -125,16 +131,31 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         (self.start, self.piece) = (t, Some(*piece));
     }
 
-    /// Adds the force from outside to that of the model; row `k` lies `after[k]` behind the start of the step, or all rows
-    /// `after[0]`.
+    /// The next evaluations are of the state at time `t`, between two steps.
+    pub(super) fn stop_at(&mut self, t: S) {
+        self.start = t;
+    }
+
+    /// The next evaluations are of the state `h` later.
+    pub(super) fn move_on(&mut self, h: S) {
+        self.start += h;
+    }
+
+    /// Time of row `row` of a batch: it lies `after[row]` behind the start of the step, or all rows `after[0]`.
+    fn time(&self, after: &[S], row: usize) -> S {
+        let after = after.get(row).or(after.first()).copied().unwrap_or_else(<S as Real>::zero);
+        let t = self.start + after;
+        self.piece.map_or(t, |piece| piece.time(t))
+    }
+
+    /// Adds the force from outside to that of the model; `after` as of [`PhaseSpace::time`].
     fn add_external(&mut self, q: &[S], v: &[S], after: &[S]) -> Result<(), StepFailure> {
-        let (Some(force), Some(piece)) = (self.force, self.piece) else { return Ok(()) };
+        let Some(force) = self.force.filter(|_| self.piece.is_some()) else { return Ok(()) };
         let (n, zero) = (self.n, <S as Real>::zero());
         self.terms.force.resize(q.len(), zero);
         self.external.resize(n, zero);
         for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
-            let after = after.get(row).or(after.first()).copied().unwrap_or(zero);
-            force.force(piece.time(self.start + after), q, v, &mut self.external);
+            force.force(self.time(after, row), q, v, &mut self.external);
             if self.external.iter().any(|x| !x.is_finite()) {
                 return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what: "external force" }));
             }
@@ -144,14 +165,23 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         Ok(())
     }
 
-    /// Evaluates states; `after` says how far behind the start of the step they lie, see [`PhaseSpace::add_external`].
+    /// Evaluates states; `after` says how far behind the start of the step they lie, see [`PhaseSpace::time`].
     fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), StepFailure> {
         if q.iter().chain(v).any(|x| !x.is_finite()) {
             return Err(StepFailure::State);
         }
         self.evaluations += q.len() / self.n;
         let request = if self.damped && request.includes(Request::DL_DQ) { request | Request::FORCE } else { request };
-        self.model.terms(q, v, request, &mut self.terms).map_err(StepFailure::Model)?;
+        let outcome = if self.timed {
+            let mut times = std::mem::take(&mut self.times);
+            times.clear();
+            times.extend((0..q.len() / self.n).map(|row| self.time(after, row)));
+            self.times = times;
+            self.model.terms_at(&self.times, q, v, request, &mut self.terms)
+        } else {
+            self.model.terms(q, v, request, &mut self.terms)
+        };
+        outcome.map_err(StepFailure::Model)?;
         if request.includes(Request::FORCE) {
             self.add_external(q, v, after)?;
             self.terms.dl_dq.iter_mut().zip(&self.terms.force).for_each(|(g, &force)| *g += force);
@@ -205,7 +235,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
     ) -> Result<(), StepFailure> {
         let n = self.n;
         let zero = <S as Real>::zero();
-        self.evaluate(q, v, Request::MASS_MATRIX, &[])?;
+        self.evaluate(q, v, Request::MASS_MATRIX, &[after])?;
         into.mass.clone_from(&self.terms.mass_matrix);
         let shift = |i: usize| {
             let size = S::max(q[i].abs(), v[i].abs());

@@ -1,11 +1,12 @@
 //! Roll-outs of any length in little memory: samples are handed over in pieces, with the balance of
 //! the energy: where it went, and where it came from.
 
+use super::event::lost;
 use super::force::pieces;
 use super::gauss::{Tableau, lagrange};
 use super::run::Nodes;
 use super::trajectory::CHUNK;
-use super::{Force, Integrable, Options, RolloutError, StepCounts, Trajectory};
+use super::{Force, Integrable, Occurrence, Options, RolloutError, StepCounts, Trajectory};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
 use std::ops::ControlFlow;
@@ -17,9 +18,11 @@ pub struct Ending<S> {
     pub samples: usize,
     /// Work done.
     pub statistics: StepCounts,
-    /// Why it ended before `t_end`.
+    /// Why it ended before `t_end`; nothing where an event that is to end it did.
     pub stop: Option<RolloutError>,
-    /// Where the energy went, of a motion with friction or a force if options ask for energies. Work and friction are integrated beside the
+    /// The events that happened, in the order of time.
+    pub events: Vec<Occurrence<S>>,
+    /// Where the energy went, of a motion with friction, impacts or a force if options ask for energies. Work and friction are integrated beside the
     /// motion, step by step, whatever the distance of the samples.
     pub balance: Option<EnergyBalance<S>>,
 }
@@ -77,15 +80,17 @@ pub(super) fn hand_over<S: Integrable>(
         }
         willing
     };
-    let (statistics, stop) = S::roll_out(model, force, start, options, (&mut keep, nodes));
+    let mut events = Vec::new();
+    let (statistics, stop) = S::roll_out(model, force, start, options, (&mut keep, nodes, &mut events));
     if willing && !piece.is_empty() {
         give(&mut piece);
     }
-    let balance = energies.filter(|_| exchanged).map(|[first, last, size]| {
+    let has_impacts = options.events.iter().any(|event| event.restitution.is_some());
+    let balance = energies.filter(|_| exchanged || has_impacts).map(|[first, last, size]| {
         let Exchange { work, dissipated, .. } = exchange;
-        EnergyBalance { change: last - first, dissipated, work, size }
+        EnergyBalance { change: last - first, dissipated, impacts: lost(&events), work, size }
     });
-    Ending { samples, statistics, stop, balance }
+    Ending { samples, statistics, stop, events, balance }
 }
 
 /// Work and loss along a motion, integrated at the nodes that its integrator hands over.
@@ -108,7 +113,7 @@ impl<'a, S: Scalar> Exchange<'a, S> {
     /// Adds the powers at a time, over `weight` in the unit of time.
     fn add(&mut self, t: S, weight: S, q: &[S], v: &[S]) {
         if !self.model.conserves_energy() {
-            let known = self.model.terms(q, v, Request::FORCE, &mut self.terms).is_ok();
+            let known = self.model.terms_at(&[t], q, v, Request::FORCE, &mut self.terms).is_ok();
             let power = self.terms.dissipation.first().copied().filter(|_| known).unwrap_or_else(S::nan);
             self.dissipated += weight * power;
         }
@@ -123,10 +128,10 @@ impl<'a, S: Scalar> Exchange<'a, S> {
 /// Samples whose interpolating polynomial is integrated.
 const SAMPLES: usize = 6;
 
-/// Energy gained, energy lost to friction and work of a force from outside between the first and the last sample, in the
+/// Energy gained, energy lost to friction and impacts, and work of a force from outside between the first and the last sample, in the
 /// unit of `L`.
 ///
-/// `dE/dt = v.Q - v.dD/dv` makes the change the work less the friction, up to the errors of the integration and of the
+/// `dE/dt = v.Q - v.dD/dv` makes the change the work less the friction and the impacts, up to the errors of the integration and of the
 /// quadrature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyBalance<S> {
@@ -134,6 +139,8 @@ pub struct EnergyBalance<S> {
     pub change: S,
     /// Integral of the dissipated power `v.dD/dv` over time; 0 for a model that conserves its energy.
     pub dissipated: S,
+    /// Energy that impacts took; 0 where only the samples are known.
+    pub impacts: S,
     /// Integral of the power `v.Q` of the force from outside over time; 0 without one.
     pub work: S,
     /// Largest `|E|` of a sample: rounding errors are in its units.
@@ -141,9 +148,9 @@ pub struct EnergyBalance<S> {
 }
 
 impl<S: Scalar> EnergyBalance<S> {
-    /// Energy that came from nowhere, `change + dissipated - work`.
+    /// Energy that came from nowhere, `change + dissipated + impacts - work`.
     pub fn defect(&self) -> S {
-        self.change + self.dissipated - self.work
+        self.change + self.dissipated + self.impacts - self.work
     }
 
     /// The balance of a motion by `model`, perhaps under a force.
@@ -158,9 +165,9 @@ impl<S: Scalar> EnergyBalance<S> {
         let size = CHUNK * (*coordinates).max(1);
         let (mut energy, mut power) = (Vec::with_capacity(t.len()), Vec::with_capacity(t.len()));
         let mut terms = Terms::default();
-        for (q, v) in q.chunks(size).zip(v.chunks(size)) {
+        for ((q, v), t) in q.chunks(size).zip(v.chunks(size)).zip(t.chunks(CHUNK)) {
             model
-                .terms(q, v, Request::ENERGY | Request::FORCE, &mut terms)
+                .terms_at(t, q, v, Request::ENERGY | Request::FORCE, &mut terms)
                 .map_err(|e| invalid(format!("samples from {}: {e}", energy.len())))?;
             energy.extend_from_slice(&terms.energy);
             power.extend_from_slice(&terms.dissipation);
@@ -174,7 +181,7 @@ impl<S: Scalar> EnergyBalance<S> {
             return Err(invalid("the power of the force is not finite".to_string()));
         }
         let size = energy.iter().fold(zero, |size, e| S::max(size, e.abs()));
-        Ok(Self { change: last - first, dissipated: integral(t, &power), work, size })
+        Ok(Self { change: last - first, dissipated: integral(t, &power), impacts: zero, work, size })
     }
 }
 

@@ -2,6 +2,7 @@
 //! the two the motion takes.
 
 use super::StepFailure;
+use super::dense::cubic;
 use crate::lagrangian::{Manifold, ManifoldRows, dot};
 use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar, are_finite};
@@ -201,9 +202,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
 
     /// Coordinates at the share `x` of a step of length `h` that ends at `(q, v)`, by Hermite's polynomial.
     fn place(&self, x: f64, h: S, q: &[S], v: &[S]) -> Vec<S> {
-        let (x, one, two, signed) = (S::of_f64(x), <S as Real>::one(), S::of_f64(2.0), h * self.direction);
-        let (y, all) = (one - x, x * x * (S::of_f64(3.0) - two * x));
-        let at = |i: usize| self.q[i] * (one - all) + q[i] * all + signed * x * y * (self.v[i] * y - v[i] * x);
+        let at = |i: usize| cubic(S::of_f64(x), h * self.direction, [self.q[i], self.v[i], q[i], v[i]]);
         (0..q.len()).map(at).collect()
     }
 

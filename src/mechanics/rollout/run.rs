@@ -3,7 +3,9 @@
 use super::error::UnderflowCause;
 use super::fixed::Stepper;
 use super::ode::Adaptive;
-use super::{Force, Integrable, Integrator, Options, RolloutError, StepCounts, Trajectory, adaptive, fixed};
+use super::{
+    Force, Integrable, Integrator, Occurrence, Options, RolloutError, StepCounts, Trajectory, adaptive, fixed,
+};
 use crate::lagrangian::{EulerLagrange, ManifoldRows, MechanicsError, OffManifold, project};
 use crate::scalar::Scalar;
 
@@ -14,12 +16,14 @@ pub struct Rollout<S> {
     pub trajectory: Trajectory<S>,
     /// Work done.
     pub statistics: StepCounts,
-    /// Why it ended before `t_end`.
+    /// Why it ended before `t_end`; nothing where an event that is to end it did.
     pub stop: Option<RolloutError>,
+    /// The events that happened, in the order of time.
+    pub events: Vec<Occurrence<S>>,
 }
 
 impl<S: Scalar> Rollout<S> {
-    /// `true` if `t_end` was reached.
+    /// `true` if `t_end` was reached, or an event that ends the motion.
     #[doc(hidden)]
     pub fn is_complete(&self) -> bool {
         self.stop.is_none()
@@ -87,7 +91,7 @@ pub(super) fn adaptive_or_fixed<S: Integrable>(
     v: &[S],
     options: &Options<S>,
 ) -> Rollout<S> {
-    collected(model, options, |keep| S::roll_out(model, force, (q, v), options, (keep, None)))
+    collected(model, options, |keep, events| S::roll_out(model, force, (q, v), options, (keep, None, events)))
 }
 
 /// By the structure-preserving methods, perhaps under a force from outside.
@@ -98,24 +102,25 @@ pub(super) fn fixed<S: Scalar>(
     v: &[S],
     options: &Options<S>,
 ) -> Rollout<S> {
-    collected(model, options, |keep| integrate_fixed(model, force, (q, v), options, (keep, None)))
+    collected(model, options, |keep, events| integrate_fixed(model, force, (q, v), options, (keep, None, events)))
 }
 
 /// The samples of a motion as a trajectory, with the energies if options ask for them.
 fn collected<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     options: &Options<S>,
-    motion: impl FnOnce(&mut Keep<'_, S>) -> (StepCounts, Option<RolloutError>),
+    motion: impl FnOnce(&mut Keep<'_, S>, &mut Vec<Occurrence<S>>) -> (StepCounts, Option<RolloutError>),
 ) -> Rollout<S> {
-    let mut trajectory = Trajectory::empty(model.coordinates());
-    let (statistics, stop) = motion(&mut |t, q, v| {
+    let (mut trajectory, mut events) = (Trajectory::empty(model.coordinates()), Vec::new());
+    let mut keep = |t: S, q: &[S], v: &[S]| {
         trajectory.push(t, q, v);
         true
-    });
+    };
+    let (statistics, stop) = motion(&mut keep, &mut events);
     if options.energy && !matches!(stop, Some(RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. })) {
         trajectory.energy = Some(trajectory.energy_by(model));
     }
-    Rollout { trajectory, statistics, stop }
+    Rollout { trajectory, statistics, stop, events }
 }
 
 /// The motion by any method, every sample and, if requested, every node handed over and none kept.
@@ -124,7 +129,7 @@ pub(super) fn integrate<S: Integrable>(
     force: Option<&dyn Force<S>>,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    receivers: (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
+    receivers: Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let method = match options.method {
         Integrator::Dopri5 => Adaptive::Dopri5,
@@ -146,7 +151,7 @@ fn integrate_fixed<S: Scalar>(
     force: Option<&dyn Force<S>>,
     (q, v): (&[S], &[S]),
     options: &Options<S>,
-    receivers: (&mut Keep<'_, S>, Option<&mut Nodes<'_, S>>),
+    receivers: Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let n = model.coordinates();
     let refused = |error| (StepCounts::default(), Some(error));
@@ -161,7 +166,7 @@ fn integrate_fixed<S: Scalar>(
         let problem = format!("{} adapts its steps; {} offers fixed steps only", options.method.name(), S::NAME);
         return refused(RolloutError::Invalid { what: "method", problem });
     };
-    if options.method == Integrator::Variational && !model.conserves_energy() {
+    if options.method == Integrator::Variational && !model.conserves_energy() && !model.is_timed() {
         let problem = "the variational integrator keeps the energy and this model loses it by friction; \
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
         return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });
@@ -275,6 +280,9 @@ pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
 /// Receives time, weight, coordinates and velocities at the nodes of a quadrature over time along a motion, beside the samples.
 pub(super) type Nodes<'a, S> = dyn FnMut(S, S, &[S], &[S]) + 'a;
+
+/// What receives the samples, the nodes if requested, and the events.
+pub(super) type Receivers<'r, 'a, S> = (&'r mut Keep<'a, S>, Option<&'r mut Nodes<'a, S>>, &'r mut Vec<Occurrence<S>>);
 
 /// The error of a motion that a step ended.
 pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {

@@ -289,6 +289,7 @@ impl<S: Scalar> Spark<S> {
             state.q.add(k, h * terms.fold(<S as Real>::zero(), |sum, (&w, &v)| sum + w * v));
             state.p.add(k, buffers.push[k]);
         }
+        phase.move_on(h);
         let push = phase.land(manifold, &state.q.high, &state.p.high, velocity)?;
         push.into_iter().enumerate().for_each(|(k, push)| state.p.add(k, push));
         Ok(())

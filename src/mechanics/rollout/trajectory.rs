@@ -88,11 +88,12 @@ impl<S: Scalar> Trajectory<S> {
         let size = CHUNK * self.coordinates.max(1);
         let mut energy = Vec::with_capacity(self.len());
         let mut terms = Terms::default();
-        for (q, v) in self.q.chunks(size).zip(self.v.chunks(size)) {
-            let batch = q.len() / self.coordinates;
+        let states = self.q.chunks(size).zip(self.v.chunks(size));
+        for ((q, v), t) in states.zip(self.t.chunks(CHUNK)) {
+            let batch = t.len();
             terms.energy.clear();
             // A row that is not finite is reported and stays `NaN` or infinite in the result.
-            let computed = model.terms(q, v, Request::ENERGY, &mut terms);
+            let computed = model.terms_at(t, q, v, Request::ENERGY, &mut terms);
             if terms.energy.len() == batch {
                 energy.extend(terms.energy.iter().map(|&e| if e.is_finite() { e } else { S::nan() }));
             } else {

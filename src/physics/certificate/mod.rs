@@ -215,6 +215,8 @@ pub enum CertificateError {
     Coordinates(usize),
     /// A system that is not of the catalogue and has no description.
     NoLagrangian,
+    /// A system that depends on the time.
+    Timed,
 }
 
 impl std::fmt::Display for CertificateError {
@@ -231,6 +233,7 @@ impl std::fmt::Display for CertificateError {
             Self::Condition(found) => write!(f, "expected a condition number of at least 1, found {found}"),
             Self::Coordinates(found) => write!(f, "expected at most {MOST_COORDINATES} coordinates, found {found}"),
             Self::NoLagrangian => f.write_str("the system has no Lagrangian that can be evaluated"),
+            Self::Timed => write!(f, "{}", crate::lagrangian::MechanicsError::Timed),
         }
     }
 }
@@ -256,7 +259,7 @@ pub fn certify<L: Lagrangian, S: Scalar>(
 /// As [`certify`], for a system of the catalogue or by its description.
 ///
 /// # Errors
-/// As there, and [`CertificateError::NoLagrangian`].
+/// As there, [`CertificateError::NoLagrangian`] and [`CertificateError::Timed`].
 pub fn certify_system<S: Scalar>(
     configured: &SystemInstance<S>,
     region: &Bounds,
@@ -268,6 +271,9 @@ pub fn certify_system<S: Scalar>(
         fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
             certify(lagrangian, self.0, self.1, self.2)
         }
+    }
+    if configured.is_timed() {
+        return Err(CertificateError::Timed);
     }
     configured.visit(Certify(&configured.parameters, region, options)).unwrap_or(Err(CertificateError::NoLagrangian))
 }

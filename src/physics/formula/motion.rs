@@ -123,6 +123,7 @@ impl Motion<'_> {
             equations: &equations,
             chosen: wanted.len(),
             between: self.between,
+            inputs: Vec::new(),
             step: data.step,
             substeps: self.substeps,
         };
@@ -135,6 +136,7 @@ impl Motion<'_> {
             sigma: data.sigma.clone(),
             sigma_of: data.sigma_of.clone(),
             errors: &[],
+            missing: &[],
             gaps: Vec::new(),
             spread: data.spread.clone(),
             robust: true,

@@ -55,10 +55,11 @@ pub(super) fn copies(
     let truth: Vec<Option<(Smoothed, Vec<f64>)>> = recording
         .tracks
         .iter()
-        .map(|track| {
+        .enumerate()
+        .map(|(at, track)| {
             let mut motion = wider.apply(track).ok()?;
             integrate(&mut motion, n);
-            let force = asked(problem, x, &motion);
+            let force = asked(problem, x, (at, &motion));
             Some((motion, force))
         })
         .collect();
@@ -137,14 +138,14 @@ fn integrate(motion: &mut Smoothed, n: usize) {
 }
 
 /// The forces that a motion needs, `(samples, n)`.
-fn asked(problem: &Problem<'_>, x: &[f64], motion: &Smoothed) -> Vec<f64> {
+fn asked(problem: &Problem<'_>, x: &[f64], (track, motion): (usize, &Smoothed)) -> Vec<f64> {
     let (n, values) = (problem.course.equations.n, problem.parameters(x));
     let mut follower = Follower::new(&problem.course);
     let mut force = vec![0.0; motion.q.len()];
     let mut scratch = vec![0.0; LANES * n];
     for first in (0..force.len()).step_by(LANES * n) {
         let range = first..(first + LANES * n).min(force.len());
-        follower.at_times(motion.times[first / n..range.end / n].iter().copied());
+        follower.at(motion.times[first / n..range.end / n].iter().map(|t| (track, *t)));
         follower.accelerate(
             &values,
             (&motion.q[range.clone()], &motion.v[range.clone()]),

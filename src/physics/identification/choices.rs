@@ -1,11 +1,12 @@
 //! The user's choices: unknown constants, sensors, position errors, and the quantity that is fitted.
 
+use super::follow::Inputs;
 use super::smoothed::Met;
 use super::solve::{Sensor, SensorKind};
 use super::{IdentifyError, IdentifyOptions};
 use crate::lagrangian::SystemInstance;
 use crate::names::pluralize;
-use crate::recording::{Recording, Targets};
+use crate::recording::{RecordedTrajectory, Recording, Targets};
 
 /// Position errors: one positive number for each position.
 pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result<(), IdentifyError> {
@@ -24,6 +25,45 @@ pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result
         }
     }
     Ok(())
+}
+
+/// What is said of readings that are missing; tracks without any may have no marks.
+pub(super) fn missing(recording: &Recording, missing: &[Vec<bool>]) -> Result<Vec<String>, IdentifyError> {
+    let n = recording.n();
+    let wrong = recording.tracks.iter().zip(missing).find(|(track, own)| !own.is_empty() && own.len() != track.q.len());
+    if let Some((track, own)) = wrong {
+        let (track, expected) = (track.name.clone(), track.q.len());
+        return Err(IdentifyError::Missing { track, expected, found: own.len() });
+    }
+    let samples = recording.samples();
+    let of = |(i, name): (usize, &String)| {
+        let count = missing.iter().flat_map(|own| own.iter().skip(i).step_by(n)).filter(|missing| **missing).count();
+        (count > 0).then(|| format!("{name}: {count} of {samples} readings are missing"))
+    };
+    Ok(recording.coordinates.iter().enumerate().filter_map(of).collect())
+}
+
+/// The inputs of every trajectory, for which the options must have as many numbers as the system takes.
+pub(super) fn inputs<'a>(
+    instance: &SystemInstance<f64>,
+    recording: &'a Recording,
+    options: &'a IdentifyOptions,
+) -> Result<Vec<Inputs<'a>>, IdentifyError> {
+    let count = instance.inputs().count();
+    if count == 0 && options.inputs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let of = |(at, track): (usize, &'a RecordedTrajectory)| {
+        let values = options.inputs.get(at).map_or(&[][..], Vec::as_slice);
+        let expected = track.len() * count;
+        let found = match values.iter().position(|x| !x.is_finite()) {
+            None if values.len() == expected => return Ok(Inputs { times: &track.times, values }),
+            None => pluralize(values.len(), "number", "numbers"),
+            Some(at) => format!("{} of sample {}", values[at], at / count.max(1)),
+        };
+        Err(IdentifyError::Inputs { track: track.name.clone(), expected, found })
+    };
+    recording.tracks.iter().enumerate().map(of).collect()
 }
 
 /// What the constants are fitted to.

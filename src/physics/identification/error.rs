@@ -78,6 +78,32 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
+    /// A constant with a value for each trajectory that does not fit the recording.
+    #[error(transparent)]
+    Description(#[from] crate::lagrangian::DescriptionError),
+    /// A value of such a constant that its range does not allow.
+    #[error(transparent)]
+    System(#[from] crate::lagrangian::SystemError),
+    /// Marks of missing readings that are not one for each position.
+    #[error("missing readings of {track}: expected {expected} marks, one for each position, found {found}")]
+    Missing {
+        /// The trajectory.
+        track: String,
+        /// Its positions.
+        expected: usize,
+        /// Marks found.
+        found: usize,
+    },
+    /// An input that is not a finite number, or the wrong number of inputs.
+    #[error("inputs of {track}: expected {expected} finite numbers, found {found}")]
+    Inputs {
+        /// The trajectory.
+        track: String,
+        /// Its inputs, those of a sample one behind the other.
+        expected: usize,
+        /// What was found.
+        found: String,
+    },
     /// A standard deviation of a position that is not a finite number above 0, or the wrong number of standard deviations.
     #[error("errors of {track}: expected a finite number above 0 for each of {expected} positions, found {found}")]
     Errors {

@@ -29,9 +29,37 @@ pub(crate) struct Course<'a> {
     /// Constants by which derivatives are taken.
     pub chosen: usize,
     pub between: Between,
+    /// Inputs of every track; none if there are none.
+    pub inputs: Vec<Inputs<'a>>,
     /// Usual step between samples in s, and integration steps in it.
     pub step: f64,
     pub substeps: usize,
+}
+
+/// Measured functions of the time on which the forces of a track depend.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inputs<'a> {
+    /// Times of the samples.
+    pub times: &'a [f64],
+    /// Values, `(samples, inputs)`.
+    pub values: &'a [f64],
+}
+
+impl Course<'_> {
+    /// Writes what is known at a time of a track: the time, then inputs.
+    fn known(&self, track: usize, t: f64, into: &mut [f64]) {
+        into[0] = t;
+        let Some(Inputs { times, values }) = self.inputs.get(track) else { return };
+        let values_at = &mut into[1..];
+        values_at.fill(0.0);
+        let after = times.partition_point(|known| *known <= t).clamp(1, times.len().max(2) - 1).min(times.len() - 1);
+        let (before, after_time) = (times[after.saturating_sub(1)], times[after]);
+        let share = if after_time > before { ((t - before) / (after_time - before)).clamp(0.0, 1.0) } else { 1.0 };
+        let count = values_at.len();
+        self.between.weigh(times, (after, share), |at, weight| {
+            values_at.iter_mut().zip(&values[at * count..]).for_each(|(x, value)| *x += weight * value);
+        });
+    }
 }
 
 /// States of all lanes with derivatives: `(lanes, n)` and `(lanes, n, columns)`.
@@ -90,8 +118,8 @@ pub(super) struct Follower<'a> {
     rest: Vec<f64>,
     by_state: Vec<f64>,
     force: Vec<f64>,
-    /// Times of the states, if the equations depend on it.
-    time: Vec<f64>,
+    /// The time and inputs of the states, `(lanes, known)`, as far as the equations depend on them.
+    known: Vec<f64>,
     row: Vec<f64>,
 }
 
@@ -108,25 +136,31 @@ impl<'a> Follower<'a> {
             rest: Vec::new(),
             by_state: Vec::new(),
             force: Vec::new(),
-            time: Vec::new(),
+            known: Vec::new(),
             row: Vec::new(),
         }
     }
 
-    /// Sets the times of the states that are evaluated next, `(lanes)`; without them states are spread over the recording.
-    pub fn at_times(&mut self, times: impl IntoIterator<Item = f64>) {
-        if self.course.equations.timed {
-            self.time.clear();
-            self.time.extend(times);
+    /// Sets tracks and times of the states that are evaluated next; without them states are spread over the recording.
+    pub fn at(&mut self, places: impl Iterator<Item = (usize, f64)>) {
+        let (course, count) = (self.course, self.course.equations.known);
+        if count > 0 {
+            self.known.clear();
+            for (lane, (track, t)) in places.enumerate() {
+                self.known.resize((lane + 1) * count, 0.0);
+                course.known(track, t, &mut self.known[lane * count..]);
+            }
         }
     }
 
     /// Spreads states over the recording if their times are not known.
     fn spread_times(&mut self, lanes: usize) {
-        if self.course.equations.timed && self.time.len() != lanes {
-            let times = || self.course.recording.tracks.iter().flat_map(|track| &track.times);
-            let (low, high) = times().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
-            self.time = (0..lanes).map(|k| low + (high - low) * (k as f64 + 0.5) / lanes as f64).collect();
+        let (course, count) = (self.course, self.course.equations.known);
+        if self.known.len() != lanes * count {
+            let tracks = course.recording.tracks.iter().enumerate();
+            let samples: Vec<(usize, f64)> =
+                tracks.flat_map(|(k, track)| track.times.iter().map(move |t| (k, *t))).collect();
+            self.at((0..lanes).map(|lane| samples[(2 * lane + 1) * samples.len() / (2 * lanes)]));
         }
     }
 
@@ -143,8 +177,8 @@ impl<'a> Follower<'a> {
         self.rest.resize(lanes * n, 0.0);
         // Shapes are those of the recorded program.
         self.spread_times(lanes);
-        let inputs: [&[f64]; 3] = [q, v, &self.time];
-        let inputs = &inputs[..2 + usize::from(self.course.equations.timed)];
+        let inputs: [&[f64]; 3] = [q, v, &self.known];
+        let inputs = &inputs[..2 + usize::from(self.course.equations.known > 0)];
         let _ = self.motion.evaluate(lanes, inputs, values, &mut [&mut self.mass, &mut self.rest]);
         if !force.is_empty() {
             self.rest.iter_mut().zip(force).for_each(|(rest, force)| *rest += force);
@@ -169,8 +203,8 @@ impl<'a> Follower<'a> {
         let n = self.course.equations.n;
         self.by_state.resize(q.len() * (2 * n + self.course.chosen), 0.0);
         self.spread_times(q.len() / n);
-        let inputs: [&[f64]; 4] = [q, v, a, &self.time];
-        let inputs = &inputs[..3 + usize::from(self.course.equations.timed)];
+        let inputs: [&[f64]; 4] = [q, v, a, &self.known];
+        let inputs = &inputs[..3 + usize::from(self.course.equations.known > 0)];
         let _ = self.slopes.evaluate(q.len() / n, inputs, values, &mut [&mut self.by_state]);
         &self.by_state
     }
@@ -260,7 +294,7 @@ impl<'a> Follower<'a> {
             let at = segment.first + sample.min(segment.samples - 1);
             (track(segment).times[at.saturating_sub(1)], track(segment).times[at])
         };
-        self.at_times(segments.iter().map(|segment| track(segment).times[segment.first]));
+        self.at(segments.iter().map(|segment| (segment.track, track(segment).times[segment.first])));
         visit(self, 0, &now);
         for sample in 1..longest {
             let interval = |segment: &&Segment| {
@@ -274,11 +308,11 @@ impl<'a> Follower<'a> {
             let steps = ((course.substeps as f64 * most / course.step - 0.5).ceil() as usize).max(course.substeps);
             let h: Vec<f64> = intervals.iter().map(|interval| interval / steps as f64).collect();
             for step in 0..steps {
-                self.advance((values, columns), (&h, &mut now), &mut scratch, |share, force, time| {
+                self.advance((values, columns), (&h, &mut now), &mut scratch, |share, force, known| {
                     let x = (step as f64 + share) / steps as f64;
-                    for (segment, time) in segments.iter().zip(time) {
+                    for (segment, known) in segments.iter().zip(known.chunks_exact_mut(course.equations.known.max(1))) {
                         let (before, after) = ends(segment, sample);
-                        *time = before + x * (after - before);
+                        course.known(segment.track, before + x * (after - before), known);
                     }
                     for (segment, into) in segments.iter().zip(force.chunks_exact_mut(n)) {
                         let at = segment.first + sample.min(segment.samples - 1);
@@ -286,12 +320,12 @@ impl<'a> Follower<'a> {
                     }
                 });
             }
-            self.at_times(segments.iter().map(|segment| ends(segment, sample).1));
+            self.at(segments.iter().map(|segment| (segment.track, ends(segment, sample).1)));
             visit(self, sample, &now);
         }
     }
 
-    /// A step of Runge and Kutta's method by `h` of each lane; `push` fills in the known forces and the times at a share of the step.
+    /// A step of Runge and Kutta's method by `h` of each lane; `push` fills in the known forces, the times and inputs at a share of the step.
     fn advance(
         &mut self,
         (values, columns): (&[f64], usize),
@@ -304,8 +338,8 @@ impl<'a> Follower<'a> {
         let part = |part: f64| h.iter().map(|h| h * part).collect::<Vec<f64>>();
         let half = part(0.5);
         for k in 0..4 {
-            if !self.force.is_empty() || self.course.equations.timed {
-                push([0.0, 0.5, 0.5, 1.0][k], &mut self.force, &mut self.time);
+            if !self.force.is_empty() || !self.known.is_empty() {
+                push([0.0, 0.5, 0.5, 1.0][k], &mut self.force, &mut self.known);
             }
             let (before, rest) = rates.split_at_mut(k);
             match k {
@@ -358,9 +392,10 @@ impl<'a> Follower<'a> {
             let steps = (course.substeps as f64 * most / course.step).ceil().max(1.0);
             let h: Vec<f64> = ways.iter().map(|way| way.1 / steps).collect();
             for step in 0..steps as usize {
-                self.advance((values, columns), (&h, late), &mut scratch, |share, force, time| {
-                    for (lane, time) in time.iter_mut().enumerate() {
-                        *time = places[lane].0 + (step as f64 + share) * h[lane];
+                self.advance((values, columns), (&h, late), &mut scratch, |share, force, known| {
+                    for (lane, known) in known.chunks_exact_mut(course.equations.known.max(1)).enumerate() {
+                        let now = places[lane].0 + (step as f64 + share) * h[lane];
+                        course.known(segments[lane].track, now, known);
                     }
                     for (lane, into) in force.chunks_exact_mut(n).enumerate() {
                         let (track, end) = (tracks[lane], ways[lane].0.min(tracks[lane].len() - 1));

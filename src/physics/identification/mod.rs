@@ -40,6 +40,7 @@ mod innovations;
 mod invariants;
 pub(crate) mod linear;
 mod moves;
+mod per_trajectory;
 mod pieces;
 mod quality;
 mod says;
@@ -89,10 +90,17 @@ pub struct IdentifyOptions {
     /// them. Empty if they are not known.
     #[serde(default)]
     pub errors: Vec<Vec<f64>>,
+    /// Readings of positions that are missing, `true` in `(samples, n)` of every trajectory; numbers in their place only start the search. Empty
+    /// if none is missing.
+    #[serde(default)]
+    pub missing: Vec<Vec<bool>>,
+    /// Inputs of the forces of the system at the samples of every trajectory, `(samples, inputs)` each, in the order of their names.
+    #[serde(default)]
+    pub inputs: Vec<Vec<f64>>,
     /// What is fitted, [`Targets::Motion`] or [`Targets::Forces`]; by default the forces of a chain of links under known forces, otherwise the
     /// motion.
     pub targets: Option<Targets>,
-    /// Interpolation of known forces between the samples; by default the one that fits the motion best.
+    /// Interpolation of known forces and inputs between the samples; by default the one that fits the motion best.
     pub between: Option<Between>,
     /// Length of the segments in s; chosen by the data if not given.
     pub segment: Option<f64>,

@@ -6,7 +6,7 @@ use super::follow::Segment;
 use super::stages::thinned;
 use super::{IdentifyError, IdentifyOptions};
 use crate::linalg::{self, Workspace};
-use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise as estimated};
+use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::survey::{Stillness, stillness};
 use crate::recording::{Clock, Filled, RecordedTrajectory, Recording};
 use std::ops::Range;
@@ -84,7 +84,24 @@ impl<'a> Pieces<'a> {
             long.tracks.push(part.clone());
             origin.push((piece.track, states.clone()));
         }
-        let choices = SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() };
+        // Numbers in place of missing readings have no noise.
+        let read = |i: usize| -> Vec<(usize, Vec<f64>, Vec<f64>)> {
+            let of = |(piece, (part, states)): (&Piece, &(RecordedTrajectory, Vec<usize>))| {
+                let own = options.missing.get(piece.track).filter(|own| !own.is_empty());
+                let kept = (0..part.len()).filter(|&k| !own.is_some_and(|own| own[states[k] * n + i]));
+                let (times, values) = kept.map(|k| (part.times[k], part.q[k * n + i])).unzip();
+                (piece.track, times, values)
+            };
+            all.iter().zip(&parts).map(of).collect()
+        };
+        let readings: Vec<_> = (0..n).map(read).collect();
+        let estimated = |i: usize, track: Option<usize>| {
+            let own = readings[i].iter().filter(|(of, ..)| track.is_none_or(|track| *of == track));
+            noise(own.map(|(_, times, values)| (times.as_slice(), values.as_slice())), 1, 0).sigma
+        };
+        let gaps = options.missing.iter().flatten().any(|missing| *missing);
+        let given = gaps.then(|| (0..n).map(|i| estimated(i, None)).collect());
+        let choices = SmoothOptions { noise: options.noise.clone().or(given), ..SmoothOptions::default() };
         // Short pieces help to estimate the noise, but are not smoothed.
         let chosen = (!long.tracks.is_empty()).then(|| Smoothing::choose(&long, &choices)).transpose();
         let smoothing = match chosen {
@@ -93,18 +110,14 @@ impl<'a> Pieces<'a> {
             Err(error) => return Err(error.into()),
         };
         let step = smoothing.as_ref().map_or_else(|| usual_step(&parts), |smoothing| smoothing.step);
-        let signals = || parts.iter().map(|(part, _)| (part.times.as_slice(), part.q.as_slice()));
         let sigma = |i: usize| match (&smoothing, &options.noise) {
             (Some(smoothing), _) => smoothing.coordinates[i].noise.sigma,
             (None, Some(given)) => given[i],
-            (None, None) => estimated(signals(), n, i).sigma,
+            (None, None) => estimated(i, None),
         };
         let noise: Vec<f64> = (0..n).map(sigma).collect();
-        let own = |track: usize, i: usize| {
-            let signals = all.iter().zip(signals()).filter(|(piece, _)| piece.track == track).map(|(_, signal)| signal);
-            estimated(signals, n, i).sigma
-        };
-        let noise_of = (0..recording.tracks.len()).map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
+        let of = |track: usize| (0..n).map(|i| estimated(i, Some(track))).collect();
+        let noise_of = (0..recording.tracks.len()).map(of).collect();
         let still = smoothing.as_ref().map_or_else(Vec::new, |smoothing| stillness(&long, smoothing));
         let still = still.into_iter().filter(|(_, how)| !matches!(how, Stillness::Copy(_)));
         let still = still

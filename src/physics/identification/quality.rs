@@ -99,7 +99,7 @@ pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]
 /// Standard deviation of the residuals of a coordinate by the median of their size, which is robust against outliers.
 pub(super) fn usual(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> f64 {
     let own = residuals.iter().flat_map(|segment| segment.iter().skip(coordinate).step_by(n));
-    let mut sizes: Vec<f64> = own.copied().collect();
+    let mut sizes: Vec<f64> = own.copied().filter(|r| r.is_finite()).collect();
     if sizes.is_empty() { 0.0 } else { robust_deviation(&mut sizes) }
 }
 

@@ -77,6 +77,7 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
         equations: &equations,
         chosen: 2,
         between: Between::Linear,
+        inputs: Vec::new(),
         step: 0.02,
         substeps: 4,
     };
@@ -89,6 +90,7 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
         sigma: vec![1e-3],
         sigma_of: Vec::new(),
         errors: &[],
+        missing: &[],
         gaps: Vec::new(),
         spread: vec![1.0],
         robust: false,

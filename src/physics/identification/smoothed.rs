@@ -78,10 +78,10 @@ impl States {
         self.q.len() / n
     }
 
-    /// The time of a state.
-    fn time(&self, problem: &Problem<'_>, at: usize) -> f64 {
+    /// The track and the time of a state.
+    fn place(&self, problem: &Problem<'_>, at: usize) -> (usize, f64) {
         let (track, sample) = self.places[at];
-        problem.course.recording.tracks[track].times[sample]
+        (track, problem.course.recording.tracks[track].times[sample])
     }
 
     /// Calls `visit` with every batch of states: the integrator, the batch's offset among the numbers, and its accelerations for constants `x`.
@@ -91,7 +91,7 @@ impl States {
         x: &[f64],
         visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
-        self.batches_at(problem, x, |at| self.time(problem, at), visit);
+        self.batches_at(problem, x, |at| self.place(problem, at), visit);
     }
 
     /// The same with states at other times.
@@ -99,7 +99,7 @@ impl States {
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        time: impl Fn(usize) -> f64,
+        place: impl Fn(usize) -> (usize, f64),
         mut visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
         let n = problem.course.equations.n;
@@ -111,7 +111,7 @@ impl States {
             let range = first..(first + LANES * n).min(self.q.len());
             let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);
-            follower.at_times((first / n..range.end / n).map(&time));
+            follower.at((first / n..range.end / n).map(&place));
             follower.accelerate(&values, state, &self.force[range.clone()], a);
             visit(&mut follower, range, a);
         }
@@ -260,39 +260,102 @@ const GROWS: f64 = 2.5;
 /// Part of the given value of such a constant on either side of it that is searched, and most values that are tried on either side.
 const SEARCHED: f64 = 0.5;
 const TRIED: usize = 40;
+/// Shortest part of a recording that is searched first, and values that are tried on either side after it doubled.
+const SHORTEST: f64 = 1.0 / 16.0;
+const DOUBLED: usize = 3;
 
 impl States {
-    /// As [`States::fit`] to accelerations under forces that depend on the time: the sum of squares has many minima over a frequency, as many
-    /// as there are periods in the recording, so that the fit begins at several values of it.
-    pub fn fit_in_time(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> Option<Normal> {
+    /// As [`States::fit`] to accelerations of a system that depends on the time: the sum of squares has many minima over a frequency, as many
+    /// as there are periods in the recording, so that the fit begins at several values of it. In a long recording a wide range is searched by
+    /// a short part, which doubles. Returns the constants, by their places, whose range was searched in part only, and that part.
+    pub fn fit_in_time(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> Option<Vec<(usize, [f64; 2])>> {
         let given = x.clone();
         let mut best = self.fit(problem, x, Met::Accelerations)?;
+        let mut cut = Vec::new();
         for k in 0..problem.chosen.len() {
             let Some(step) = self.phase_step(problem, &given, k) else { continue };
-            let most = if given[k] == 0.0 { TRIED } else { ((SEARCHED * given[k].abs() / step) as usize).min(TRIED) };
-            for place in (1..=most).flat_map(|j| [j as f64, -(j as f64)]) {
-                let mut tried = given.clone();
-                tried[k] += place * step;
-                let found = self.fit(problem, &mut tried, Met::Accelerations);
-                if let Some(found) = found.filter(|found| found.square < best.square) {
-                    (*x, best) = (tried, found);
+            let reach = if given[k] == 0.0 { TRIED as f64 * step } else { SEARCHED * given[k].abs() };
+            let mut share = (TRIED as f64 * step / reach).clamp(SHORTEST, 1.0);
+            let mut count = ((reach * share / step) as usize).min(TRIED);
+            if (count + 1) as f64 * step < reach * share {
+                let widest = count as f64 * step / share;
+                cut.push((k, [given[k] - widest, given[k] + widest]));
+            }
+            let mut from = given.clone();
+            loop {
+                let part = (share < 1.0).then(|| self.beginning(problem, share));
+                let found = part.as_ref().unwrap_or(self).nearest(problem, (&from, k), step / share, count);
+                let Some((tried, found)) = found else { break };
+                if share == 1.0 {
+                    if found.square < best.square {
+                        (*x, best) = (tried, found);
+                    }
+                    break;
                 }
+                (from, share, count) = (tried, (2.0 * share).min(1.0), DOUBLED);
             }
         }
-        Some(best)
+        Some(cut)
+    }
+
+    /// The best of the fits that begin at a value of constant `k` and at `count` others on either side of it.
+    fn nearest(
+        &self,
+        problem: &Problem<'_>,
+        (from, k): (&[f64], usize),
+        step: f64,
+        count: usize,
+    ) -> Option<(Vec<f64>, Normal)> {
+        let mut best: Option<(Vec<f64>, Normal)> = None;
+        for place in std::iter::once(0.0).chain((1..=count).flat_map(|j| [j as f64, -(j as f64)])) {
+            let mut tried = from.to_vec();
+            tried[k] += place * step;
+            let Some(found) = self.fit(problem, &mut tried, Met::Accelerations) else { continue };
+            if best.as_ref().is_none_or(|(_, best)| found.square < best.square) {
+                best = Some((tried, found));
+            }
+        }
+        best
+    }
+
+    /// The states within the first share of the time.
+    fn beginning(&self, problem: &Problem<'_>, share: f64) -> Self {
+        let n = problem.course.equations.n;
+        let [low, high] = self.span(problem);
+        let end = low + share * (high - low);
+        let kept: Vec<usize> = (0..self.places.len()).filter(|&at| self.place(problem, at).1 <= end).collect();
+        let of = |values: &[f64]| -> Vec<f64> {
+            kept.iter().filter_map(|at| values.get(at * n..(at + 1) * n)).flatten().copied().collect()
+        };
+        Self {
+            q: of(&self.q),
+            v: of(&self.v),
+            a: of(&self.a),
+            force: of(&self.force),
+            a_error: of(&self.a_error),
+            places: kept.iter().map(|&at| self.places[at]).collect(),
+            weight: of(&self.weight),
+            share: of(&self.share),
+            ..*self
+        }
+    }
+
+    /// First and last time of a state.
+    fn span(&self, problem: &Problem<'_>) -> [f64; 2] {
+        let times = (0..self.places.len()).map(|at| self.place(problem, at).1);
+        times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)])
     }
 
     /// Change of constant `k` that turns the phase of the forces by about half a radian at the end of the recording; none of a constant
     /// whose effect does not grow with time.
     fn phase_step(&self, problem: &Problem<'_>, x: &[f64], k: usize) -> Option<f64> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
-        let times = || (0..self.places.len()).map(|at| self.time(problem, at));
-        let (low, high) = times().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+        let [low, high] = self.span(problem);
         let third = (high - low) / 3.0;
         let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
         self.residuals(problem, x, Met::Accelerations, |first, _, slopes| {
             for (row, slopes) in slopes.chunks_exact(2 * n + m).enumerate() {
-                let since = self.time(problem, (first + row) / n) - low;
+                let since = self.place(problem, (first + row) / n).1 - low;
                 let part = if since < third { 0 } else { 1 };
                 if since < third || since > 2.0 * third {
                     sums[part] += slopes[2 * n + k].powi(2);
@@ -310,7 +373,7 @@ impl States {
         self.batches_at(
             problem,
             x,
-            |_| low,
+            |at| (self.places[at].0, low),
             |_, range, a| {
                 all[range].iter_mut().zip(a).for_each(|(moved, still)| *moved -= still);
             },

@@ -57,6 +57,8 @@ pub(crate) struct Problem<'a> {
     pub sigma_of: Vec<Vec<f64>>,
     /// The same for every sample if known, `(samples, n)` by trajectory; otherwise empty.
     pub errors: &'a [Vec<f64>],
+    /// Readings of positions that are missing, `(samples, n)` of each track; empty if none is.
+    pub missing: &'a [Vec<bool>],
     /// First samples after long gaps, by trajectory: there the number of turns of an angle is unknown.
     pub gaps: Vec<Vec<usize>>,
     /// Spread of every coordinate over all samples.
@@ -155,6 +157,22 @@ impl Problem<'_> {
         }
     }
 
+    /// `true` for a position that was not read.
+    fn is_missing(&self, track: usize, sample: usize, i: usize) -> bool {
+        self.missing.get(track).and_then(|track| track.get(sample * self.n() + i)).is_some_and(|missing| *missing)
+    }
+
+    /// Number of positions of segments that were read.
+    pub fn readings(&self, segments: &[Segment]) -> f64 {
+        let n = self.n();
+        let of = |segment: &Segment| {
+            let (first, end) = (segment.first * n, (segment.first + segment.samples) * n);
+            let missing = self.missing.get(segment.track).and_then(|track| track.get(first..end));
+            end - first - missing.map_or(0, |part| part.iter().filter(|missing| **missing).count())
+        };
+        segments.iter().map(of).sum::<usize>() as f64
+    }
+
     /// `true` for a sample of a segment that follows a long gap.
     fn is_beyond_gap(&self, segment: &Segment, sample: usize) -> bool {
         let next = |gaps: &Vec<usize>| gaps.get(gaps.partition_point(|gap| *gap <= segment.first)).copied();
@@ -194,7 +212,7 @@ impl Problem<'_> {
                 let place = segment.first + sample;
                 let turned = self.is_beyond_gap(segment, place);
                 let measured = &self.course.recording.tracks[segment.track].q[place * n..][..n];
-                for i in 0..n {
+                for i in (0..n).filter(|i| !self.is_missing(segment.track, place, *i)) {
                     let at = lane * n + i;
                     let [offset, gain, delay] = sensors[i];
                     let late = delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
@@ -243,7 +261,7 @@ impl Problem<'_> {
             matrix: vec![0.0; width * width],
             right: vec![0.0; width],
             square: 0.0,
-            count: (segment.samples * n) as f64 - 2.0 * n as f64,
+            count: self.readings(std::slice::from_ref(*segment)) - 2.0 * n as f64,
         };
         let mut found: Vec<Linear> = segments.iter().map(empty).collect();
         self.residuals(x, segments, true, |lane, _, _, residual, row| {
@@ -297,10 +315,10 @@ impl Problem<'_> {
         found
     }
 
-    /// Residuals in units of noise, `(samples, n)` of each segment.
+    /// Residuals in units of noise, `(samples, n)` of each segment, `NaN` for readings that are missing.
     pub fn all_residuals(&self, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
         let n = self.n();
-        let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * n]).collect();
+        let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![f64::NAN; segment.samples * n]).collect();
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
         for batch in order.chunks(LANES).take_while(|_| self.cancellation.go_on()) {

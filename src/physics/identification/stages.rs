@@ -1,10 +1,11 @@
 //! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
 
-use super::choices::{check_errors, chosen, met, sensors};
+use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::innovations::Disturbances;
+use super::per_trajectory::per_trajectory;
 use super::pieces::{LEAST_SEGMENT, Pieces};
 use super::quality::{
     CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
@@ -12,11 +13,13 @@ use super::quality::{
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
-use super::ways::best_between;
+use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
+use crate::lagrangian::system::Range;
 use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::{Filled, Recording, deviation, filled, rms};
+use std::f64::consts::TAU;
 
 /// Smallest share of degrees of freedom that initial states and constants leave.
 const LEAST_LEFT: f64 = 0.25;
@@ -24,6 +27,8 @@ const LEAST_LEFT: f64 = 0.25;
 const PACES: f64 = 2.5;
 /// Largest number of samples that are followed.
 const MOST_SAMPLES: usize = 60_000;
+/// Relative change of the sum of squares up to which a full turn of a constant changes nothing.
+const SAME: f64 = 1e-6;
 /// Smallest noise that is assumed, over the spread of a coordinate: the accuracy of the integration.
 const LEAST_NOISE: f64 = 1e-9;
 /// Error of the integrator over the noise.
@@ -108,14 +113,20 @@ pub fn identify(
     recording: &Recording,
     options: &IdentifyOptions,
 ) -> Result<Identified, IdentifyError> {
+    if let Some((instance, options)) = per_trajectory(instance, recording, options)? {
+        return identify(&instance, recording, &options);
+    }
     let n = instance.coordinates;
     if recording.n() != n {
         return Err(IdentifyError::Coordinates { expected: n, found: recording.n() });
     }
     recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;
     check_errors(recording, &options.errors)?;
+    let inputs = inputs(instance, recording, options)?;
     let filled = filled(recording);
-    let repeated = filled.as_ref().map_or_else(Vec::new, repeated);
+    let mut repeated = filled.as_ref().map_or_else(Vec::new, repeated);
+    repeated.extend(missing(recording, &options.missing)?);
+    let filled = Filled::without(filled, recording, &options.missing);
     let recording = filled.as_ref().map_or(recording, |filled| &filled.recording);
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
@@ -141,6 +152,7 @@ pub fn identify(
         equations: &equations,
         chosen: chosen.len(),
         between: options.between.unwrap_or(Between::Linear),
+        inputs: inputs.clone(),
         step: pieces.step,
         substeps: 1,
     };
@@ -155,6 +167,7 @@ pub fn identify(
         sigma: noise.clone(),
         sigma_of: Vec::new(),
         errors: &options.errors,
+        missing: &options.missing,
         gaps: pieces.gaps(),
         spread,
         robust: options.robust,
@@ -164,7 +177,10 @@ pub fn identify(
     };
     stop.check()?;
     let mut x = given.clone();
-    let on_pieces = Problem { course: Course { recording: &pieces.long, ..problem.course.clone() }, ..problem.clone() };
+    let of_piece = |track: usize| inputs.get(pieces.origin(track, 0).0).copied();
+    let of_pieces = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
+    let course = Course { recording: &pieces.long, inputs: of_pieces, ..problem.course.clone() };
+    let on_pieces = Problem { course, missing: &[], ..problem.clone() };
     if met == Met::Forces {
         stop.stage("forces");
         let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
@@ -176,15 +192,13 @@ pub fn identify(
         return Ok(found.named(recording, options.robust));
     }
     let states = States::new(&on_pieces, &pieces.smoothed);
-    let fitted = match equations.timed {
-        _ if states.len(n) == 0 => true,
-        true => states.fit_in_time(&on_pieces, &mut x).is_some(),
-        false => states.fit(&on_pieces, &mut x, met).is_some(),
+    let cut = match equations.known {
+        _ if states.len(n) == 0 => Some(Vec::new()),
+        0 => states.fit(&on_pieces, &mut x, met).map(|_| Vec::new()),
+        _ => states.fit_in_time(&on_pieces, &mut x),
     };
     stop.check()?;
-    if !fitted {
-        return Err(IdentifyError::Singular);
-    }
+    let cut = cut.ok_or(IdentifyError::Singular)?;
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
     let samples = first_samples(&states, (n, pieces.step), options.segment)?;
     stop.stage("short segments");
@@ -196,7 +210,7 @@ pub fn identify(
         refit(&problem, &mut fitted, ITERATIONS);
     }
     // The noise of the forces is now known, so that the smoothest curve through it does not win.
-    let (best, rivals) = best_between(&mut problem, fitted, options, forced);
+    let (best, mut rivals) = best_between(&mut problem, fitted, &Rivals::all(options, forced || instance.has_inputs()));
     fitted = best;
     if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
         refit(&problem, &mut fitted, ITERATIONS);
@@ -219,7 +233,9 @@ pub fn identify(
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
     }
     refit(&problem, &mut fitted, LAST_ITERATIONS);
-    fitted = released(&problem, fitted, &given);
+    // Longer segments exclude more of the interpolations.
+    (fitted, rivals) = best_between(&mut problem, fitted, &rivals);
+    fitted = unturned(&problem, released(&problem, fitted, &given), &given);
     if !problem.sigma_of.is_empty() {
         let own = |i: usize| {
             let squares = recording.tracks.iter().zip(&pieces.noise_of);
@@ -236,7 +252,12 @@ pub fn identify(
         let coordinate = recording.coordinates[0].clone();
         (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
     }
-    found.obstacles = [pieces.still, repeated].concat();
+    let searched = |(k, [low, high]): &(usize, [f64; 2])| {
+        let symbol = &instance.system.parameters[problem.chosen[*k]].symbol;
+        let [low, high] = [low, high].map(|x| rounded(*x, 4));
+        format!("{symbol} was searched from {low} to {high}; begin nearer if it may lie outside")
+    };
+    found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect()].concat();
     rivals.widen(&mut found);
     Ok(found.named(recording, options.robust))
 }
@@ -342,6 +363,23 @@ fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     if better { tried } else { fitted }
 }
 
+/// The fit with constants that are known up to full turns, such as a phase, brought next to their given values.
+fn unturned(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted {
+    for (k, &parameter) in problem.chosen.iter().enumerate().filter(|(_, k)| problem.ranges[**k] == Range::Any) {
+        let turns = ((fitted.x[k] - given[k]) / TAU).round();
+        let mut tried = fitted.x.clone();
+        tried[k] -= turns * TAU;
+        if turns != 0.0 && turns.is_finite() {
+            let square = problem.normal_at(&tried, &fitted.segments).square;
+            if (square - fitted.normal.square).abs() <= SAME * fitted.normal.square {
+                tracing::debug!(parameter, turns, "full turns");
+                fitted.x = tried;
+            }
+        }
+    }
+    fitted
+}
+
 pub(super) fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
     fitted.substeps = problem.course.substeps;
     fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
@@ -383,7 +421,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
 fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
     let (n, tracks) = (problem.sigma.len(), problem.course.recording.tracks.len());
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
-    let taken = fitted.normal.count / residuals.iter().map(|r| r.len() as f64).sum::<f64>();
+    let taken = fitted.normal.count / problem.readings(&fitted.segments);
     // Residuals in the units of the coordinates, `(tracks, n)`.
     let mut own = vec![Vec::new(); tracks * n];
     for (segment, residuals) in fitted.segments.iter().zip(&residuals) {
@@ -531,7 +569,7 @@ fn result(
     let recording = problem.course.recording;
     let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
-    let numbers: f64 = residuals.iter().map(|r| r.len() as f64).sum();
+    let numbers = problem.readings(&fitted.segments);
     let taken = (fitted.normal.count - fitted.x.len() as f64).max(1.0) / numbers;
     let weighing = Weighing::of(&residuals, problem.robust, taken);
     let follow: Vec<Correlation> =
@@ -592,7 +630,8 @@ fn result(
         segments: fitted.segments.len(),
         segment_seconds,
         substeps: fitted.substeps,
-        between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
+        between: (instance.has_inputs() || recording.tracks.iter().any(|track| !track.force.is_empty()))
+            .then_some(problem.course.between),
         ..unknowns(
             instance,
             problem,
@@ -641,7 +680,7 @@ fn informed(
     let inflation = (mean / plain).max(1.0);
     // Initial states and constants use up as many of a few independent numbers as of many: correlated residuals fall below the noise by more
     // than independent ones.
-    let numbers: f64 = fitted.segments.iter().map(|segment| (segment.samples * problem.sigma.len()) as f64).sum();
+    let numbers = problem.readings(&fitted.segments);
     let taken = (numbers - fitted.normal.count + m as f64) / numbers;
     let hidden = (1.0 - taken) / (1.0 - taken * inflation).max(LEAST_LEFT);
     seen.iter_mut().for_each(|x| *x *= hidden);

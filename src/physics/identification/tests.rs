@@ -5,6 +5,7 @@ use crate::lagrangian::{Description, SystemInstance, configure, configure_system
 use crate::random::RngStream;
 use crate::recording::{RecordedTrajectory, Recording};
 use crate::rollout::{Driven, Motion, Options, SampledForce};
+use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 
@@ -80,6 +81,55 @@ fn constants_of_a_double_pendulum_lie_within_their_errors() {
     }
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     assert!((0.2..2.2).contains(&mean) && squares.iter().all(|s| *s < 16.0), "{squares:?}");
+}
+
+#[test]
+fn readings_may_be_missing() {
+    let truth = [("m2", 0.6), ("l1", 0.8), ("l2", 1.3)];
+    let instance = configure::<f64>("double-pendulum", &given(&truth)).unwrap();
+    let form = configure::<f64>("double-pendulum", &[]).unwrap();
+    let constants = || ["m2", "l1", "l2"].map(String::from).to_vec();
+    let (mut squares, mut explained) = (Vec::new(), 0);
+    for seed in 0..4 {
+        let recording = recorded(&instance, &STARTS, (3.0, 0.02), &[2e-3, 3e-3], seed);
+        // Of the second angle two of three are missing, of the first one of five; what stands in their place says nothing.
+        let mut rng = RngStream::Region.generator(seed);
+        let mut lossy = recording.clone();
+        let mut missing = Vec::new();
+        for track in &mut lossy.tracks {
+            let lost: Vec<bool> = (0..track.q.len()).map(|k| rng.random::<f64>() < [0.2, 0.66][k % 2]).collect();
+            track.q.iter_mut().zip(&lost).filter(|(_, lost)| **lost).for_each(|(q, _)| *q = f64::NAN);
+            assert_eq!(track.fill_missing(2).as_ref(), Ok(&lost));
+            missing.push(lost);
+        }
+        let full =
+            identify(&form, &recording, &IdentifyOptions { constants: constants(), ..Default::default() }).unwrap();
+        let options = IdentifyOptions { constants: constants(), missing, ..Default::default() };
+        let found = identify(&form, &lossy, &options).unwrap();
+        // A wrong form, l2 = 1 m, does not fit what is left.
+        if seed == 0 {
+            let few = IdentifyOptions { constants: constants()[..2].to_vec(), ..options };
+            assert!(!identify(&form, &lossy, &few).unwrap().explained);
+        }
+        explained += usize::from(found.explained);
+        assert!(found.obstacles.iter().any(|text| text.starts_with("theta2: ") && text.contains("missing")));
+        for ((constant, full), (_, truth)) in found.constants.iter().zip(&full.constants).zip(truth) {
+            let (error, less) = (constant.standard_error.unwrap(), full.standard_error.unwrap());
+            assert!(error > 1.05 * less && error < 3.0 * less, "{constant:?} {full:?}");
+            squares.push(((constant.value - truth) / error).powi(2));
+        }
+        for (residual, noise) in found.residuals.iter().zip([2e-3, 3e-3]) {
+            assert!((residual.rms / noise - 1.0).abs() < 0.15, "{residual:?}");
+        }
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!(
+        explained >= 3 && (0.2..2.2).contains(&mean) && squares.iter().all(|s| *s < 16.0),
+        "{explained} {squares:?}"
+    );
+    let wrong = IdentifyOptions { missing: vec![vec![true; 3]], ..Default::default() };
+    let recording = recorded(&instance, &STARTS, (3.0, 0.02), &[2e-3, 3e-3], 0);
+    assert!(matches!(identify(&form, &recording, &wrong), Err(IdentifyError::Missing { found: 3, .. })));
 }
 
 #[test]

@@ -9,26 +9,30 @@ use super::{Between, IdentifyOptions};
 /// Increase of the sum of squares, in units of the variance, up to which an interpolation is not excluded: three standard deviations.
 const RIVAL: f64 = 9.0;
 
-/// Other interpolations that the motion does not exclude, and the largest difference of the unknowns for one of them.
+/// Interpolations that the motion does not exclude, the best first, and the largest difference of the unknowns for one of the others.
 #[derive(Default)]
 pub(super) struct Rivals {
-    names: Vec<&'static str>,
+    ways: Vec<Between>,
     farthest: Vec<f64>,
 }
 
-/// The fit with the interpolation of forces that fits the motion best.
-pub(super) fn best_between(
-    problem: &mut Problem<'_>,
-    fitted: Fitted,
-    options: &IdentifyOptions,
-    forced: bool,
-) -> (Fitted, Rivals) {
-    if !forced || options.between.is_some() {
+impl Rivals {
+    /// All interpolations of forces, if the options leave the choice open.
+    pub fn all(options: &IdentifyOptions, forced: bool) -> Self {
+        let open = forced && options.between.is_none();
+        Self { ways: if open { Between::ALL.to_vec() } else { Vec::new() }, farthest: Vec::new() }
+    }
+}
+
+/// The fit with that one of the interpolations that fits the motion best, and those that it does not exclude.
+pub(super) fn best_between(problem: &mut Problem<'_>, fitted: Fitted, rivals: &Rivals) -> (Fitted, Rivals) {
+    if rivals.ways.is_empty() {
         return (fitted, Rivals::default());
     }
     let mut best = 0;
-    let mut tried = vec![(problem.course.between, fitted)];
-    for between in [Between::Held, Between::Cubic, Between::BandLimited] {
+    let first = problem.course.between;
+    let mut tried = vec![(first, fitted)];
+    for between in rivals.ways.iter().copied().filter(|way| *way != first) {
         problem.course.between = between;
         let mut own = tried[best].1.clone();
         problem.settle(&own.x, &mut own.segments, 3);
@@ -42,9 +46,9 @@ pub(super) fn best_between(
     let (between, fitted) = tried.swap_remove(best);
     problem.course.between = between;
     let limit = fitted.normal.square + RIVAL * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
-    let mut rivals = Rivals { names: vec![between.name()], farthest: vec![0.0; fitted.x.len()] };
+    let mut rivals = Rivals { ways: vec![between], farthest: vec![0.0; fitted.x.len()] };
     for (between, own) in tried.iter().filter(|(_, own)| own.normal.failed == 0 && own.normal.square < limit) {
-        rivals.names.push(between.name());
+        rivals.ways.push(*between);
         let off = own.x.iter().zip(&fitted.x).map(|(own, best)| (own - best).abs());
         rivals.farthest.iter_mut().zip(off).for_each(|(most, off)| *most = most.max(off));
     }
@@ -69,7 +73,8 @@ impl Rivals {
             }
         }
         if !doubled.is_empty() {
-            let (ways, names) = (self.names.join(", "), doubled.join(", "));
+            let ways: Vec<&str> = self.ways.iter().map(|way| way.name()).collect();
+            let (ways, names) = (ways.join(", "), doubled.join(", "));
             found.obstacles.push(format!(
                 "forces between the samples may be {ways}: the standard errors of {names} include the difference"
             ));

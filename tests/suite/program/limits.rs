@@ -41,7 +41,7 @@ fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
 }
 
 /// Options of the commands below that take no number.
-const WORDS: [&str; 52] = [
+const WORDS: [&str; 53] = [
     "acceleration",
     "activation",
     "between",
@@ -61,6 +61,7 @@ const WORDS: [&str; 52] = [
     "name",
     "observer",
     "out",
+    "events",
     "param",
     "penalty",
     "periodic",

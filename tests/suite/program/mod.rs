@@ -7,6 +7,7 @@ mod constraints;
 mod conveniences;
 mod dissipation;
 mod driven;
+mod events;
 mod first_minute;
 mod fit;
 mod fit_resume;

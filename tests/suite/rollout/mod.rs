@@ -1,5 +1,6 @@
 //! Integrators.
 
 mod constraints;
+mod events;
 mod forces;
 mod integrators;

@@ -20,6 +20,10 @@ pub struct TrackBuilder {
     pub track: RecordedTrajectory,
     /// Standard deviations of its positions, `(samples, n)`; empty if there are none.
     pub error: Vec<f64>,
+    /// Inputs, `(samples, inputs)`; empty if there are none.
+    pub input: Vec<f64>,
+    /// Which readings of positions are missing, `(samples, n)`; empty if none is.
+    pub missing: Vec<bool>,
     /// The row before, as it stands in the file.
     last: Vec<f64>,
     last_row: u64,
@@ -38,6 +42,8 @@ pub struct Builder<'a> {
     pub tracks: Vec<TrackBuilder>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
+    /// Number of rows that are left out because a reading is missing, and the first one, with the column.
+    pub incomplete: (usize, Option<(u64, String)>),
 }
 
 impl<'a> Builder<'a> {
@@ -45,7 +51,17 @@ impl<'a> Builder<'a> {
     pub fn new(columns: &'a Columns, selection: Selection) -> Self {
         let periodic = columns.periodic();
         let (tracks, labels) = (Vec::new(), HashMap::new());
-        Self { columns, selection, periodic, current: 0, labels, expected: 0, tracks, duplicates: 0 }
+        Self {
+            columns,
+            selection,
+            periodic,
+            current: 0,
+            labels,
+            expected: 0,
+            tracks,
+            duplicates: 0,
+            incomplete: (0, None),
+        }
     }
 
     /// Which columns are used.
@@ -66,6 +82,9 @@ impl<'a> Builder<'a> {
     /// Adds a row: the used columns in the order of the selection, as they stand in the file, and the value that tells
     /// trajectories apart if there is such a column.
     pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {
+        if self.lacks(row, values) {
+            return Ok(());
+        }
         self.turn_to(row, label)?;
         let Some(open) = self.tracks.get_mut(self.current) else { return Ok(()) };
         let timed = usize::from(self.selection.timed);
@@ -96,7 +115,7 @@ impl<'a> Builder<'a> {
         let n = self.columns.coords.len();
         let mut scaled = values.iter().zip(&self.selection.values).map(|(x, used)| {
             let y = x * used.factor;
-            if y.is_finite() {
+            if y.is_finite() || x.is_nan() {
                 Ok(y)
             } else {
                 Err(Problem::Field { row, column: used.name.clone(), found: format!("{x} times {:e}", used.factor) })
@@ -112,9 +131,11 @@ impl<'a> Builder<'a> {
         }
         for (i, q) in scaled.by_ref().take(n).enumerate() {
             let q = q?;
-            let turns = match (self.periodic[i], sample) {
-                (true, 1..) => ((track.q[(sample - 1) * n + i] - q) / TAU).round(),
-                _ => 0.0,
+            // An angle goes on from its last reading.
+            let last = || track.q.iter().skip(i).step_by(n).rev().find(|q| !q.is_nan());
+            let turns = match self.periodic[i] && !q.is_nan() {
+                true => last().map_or(0.0, |last| ((last - q) / TAU).round()),
+                false => 0.0,
             };
             track.q.push(if turns == 0.0 { q } else { q + TAU * turns });
         }
@@ -127,14 +148,33 @@ impl<'a> Builder<'a> {
                 part.push(value?);
             }
         }
-        for (name, error) in self.columns.error.iter().zip(scaled) {
+        for (name, error) in self.columns.error.iter().zip(scaled.by_ref()) {
             let error = error?;
             if error <= 0.0 {
                 return Err(Problem::Error { row, column: name.clone(), found: error });
             }
             open.error.push(error);
         }
+        for value in scaled {
+            open.input.push(value?);
+        }
         Ok(())
+    }
+
+    /// Notes a row that lacks a reading and is left out for it. A trajectory that stays whole keeps rows with some of the positions.
+    fn lacks(&mut self, row: u64, values: &[f64]) -> bool {
+        let lacking = |x: &&f64| x.is_nan();
+        let Some(first) = values.iter().position(|x| x.is_nan()) else { return false };
+        let (start, n) = (usize::from(self.selection.timed), self.columns.coords.len());
+        let positions = values[start..start + n].iter().filter(lacking).count();
+        if self.columns.whole && positions < n && values.iter().filter(lacking).count() == positions {
+            return false;
+        }
+        let column = || self.selection.values[first].name.clone();
+        let (count, known) = &mut self.incomplete;
+        *count += 1;
+        known.get_or_insert_with(|| (row, column()));
+        true
     }
 
     /// Finds or begins the trajectory of a label.
@@ -165,8 +205,8 @@ impl<'a> Builder<'a> {
             force: room(force.len()),
             ..empty()
         };
-        let (rows, error, last) = (Rows::default(), Vec::new(), Vec::new());
-        self.tracks.push(TrackBuilder { label, rows, track, error, last, last_row: 0 });
+        let (rows, error, input, last) = (Rows::default(), Vec::new(), Vec::new(), Vec::new());
+        self.tracks.push(TrackBuilder { label, rows, track, error, input, missing: Vec::new(), last, last_row: 0 });
         Ok(())
     }
 }

@@ -160,7 +160,7 @@ impl<'a> Text<'a> {
         let (mut found, mut good, mut label) = (0, true, None);
         for field in self.separator.fields(text) {
             if let Some(slot) = self.slots.get(found).copied().flatten() {
-                match self.numbers.parse(field, row) {
+                match self.numbers.reading(field, row) {
                     Some(x) => lane.values[slot] = x,
                     None => good = false,
                 }
@@ -203,7 +203,7 @@ impl<'a> Text<'a> {
         }
         for (field, slot) in self.separator.fields(text).zip(&self.slots) {
             if let Some(slot) = slot
-                && self.numbers.parse(field, row).is_none()
+                && self.numbers.reading(field, row).is_none()
                 && let Some(lane) = self.lanes.first()
             {
                 let column = &lane.builder.selection().values[*slot].name;

@@ -125,6 +125,26 @@ pub enum Problem {
         /// Fields of the row.
         found: usize,
     },
+    /// Rows that lack a reading, more than those that do not.
+    #[error("row {row}, column {column}: no reading; {incomplete} rows lack one, and {whole} do not")]
+    Missings {
+        /// The first of them.
+        row: u64,
+        /// A column without a reading there.
+        column: String,
+        /// How many they are.
+        incomplete: usize,
+        /// How many others.
+        whole: usize,
+    },
+    /// A coordinate without any reading.
+    #[error("column {column}: no reading{}", label.as_ref().map_or(String::new(), |label| format!(" in trajectory {label}")))]
+    Unread {
+        /// The column.
+        column: String,
+        /// The trajectory.
+        label: Option<String>,
+    },
     /// A field that is not a finite number.
     #[error("row {row}, column {column}: expected a finite number, found {found:?}")]
     Field {

@@ -49,7 +49,7 @@ pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>
                     values[place] = source.element.decode(&buffer[(k * source.width + column) * size..][..size]);
                 }
             }
-            for (used, found) in builder.selection().used().zip(&values).filter(|(_, x)| !x.is_finite()) {
+            for (used, found) in builder.selection().used().zip(&values).filter(|(_, x)| x.is_infinite()) {
                 faults.add(Problem::Field { row, column: used.name.clone(), found: found.to_string() });
             }
             // Beside a mistake the others are looked for, and nothing is kept.

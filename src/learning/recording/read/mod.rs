@@ -89,6 +89,13 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
         let selection = builder.selection();
         reading.time = selection.time().map(ToString::to_string);
         reading.duplicates += builder.duplicates;
+        let (incomplete, first) = builder.incomplete.clone();
+        let whole: usize = builder.tracks.iter().map(|track| track.track.len()).sum();
+        // Most rows lack something where a file is read wrongly.
+        if let Some((row, column)) = first.filter(|_| incomplete > whole) {
+            return Err(Problem::Missings { row, column, incomplete, whole });
+        }
+        reading.incomplete += incomplete;
         for used in selection.used() {
             let name = selection.number.as_ref().and_then(|number| used.name.strip_suffix(number.as_str()));
             units.extend(used.unit.clone().map(|unit| (name.unwrap_or(&used.name).to_string(), unit)));
@@ -96,7 +103,11 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
         if reading.formats.is_empty() {
             reading.columns = builder.called();
         }
-        for track in builder.tracks {
+        for mut track in builder.tracks {
+            track.missing = track.track.fill_missing(columns.coords.len()).map_err(|i| {
+                let column = reading.columns.coords.get(i).or(columns.coords.get(i)).cloned().unwrap_or_default();
+                Problem::Unread { column, label: track.label.clone() }
+            })?;
             most = most.max(Some(pieces::add(&name, track, columns.whole, reading)));
         }
     }

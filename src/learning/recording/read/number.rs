@@ -4,6 +4,9 @@ use super::Problem;
 use super::encoding::decode;
 use super::text::{unquoted, with_point};
 
+/// Words that stand for a reading that is missing.
+const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
+
 /// Mark of the decimals of a file as far as it is known.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Numbers {
@@ -30,6 +33,15 @@ impl Numbers {
             }
             number => number,
         }
+    }
+
+    /// The same, `NaN` for a field without a reading: one that is empty or says so.
+    #[inline]
+    pub fn reading(&mut self, field: &[u8], row: u64) -> Option<f64> {
+        self.parse(field, row).or_else(|| {
+            let text = unquoted(std::str::from_utf8(field).ok()?.trim());
+            (text.is_empty() || MISSING.iter().any(|word| text.eq_ignore_ascii_case(word))).then_some(f64::NAN)
+        })
     }
 
     /// A number without a decimal comma.

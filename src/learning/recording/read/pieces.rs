@@ -16,7 +16,7 @@ const UNSURE: f64 = 1.5;
 /// A trajectory continues across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
 /// is a guess, and where gaps are longer, it is cut unless it is to stay whole.
 pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedRecording) -> usize {
-    let TrackBuilder { label, rows, mut track, error, .. } = builder;
+    let TrackBuilder { label, rows, mut track, error, input, missing, .. } = builder;
     let clock = Clock::of(&track.times);
     let mut bounds = vec![0];
     let mut turned = Vec::new();
@@ -73,6 +73,16 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
         reading.recording.tracks.push(part);
         if !error.is_empty() {
             reading.errors.push(error[start * n..end * n].to_vec());
+        }
+        if !input.is_empty() {
+            let count = input.len() / bounds[bounds.len() - 1];
+            reading.inputs.push(input[start * count..end * count].to_vec());
+        }
+        if !missing.is_empty() {
+            // Only of whole trajectories.
+            reading.missing.resize(reading.recording.tracks.len(), Vec::new());
+            let at = reading.missing.len() - 1;
+            reading.missing[at] = missing[start * n..end * n].to_vec();
         }
         reading.rows.push(rows.part(start, end));
         reading.takes.push(take);

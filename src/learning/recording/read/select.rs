@@ -82,8 +82,8 @@ impl Selection {
             return called;
         }
         let mut names = self.values.iter().map(|used| &used.name).skip(usize::from(self.timed));
-        let lists =
-            [&mut called.coords, &mut called.velocity, &mut called.acceleration, &mut called.force, &mut called.error];
+        let Columns { coords, velocity, acceleration, force, error, input, .. } = &mut called;
+        let lists = [coords, velocity, acceleration, force, error, input];
         for (name, found) in lists.into_iter().flatten().zip(&mut names) {
             name.clone_from(found);
         }
@@ -128,6 +128,7 @@ impl File<'_> {
             ("acceleration", &columns.acceleration),
             ("force", &columns.force),
             ("error", &columns.error),
+            ("input", &columns.input),
         ] {
             for (k, name) in list.iter().enumerate() {
                 let Some(mut used) = faults.good(self.find(what, name, &numbered(name))) else { continue };

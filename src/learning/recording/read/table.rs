@@ -51,7 +51,7 @@ impl RawTable {
         let has_names = names.iter().any(|name| name.parse::<f64>().is_err());
         let twice = names.iter().enumerate().any(|(k, name)| names[..k].contains(name));
         let names = if twice { (1..=names.len()).map(|k| k.to_string()).collect() } else { names };
-        let numbers = match rows(path, &asked(&names)) {
+        let numbers: Vec<Result<Vec<f64>, String>> = match rows(path, &asked(&names)) {
             Ok(rows) => columns(&rows, names.len()).into_iter().map(Ok).collect(),
             Err(problem) if names.len() > MOST => return Err(problem),
             Err(_) => names
@@ -59,6 +59,15 @@ impl RawTable {
                 .map(|name| rows(path, &asked(std::slice::from_ref(name))).map_err(|problem| problem.to_string()))
                 .collect(),
         };
+        // Columns that lack readings do not stand beside the others.
+        let most = numbers.iter().flatten().map(Vec::len).max().unwrap_or(0);
+        let beside = |column: Result<Vec<f64>, String>| {
+            column.and_then(|own| match most - own.len() {
+                0 => Ok(own),
+                missing => Err(format!("{missing} of {most} readings are missing")),
+            })
+        };
+        let numbers = numbers.into_iter().map(beside).collect();
         Ok(Self { names, numbers, has_names })
     }
 }

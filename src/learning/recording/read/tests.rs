@@ -113,7 +113,7 @@ fn wrong_columns_are_named() {
 #[test]
 fn wrong_rows_are_named() {
     let with = |line: &str| refusal(table("t,q1,q2", 20, &[(4, line)]), &coordinates("q1,q2"));
-    for bad in ["nan", "NaN", "inf", "-infinity", "1e999", "", "x", "0x10", "1_000", "1;2"] {
+    for bad in ["inf", "-infinity", "1e999", "x", "0x10", "1_000", "1;2"] {
         let expected = format!("row 6, column q1: expected a finite number, found {bad:?}");
         assert_eq!(with(&format!("0.4,{bad},4")), expected);
     }
@@ -253,9 +253,9 @@ fn arrays_of_all_kinds() {
     let content = npy("'<f8'", false, "(20, 3)", &bytes(&rows, f64::to_le_bytes));
     assert_eq!(read(&content, &named).unwrap().recording.tracks[0].q[6..8], expected);
     let mut broken = rows.clone();
-    broken[3 * 7 + 2] = f64::NAN;
+    broken[3 * 7 + 2] = f64::INFINITY;
     let content = npy("'<f8'", false, "(20, 3)", &bytes(&broken, f64::to_le_bytes));
-    assert_eq!(refusal(content, &named), "row 8, column y: expected a finite number, found \"NaN\"");
+    assert_eq!(refusal(content, &named), "row 8, column y: expected a finite number, found \"inf\"");
 }
 
 #[test]

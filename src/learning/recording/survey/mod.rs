@@ -77,6 +77,8 @@ pub struct Survey {
     pub(crate) tracks: Vec<TrajectorySurvey>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
+    /// Rows left out because a field is empty or `NaN`.
+    pub incomplete: usize,
     /// Short gaps in time, across which trajectories continue.
     pub bridged: Bridged,
     /// Long gaps in time, which cut trajectories.
@@ -164,6 +166,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         step: alone.step,
         tracks: tracks.collect(),
         duplicates: reading.duplicates,
+        incomplete: reading.incomplete,
         bridged: reading.bridged,
         cuts: reading.cuts.clone(),
         dropped: reading.dropped.clone(),

@@ -135,6 +135,10 @@ impl Survey {
             let rows = pluralize(self.duplicates, "row that repeats", "rows that repeat");
             findings.line(format!("left out: {rows} the row before"));
         }
+        if self.incomplete > 0 {
+            let rows = pluralize(self.incomplete, "row", "rows");
+            findings.line(format!("left out: {rows} with an empty field"));
+        }
         if self.bridged.gaps > 0 {
             let gaps = pluralize(self.bridged.gaps, "short gap", "short gaps");
             let rows = pluralize(self.bridged.rows, "row is", "rows are");

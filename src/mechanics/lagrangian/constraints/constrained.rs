@@ -335,8 +335,19 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        self.terms_at(&[], q, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let outcome = self.model.terms_at(t, q, v, request.without_solution(), terms);
         let n = self.model.coordinates();
-        let outcome = self.model.terms(q, v, request.without_solution(), terms);
         let found = terms.drain_failures(outcome)?;
         if terms.constraints > 0 {
             let (what, expected) = ("constraints of the model beneath", 0);

@@ -4,21 +4,24 @@
 //! the header of a model file.
 
 mod chain;
+mod events;
 #[cfg(feature = "serde")]
 pub(crate) mod pair;
+mod per_trajectory;
 mod quantity;
 #[cfg(feature = "serde")]
 mod read;
 mod system;
 
-use super::ExpressionLagrangian;
 use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
+use super::formula_events::FormulaEvent;
 use super::formula_forces::FormulaForces;
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
+use super::{ExpressionLagrangian, Lagrangian};
 use crate::scalar::Real;
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -26,6 +29,9 @@ use chain::{ChainDescription, LinkDescription};
 #[cfg(feature = "cli")]
 pub(crate) use chain::{ShownLink, turned};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
+use events::EventDescription;
+pub use per_trajectory::Per;
+pub(crate) use per_trajectory::PerTrajectory;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -50,9 +56,18 @@ pub struct Description {
     /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<String>,
-    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names and of the time `t`.
+    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names, of the time `t` and of inputs.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub forces: BTreeMap<String, String>,
+    /// Measured quantities in the forces, such as the voltage of a motor, and their units.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub inputs: BTreeMap<String, String>,
+    /// Inputs that do not change along a motion, so that all formulas may depend on them.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    marks: BTreeSet<String>,
+    /// Zeros of formulas that a roll-out finds, by name: of the same names and of the time `t`.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    events: BTreeMap<String, EventDescription>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -155,6 +170,12 @@ pub struct ParameterDescription {
     /// `true` if its value is to be found by the training.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "is_false"))]
     pub learn: bool,
+    /// What has a value of its own; nothing for one value.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub per: Option<Per>,
+    /// Values that are known, by the names of the trajectories.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "BTreeMap::is_empty"))]
+    pub known: BTreeMap<String, Decimal>,
 }
 
 /// Motions on which a model is tried.
@@ -213,7 +234,10 @@ impl Description {
         };
         let parameter = |(symbol, default, unit, range): (&str, &str, &str, Range)| {
             let (default, unit) = (Decimal(default.to_string()), unit.to_string());
-            (symbol.to_string(), ParameterDescription { default, unit, range, learn: false })
+            (
+                symbol.to_string(),
+                ParameterDescription { default, unit, range, learn: false, per: None, known: BTreeMap::new() },
+            )
         };
         Self {
             name: name.to_string(),
@@ -222,6 +246,9 @@ impl Description {
             lagrangian: Some(lagrangian),
             dissipation: None,
             forces: BTreeMap::new(),
+            inputs: BTreeMap::new(),
+            marks: BTreeSet::new(),
+            events: BTreeMap::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),
@@ -282,12 +309,15 @@ pub struct Described {
     pub description: Description,
     /// The description with its links, if it has any.
     written: Option<Description>,
-    /// Its Lagrangian; parameters in the order of their names.
+    /// Its Lagrangian; parameters in the order of their names. If it or the forces depend on the time, this is a coordinate behind the others,
+    /// and inputs are coordinates behind the time.
     pub lagrangian: ExpressionLagrangian,
     /// Its dissipation function, if it has one; parameters as the Lagrangian's.
     pub dissipation: Option<ExpressionLagrangian>,
     /// Its forces, if there are any; parameters as the Lagrangian's.
     pub(super) forces: Option<FormulaForces>,
+    /// Its events; parameters as the Lagrangian's.
+    pub(super) events: Arc<[FormulaEvent]>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
     /// `true` if these are known to be independent: nothing has to be examined.
@@ -301,6 +331,11 @@ pub struct Described {
 }
 
 impl Described {
+    /// `true` if the Lagrangian or forces depend on the time, or on inputs.
+    pub fn is_timed(&self) -> bool {
+        Lagrangian::coordinates(&self.lagrangian) > self.description.coordinates.len()
+    }
+
     /// `true` if it was written as a chain of links.
     pub fn is_chain(&self) -> bool {
         self.written.is_some()

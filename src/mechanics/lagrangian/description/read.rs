@@ -1,13 +1,15 @@
 //! Numbers of a description as a file has them.
 
-use super::ParameterDescription;
+use super::events::{Consequence, Word};
 use super::quantity::{Decimal, Quantity};
+use super::{ParameterDescription, Per};
 use crate::lagrangian::expression::quantity;
 use crate::lagrangian::system::Range;
+use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use core::fmt;
 use serde::Deserialize;
-use serde::de::value::MapAccessDeserializer;
+use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
 
 /// A number or a text, as text.
@@ -63,6 +65,9 @@ struct ParameterTable {
     range: Range,
     #[serde(default)]
     learn: bool,
+    per: Option<Per>,
+    #[serde(default)]
+    known: BTreeMap<String, Decimal>,
 }
 
 struct NumberOrTable;
@@ -71,7 +76,7 @@ impl<'de> Visitor<'de> for NumberOrTable {
     type Value = ParameterDescription;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number, or a table { default, unit, range, learn }")
+        f.write_str("a number, or a table { default, unit, range, learn, per, known }")
     }
     fn visit_f64<E: Error>(self, value: f64) -> Result<ParameterDescription, E> {
         Ok(alone(value.to_string()))
@@ -86,18 +91,58 @@ impl<'de> Visitor<'de> for NumberOrTable {
         Ok(alone(value.to_string()))
     }
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ParameterDescription, A::Error> {
-        let ParameterTable { default, unit, range, learn } =
+        let ParameterTable { default, unit, range, learn, per, known } =
             ParameterTable::deserialize(MapAccessDeserializer::new(map))?;
-        Ok(ParameterDescription { default, unit, range, learn })
+        if per.is_none() && !known.is_empty() {
+            return Err(A::Error::custom("known: values by trajectory need `per = \"trajectory\"`"));
+        }
+        Ok(ParameterDescription { default, unit, range, learn, per, known })
     }
 }
 
 fn alone(default: String) -> ParameterDescription {
-    ParameterDescription { default: Decimal(default), unit: super::one(), range: Range::Any, learn: false }
+    ParameterDescription {
+        default: Decimal(default),
+        unit: super::one(),
+        range: Range::Any,
+        learn: false,
+        per: None,
+        known: BTreeMap::new(),
+    }
 }
 
 impl<'de> Deserialize<'de> for ParameterDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(NumberOrTable)
+    }
+}
+
+/// The table of an impact.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImpactTable {
+    restitution: Decimal,
+}
+
+struct WordOrTable;
+
+impl<'de> Visitor<'de> for WordOrTable {
+    type Value = Consequence;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"mark\", \"stop\", or a table { restitution }")
+    }
+    fn visit_str<E: Error>(self, value: &str) -> Result<Consequence, E> {
+        Word::deserialize(StrDeserializer::new(value)).map(Consequence::Named)
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Consequence, A::Error> {
+        let ImpactTable { restitution } = ImpactTable::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(Consequence::Impact { restitution })
+    }
+}
+
+impl<'de> Deserialize<'de> for Consequence {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WordOrTable)
     }
 }

@@ -26,13 +26,26 @@ const MAX_NAMES: usize = 256;
 /// Constants of a link and its joint.
 const CONSTANTS: usize = 13;
 
-/// Name of the time in formulas of forces.
+/// Name of the time in formulas.
 const TIME: &str = "t";
 
 type Outcome<T> = Result<T, DescriptionError>;
 
 /// Demand of the mass shell, in words.
 const SHELL: &str = "from the mass shell g(v, v) = -1, to the future";
+
+/// Refuses what no formula can call by its name.
+fn check_name(key: String, name: &str) -> Outcome<()> {
+    if !is_name(name) {
+        let problem =
+            format!("{name:?} is not a valid name: expected a letter or _, then letters, digits and _, 64 at most");
+        return Err(DescriptionError::new(key, problem));
+    }
+    match is_reserved(name) {
+        true => Err(DescriptionError::new(key, format!("`{name}` is a function or constant of formulas"))),
+        false => Ok(()),
+    }
+}
 
 impl Description {
     /// The system, its Lagrangian ready to be evaluated.
@@ -69,8 +82,9 @@ impl Description {
         let written = (self != *written).then(|| written.clone());
         let n = self.coordinates.len();
         let mut compiler = Compiler::default();
-        let mut scope = self.scope()?;
+        let (mut scope, timed) = self.scope()?;
         self.define(&mut compiler, &mut scope)?;
+        let size = (n + if timed { 1 + self.inputs.len() } else { 0 }, self.parameters.len());
         let time_like = self.time_like()?;
         let (value, shell) = match (&self.lagrangian, &self.metric) {
             (Some(text), None) => (self.written(text, &mut compiler, &scope)?, None),
@@ -90,7 +104,8 @@ impl Description {
             }
         };
         let dissipation = self.friction(&mut compiler, &scope)?;
-        let forces = self.forces(&mut compiler, &scope)?;
+        let forces = self.forces(&mut compiler, &scope, size)?;
+        let events = self.compiled_events(&mut compiler, &scope)?.into();
         let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
@@ -120,10 +135,10 @@ impl Description {
             described: Some(Arc::new(Described {
                 description: self.clone(),
                 written,
-                lagrangian: ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value)),
-                dissipation: dissipation
-                    .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),
+                lagrangian: ExpressionLagrangian::compiled(size, compiler.formula(value)),
+                dissipation: dissipation.map(|value| ExpressionLagrangian::compiled(size, compiler.formula(value))),
                 forces,
+                events,
                 constraints,
                 independent: catalogued,
                 chain,
@@ -141,12 +156,14 @@ impl Description {
             let problem = "expected a name of 1 to 64 letters, digits, `-` and `_`";
             return Err(DescriptionError::new("name", problem));
         }
+        let inputs = self.inputs.iter().map(|(name, unit)| (format!("inputs.{name}"), unit));
         let units = self.coordinates.iter().enumerate().map(|(i, c)| (format!("coordinates[{i}].unit"), &c.unit));
         let parameters = self.parameters.iter().map(|(name, p)| (format!("parameters.{name}.unit"), &p.unit));
         let texts = self.title.iter().map(|title| ("title".to_string(), title));
         let texts = texts
             .chain(self.time_unit.iter().map(|unit| ("time_unit".to_string(), unit)))
             .chain(units)
+            .chain(inputs)
             .chain(parameters);
         for (key, text) in texts {
             if text.is_empty() || text.chars().count() > 100 || text.chars().any(char::is_control) {
@@ -167,7 +184,9 @@ impl Description {
         let counts = [
             ("parameters", self.parameters.len(), MAX_NAMES + of_links),
             ("definitions", self.definitions.len(), MAX_NAMES),
+            ("inputs", self.inputs.len(), MAX_NAMES),
             ("constraints", self.constraints.len(), MAX_NAMES),
+            ("events", self.events.len(), MAX_NAMES),
         ];
         for (key, count, most) in counts {
             if count > most {
@@ -177,19 +196,12 @@ impl Description {
         Ok(())
     }
 
-    /// Meaning of the names of coordinates, velocities and parameters.
-    fn scope(&self) -> Outcome<BTreeMap<String, Meaning>> {
+    /// Meaning of the names of coordinates, velocities and parameters, and of `t`, the time, if nothing else has this name; whether equations
+    /// of motion depend on it.
+    fn scope(&self) -> Outcome<(BTreeMap<String, Meaning>, bool)> {
         let mut scope = BTreeMap::new();
         let mut add = |key: String, name: &str, meaning: Meaning| {
-            if !is_name(name) {
-                let problem = format!(
-                    "{name:?} is not a valid name: expected a letter or _, then letters, digits and _, 64 at most"
-                );
-                return Err(DescriptionError::new(key, problem));
-            }
-            if is_reserved(name) {
-                return Err(DescriptionError::new(key, format!("`{name}` is a function or constant of formulas")));
-            }
+            check_name(key.clone(), name)?;
             match scope.insert(name.to_string(), meaning) {
                 Some(_) => Err(DescriptionError::new(key, format!("the name `{name}` is taken"))),
                 None => Ok(()),
@@ -207,12 +219,19 @@ impl Description {
         for (i, name) in self.parameters.keys().enumerate() {
             add(format!("parameters.{name}"), name, Meaning::Parameter(i))?;
         }
+        let timed = self.is_timed();
+        if !self.time_is_taken() {
+            add("lagrangian".to_string(), TIME, Meaning::Position(self.coordinates.len()))?;
+        }
+        for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| self.marks.contains(*name)) {
+            add(format!("inputs.{name}"), name, Meaning::Position(self.coordinates.len() + 1 + k))?;
+        }
         // Taken, though without a meaning yet.
         for name in self.definitions.keys() {
             add(format!("definitions.{name}"), name, Meaning::Parameter(usize::MAX))?;
         }
         scope.retain(|name, _| !self.definitions.contains_key(name));
-        Ok(scope)
+        Ok((scope, timed))
     }
 
     /// Compiles the definitions, each after those that it needs.
@@ -272,15 +291,15 @@ impl Description {
         Ok(Some(value))
     }
 
-    /// The generalized forces; `t` is the time in them, unless it is the name of something else.
-    fn forces(&self, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Option<FormulaForces>> {
-        let size = (self.coordinates.len(), self.parameters.len());
-        let mut scope = scope.clone();
-        let is_free = !scope.contains_key(TIME);
-        if is_free {
-            scope.insert(TIME.to_string(), Meaning::Parameter(size.1));
-        }
-        let (mut formulas, mut timed) = (Vec::new(), false);
+    /// The generalized forces, functions of so many coordinates and parameters.
+    fn forces(
+        &self,
+        compiler: &mut Compiler,
+        scope: &BTreeMap<String, Meaning>,
+        size: (usize, usize),
+    ) -> Outcome<Option<FormulaForces>> {
+        let mut formulas = Vec::new();
+        let scope = &self.with_inputs(scope)?;
         for (name, text) in &self.forces {
             let key = format!("forces.{name}");
             let names = || self.coordinates.iter().map(|c| c.name.as_str());
@@ -288,11 +307,63 @@ impl Description {
             let place = place
                 .ok_or_else(|| DescriptionError::new(&key, unknown("coordinate", name, names().collect::<Vec<_>>())))?;
             let expression: Expression = text.parse().map_err(DescriptionError::formula(&key))?;
-            timed |= is_free && expression.names().any(|used| used == TIME);
-            let value = compiler.add(&expression, &scope, false).map_err(DescriptionError::formula(&key))?;
+            let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula(&key))?;
             formulas.push((place, compiler.formula(value)));
         }
-        Ok((!formulas.is_empty()).then(|| FormulaForces::compiled(size, formulas, timed)))
+        Ok((!formulas.is_empty()).then(|| FormulaForces::compiled(size, formulas)))
+    }
+
+    /// The names of forces: inputs beside all others.
+    fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
+        let mut scope = scope.clone();
+        for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| !self.marks.contains(*name)) {
+            let key = || format!("inputs.{name}");
+            check_name(key(), name)?;
+            if name == TIME || scope.insert(name.clone(), Meaning::Position(self.coordinates.len() + 1 + k)).is_some() {
+                return Err(DescriptionError::new(key(), format!("the name `{name}` is taken")));
+            }
+            let is_used = |text: &String| {
+                text.parse::<Expression>().is_ok_and(|formula| formula.names().any(|used| used == name))
+            };
+            if !self.forces.values().any(is_used) {
+                return Err(DescriptionError::new(key(), "expected it in a formula of [forces]"));
+            }
+        }
+        Ok(scope)
+    }
+
+    /// `true` if there are inputs, or if the Lagrangian, the dissipation function or forces depend on the time `t`, which nothing else may be
+    /// called.
+    fn is_timed(&self) -> bool {
+        let metric = self.metric.iter().flat_map(|entries| entries.values());
+        let mut texts = self.lagrangian.iter().chain(&self.dissipation).chain(self.forces.values()).chain(metric);
+        !self.inputs.is_empty() || !self.time_is_taken() && texts.any(|text| self.names_time(text))
+    }
+
+    /// `true` if something else is called `t`.
+    fn time_is_taken(&self) -> bool {
+        let names = self.coordinates.iter().map(|coordinate| &coordinate.name);
+        names.chain(self.parameters.keys()).chain(self.definitions.keys()).any(|name| name == TIME)
+    }
+
+    /// `true` if `t` is in a formula, or in a definition that it needs.
+    fn names_time(&self, text: &str) -> bool {
+        let (mut texts, mut seen) = (vec![text], BTreeSet::new());
+        while let Some(text) = texts.pop() {
+            // A mistake in it is reported where it is compiled.
+            let Ok(expression) = text.parse::<Expression>() else { continue };
+            for name in expression.names() {
+                if name == TIME {
+                    return true;
+                }
+                if let Some((name, text)) = self.definitions.get_key_value(name)
+                    && seen.insert(name.as_str())
+                {
+                    texts.push(text);
+                }
+            }
+        }
+        false
     }
 
     /// The formulas that vanish.
@@ -308,6 +379,12 @@ impl Description {
             if name.is_empty() || name.chars().count() > 100 || name.chars().any(char::is_control) {
                 return Err(DescriptionError::new("constraints", "expected names of 1 to 100 characters on one line"));
             }
+        }
+        if !self.time_is_taken()
+            && let Some((name, _)) = self.constraints.iter().find(|(_, text)| self.names_time(text))
+        {
+            let problem = "expected a formula without the time `t`: put what moves by a known law into the Lagrangian";
+            return Err(DescriptionError::new(format!("constraints.{name}"), problem));
         }
         let size = (self.coordinates.len(), self.parameters.len());
         let formulas = self.constraints.iter().map(|(name, text)| (name.as_str(), text.as_str()));

@@ -5,6 +5,7 @@ use crate::lagrangian::description::quantity::Decimal;
 use crate::lagrangian::description::{Description, DescriptionError, ParameterDescription};
 use crate::lagrangian::recursion::Joint;
 use crate::lagrangian::system::Range;
+use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
@@ -182,6 +183,8 @@ impl Description {
                 unit: (*unit).to_string(),
                 range: Range::Any,
                 learn: true,
+                per: None,
+                known: BTreeMap::new(),
             };
             self.parameters.insert(format!("{name}{number}"), own);
         }

@@ -1,0 +1,118 @@
+//! Events of a description: formulas whose zeros a roll-out finds.
+
+use super::quantity::Decimal;
+use super::{Description, DescriptionError};
+use crate::lagrangian::expression::{Compiler, Expression, Formula, Meaning, Value};
+use crate::lagrangian::formula_events::FormulaEvent;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// An event: where a formula vanishes along a motion, and what happens there.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
+pub struct EventDescription {
+    /// Formula of coordinates, velocities, the time `t`, parameters and definitions; its zero is the event.
+    when: String,
+    /// Only where it falls through 0.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "super::is_false"))]
+    falling: bool,
+    /// Only where it rises through 0.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "super::is_false"))]
+    rising: bool,
+    /// The motion ends when this has happened so many times.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    after: Option<usize>,
+    /// What happens.
+    #[cfg_attr(feature = "serde", serde(default))]
+    then: Consequence,
+}
+
+/// What an event does to the motion.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize), serde(untagged))]
+pub enum Consequence {
+    /// Something that a word says.
+    Named(Word),
+    /// An impact on the surface where the formula vanishes.
+    Impact {
+        /// The speed after over the speed before, along the normal: a number or a formula.
+        restitution: Decimal,
+    },
+}
+
+/// What an event without an impact does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "lowercase"))]
+pub enum Word {
+    /// It is recorded.
+    Mark,
+    /// The motion ends.
+    Stop,
+}
+
+impl Default for Consequence {
+    fn default() -> Self {
+        Self::Named(Word::Mark)
+    }
+}
+
+impl Description {
+    /// The events.
+    pub(super) fn compiled_events(
+        &self,
+        compiler: &mut Compiler,
+        scope: &BTreeMap<String, Meaning>,
+    ) -> Result<Vec<FormulaEvent>, DescriptionError> {
+        let mut read = |key: &str, text: &str, still: bool| -> Result<Formula, DescriptionError> {
+            let expression: Expression = text.parse().map_err(DescriptionError::formula(key))?;
+            let value: Value = compiler.add(&expression, scope, still).map_err(DescriptionError::formula(key))?;
+            Ok(compiler.formula(value))
+        };
+        let mut events = Vec::with_capacity(self.events.len());
+        for (name, event) in &self.events {
+            let key = |part: &str| format!("events.{name}.{part}");
+            if name.is_empty() || name.chars().count() > 100 || name.chars().any(char::is_control) {
+                return Err(DescriptionError::new("events", "expected names of 1 to 100 characters on one line"));
+            }
+            if event.after == Some(0) {
+                return Err(DescriptionError::new(key("after"), "expected a number of times, at least 1"));
+            }
+            let impact = if let Consequence::Impact { restitution } = &event.then { Some(restitution) } else { None };
+            let when = read(&key("when"), &event.when, impact.is_some())?;
+            let restitution = match impact {
+                Some(Decimal(text)) => {
+                    let formula = read(&key("then.restitution"), text, false)?;
+                    self.check_restitution(&formula).map_err(|e| DescriptionError::new(key("then.restitution"), e))?;
+                    Some(formula)
+                }
+                None => None,
+            };
+            let stops = event.then == Consequence::Named(Word::Stop);
+            let either = event.falling == event.rising;
+            events.push(FormulaEvent {
+                name: name.clone(),
+                falling: event.falling || either,
+                rising: event.rising || either,
+                last: event.after.or(stops.then_some(1)),
+                when,
+                restitution,
+            });
+        }
+        Ok(events)
+    }
+
+    /// Refuses a coefficient of restitution that the defaults of the parameters put out of its range; one that depends on the state is not
+    /// known here.
+    fn check_restitution(&self, formula: &Formula) -> Result<(), String> {
+        let value = |text: &str| text.trim().parse().unwrap_or(f64::NAN);
+        let defaults: Vec<f64> = self.parameters.values().map(|parameter| value(&parameter.default.0)).collect();
+        let found: f64 = formula.evaluate(&defaults, &[], &[]);
+        match found.is_nan() || (0.0..=1.0).contains(&found) {
+            true => Ok(()),
+            false => Err(format!("expected a number from 0 to 1, found {found}")),
+        }
+    }
+}

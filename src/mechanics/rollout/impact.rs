@@ -1,0 +1,198 @@
+//! What a motion does where an event happens: it is recorded, ends, or its velocities change by an impact.
+
+use super::crossing::{Dense, Found, Watcher, side};
+use super::event::{Event, Impact, Occurrence, When};
+use super::run::into_error;
+use super::{RolloutError, StepFailure};
+use crate::lagrangian::{Manifold, MechanicsError, Request, dot, project};
+use crate::linalg::Workspace;
+use crate::scalar::{Real, Scalar};
+
+/// Impacts of one event, each sooner after the one before than time resolves, that are taken one by one.
+const QUICK: usize = 16;
+
+/// The impacts of an event so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Flights<S> {
+    /// Time of the last one, and the time between it and the one before.
+    last: Option<S>,
+    between: Option<S>,
+    /// Place of the first one of those that follow each other sooner than time resolves, and their number.
+    since: Option<usize>,
+    quick: usize,
+}
+
+impl<S: Scalar> Watcher<'_, S> {
+    /// `true` if the motion does not simply go on where a crossing happens: at an impact, and where it ends.
+    pub(super) fn interrupts(&self, found: &Found<S>) -> bool {
+        let Event { restitution, last, .. } = &self.events[found.event];
+        let ends = last.is_some_and(|last| self.counts[found.event] + 1 >= last);
+        restitution.is_some() || ends || self.happened.len() >= self.most
+    }
+
+    /// The first event within a step that interrupts the motion, and its share of the step. Those before it are marked, their states brought to
+    /// the constraints.
+    pub(super) fn interruption(
+        &mut self,
+        manifold: Option<&dyn Manifold<S>>,
+        time: &dyn Fn(S) -> S,
+        dense: &mut Dense<'_, S>,
+    ) -> Option<(Found<S>, S)> {
+        let (n, mut from) = (self.normal.len(), <S as Real>::zero());
+        while let Some(found) = self.first(from, time, dense) {
+            from = self.share(&found);
+            if self.interrupts(&found) {
+                return Some((found, from));
+            }
+            let mut state = vec![<S as Real>::zero(); 2 * n];
+            dense(from, &mut state);
+            let mut shown = state.clone();
+            let (q, v) = shown.split_at_mut(n);
+            // It stays where it is if the constraints are too far away.
+            let _ = manifold.map(|manifold| project(manifold, q, v));
+            self.mark(found, time(from), [&state, &shown]);
+        }
+        None
+    }
+
+    /// Lets a crossing happen that does not interrupt the motion, at a state that is recorded as `shown`.
+    pub(super) fn mark(&mut self, found: Found<S>, t: S, [state, shown]: [&[S]; 2]) {
+        self.record(found.event, t, shown, None);
+        self.follow(t, state);
+        self.goes_on(found, !found.above);
+    }
+
+    /// Lets a crossing happen at a time and state `(q, v)`, whose velocities an impact changes.
+    ///
+    /// # Errors
+    /// [`RolloutError::Event`] of an impact that is not determined, or of events that accumulate; those of the model.
+    pub(super) fn strike(&mut self, found: Found<S>, t: S, state: &mut [S]) -> Result<(), RolloutError> {
+        let Found { event, above, .. } = found;
+        if self.happened.len() >= self.most {
+            let problem = format!("it is one of more than {}, as many as steps are allowed", self.most);
+            return Err(self.refused(event, t, state, problem));
+        }
+        let Some(restitution) = self.events[event].restitution.clone() else {
+            self.mark(found, t, [state, state]);
+            return Ok(());
+        };
+        self.impact((event, above), t, state, restitution.as_ref())?;
+        self.follow(t, state);
+        self.goes_on(found, above);
+        Ok(())
+    }
+
+    /// After an event the motion is on a side of its zero.
+    fn goes_on(&mut self, found: Found<S>, above: bool) {
+        self.fired = Some(found.event);
+        self.sides[found.event] = Some(above);
+        self.next.clone_from(&self.sides);
+    }
+
+    /// Takes over the sides of a state. An event that is to be caught keeps its own and is found at the start of the next step.
+    pub(super) fn follow(&mut self, t: S, state: &[S]) {
+        let (q, v) = state.split_at(self.normal.len());
+        for event in 0..self.events.len() {
+            let (now, before) = (side(self.events[event].when.value(t, q, v)), self.sides[event]);
+            let crossed = before.is_some_and(|above| now == Some(!above) && self.catches(event, above));
+            self.sides[event] = if crossed { before } else { now.or(before) };
+        }
+        self.fired = None;
+        self.next.clone_from(&self.sides);
+    }
+
+    fn record(&mut self, event: usize, t: S, state: &[S], impact: Option<Impact<S>>) {
+        let (q, v) = state.split_at(self.normal.len());
+        let name = self.events[event].name.clone();
+        self.happened.push(Occurrence { name, t, q: q.to_vec(), v: v.to_vec(), impact });
+        self.counts[event] += 1;
+        self.over |= self.events[event].last.is_some_and(|last| self.counts[event] >= last);
+    }
+
+    /// The error of an event at a time and state.
+    fn refused(&self, event: usize, t: S, state: &[S], problem: impl Into<String>) -> RolloutError {
+        let (event, state) = (self.events[event].name.clone(), state.iter().map(|x| x.to_f64()).collect());
+        RolloutError::Event { t: t.to_f64(), state, event, problem: problem.into() }
+    }
+
+    /// Changes the velocities by an impact and records it.
+    fn impact(
+        &mut self,
+        (event, above): (usize, bool),
+        t: S,
+        state: &mut [S],
+        restitution: &dyn When<S>,
+    ) -> Result<(), RolloutError> {
+        let (n, zero, one) = (self.normal.len(), <S as Real>::zero(), <S as Real>::one());
+        let when = self.events[event].when.clone();
+        let v_before = state[n..].to_vec();
+        let (q, v) = state.split_at(n);
+        let by_time = when.slopes(t, q, v, &mut self.normal);
+        let (energy_before, direction) = self.answer(t, (q, v)).map_err(|error| failed(error, t, state))?;
+        let inverse = dot(&self.normal, &direction);
+        let speed = dot(&self.normal, v) + by_time;
+        let e = restitution.value(t, q, v);
+        if !(inverse.is_finite() && inverse > zero && speed.is_finite()) {
+            let problem = "the gradient of its formula by the coordinates gives no direction for an impact";
+            return Err(self.refused(event, t, state, problem));
+        }
+        if !(e >= zero && e <= one) {
+            let problem = format!("expected a coefficient of restitution from 0 to 1, found {e}");
+            return Err(self.refused(event, t, state, problem));
+        }
+        // Rounding may find a crossing on the way back.
+        if (speed < zero) == above {
+            let change = (one + e) * speed / inverse;
+            state[n..].iter_mut().zip(&direction).for_each(|(v, direction)| *v -= change * *direction);
+        }
+        let (q, v) = state.split_at(n);
+        if when.value(t, q, v) != when.value(t, q, &v_before) {
+            let problem = "its formula depends on velocities, which an impact changes at once";
+            return Err(self.refused(event, t, state, problem));
+        }
+        let after = self.model.terms_at(&[t], q, v, Request::ENERGY, &mut self.terms);
+        after.map_err(|error| failed(error, t, state))?;
+        let energy_after = self.terms.energy.first().copied().unwrap_or_else(S::nan);
+        self.record(event, t, state, Some(Impact { v_before, energy_before, energy_after }));
+        match self.accumulates(event, t) {
+            None => Ok(()),
+            Some(problem) => Err(self.refused(event, t, state, problem)),
+        }
+    }
+
+    /// The energy of a state, and the change of its velocities by a unit impulse along the normal, which constraints allow: `M^-1 n`.
+    fn answer(&mut self, t: S, (q, v): (&[S], &[S])) -> Result<(S, Vec<S>), MechanicsError> {
+        let terms = &mut self.terms;
+        self.model.terms_at(&[t], q, v, Request::ACCELERATION | Request::ENERGY, terms)?;
+        let energy = terms.energy.first().copied().unwrap_or_else(S::nan);
+        terms.acceleration.fill(<S as Real>::zero());
+        terms.add_force(q.len(), v, &self.normal, &mut Workspace::new())?;
+        Ok((energy, terms.acceleration.clone()))
+    }
+
+    /// Says when the impacts of an event accumulate, if they do; those that time does not resolve are forgotten then.
+    fn accumulates(&mut self, event: usize, t: S) -> Option<String> {
+        let Flights { last, between, since, quick } = &mut self.flights[event];
+        let now = t - last.replace(t)?;
+        let ratio = between.replace(now).filter(|before| *before > now).map(|before| now / before);
+        // Beside a surface, distances grow with the square of time.
+        if now > Real::sqrt(S::epsilon()) * S::max(t.abs(), self.dt) {
+            (*since, *quick) = (None, 0);
+            return None;
+        }
+        let since = *since.get_or_insert(self.happened.len().saturating_sub(1));
+        *quick += 1;
+        if *quick < QUICK {
+            return None;
+        }
+        let rest = ratio.map_or(<S as Real>::zero(), |ratio| now * ratio / (<S as Real>::one() - ratio));
+        self.happened.truncate(since);
+        let at = (t + rest).to_f64();
+        Some(format!("its impacts accumulate at t = {at}, and a motion in contact does not follow from them"))
+    }
+}
+
+/// The error of a state that the model refuses.
+fn failed<S: Scalar>(error: MechanicsError, t: S, state: &[S]) -> RolloutError {
+    into_error(StepFailure::Model(error), t.to_f64(), state.iter().map(|x| x.to_f64()).collect(), 0.0)
+}
