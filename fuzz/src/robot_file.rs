@@ -1,8 +1,9 @@
 //! Any text as the file of a robot: refused with a line and a message, or a system whose description is written back as the same one; and the
 //! same text if it is written with the constants that it has.
 
-use lnn::cli::{parse_robot, parse_system, rewritten};
+use lnn::cli::parse_system;
 use lnn::lagrangian::configure_system;
+use lnn::pipeline::{parse_robot, rewrite_robot};
 use std::borrow::Cow;
 
 /// Reads the bytes.
@@ -24,12 +25,12 @@ pub fn run(bytes: &[u8]) {
     let same: Vec<(&str, f64)> =
         symbols.iter().map(String::as_str).zip(configured.parameters.iter().copied()).collect();
     // An MJCF file is not written back.
-    if let Ok(copy) = rewritten(text, &same) {
+    if let Ok(copy) = rewrite_robot(text, &same) {
         assert_eq!(copy, text);
     }
     // Other masses: refused, or read again.
     let heavier: Vec<(&str, f64)> = same.iter().map(|&(symbol, x)| (symbol, 1.5 * x)).collect();
-    if let Ok(other) = rewritten(text, &heavier) {
+    if let Ok(other) = rewrite_robot(text, &heavier) {
         parse_robot(&other).expect("what is written can be read");
     }
 }

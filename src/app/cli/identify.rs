@@ -4,13 +4,13 @@ use crate::cli::files::OutputFile;
 use crate::cli::number::{positive, seconds, thread_count, threads};
 use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::result_page::{self, PageArgs};
-use crate::cli::robot::{self, is_robot};
 use crate::cli::source::parameter;
 use crate::cli::watch::search;
 use crate::cli::{CliError, output, parse_system, system_arg};
 use crate::identification::{Between, Identified, IdentifyError, IdentifyOptions, identify};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::pluralize;
+use crate::pipeline::{is_robot, rewrite_robot};
 use crate::recording::{Columns, LoadedRecording, Targets};
 use crate::report::identification_figures;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
     /// The system whose constants are unknown, by name or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml")]
+    #[arg(long, value_name = "NAME|FILE")]
     system: String,
     /// The unknown constants, by symbol [default: those with learn = true in the file; all if there are none].
     #[arg(long, value_name = "SYMBOL,..", value_delimiter = ',')]
@@ -203,7 +203,7 @@ fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<
     match is_robot_written(args) && is_robot(Path::new(&args.system)) {
         true => {
             // What cannot be written is said before the search.
-            robot::at_line(Path::new(&args.system), |text| robot::rewritten(text, &[]))?;
+            system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &[]))?;
             OutputFile::claim(out, inputs, args.overwrite)
         }
         false => OutputFile::claim_system(out, inputs, args.overwrite),
@@ -223,7 +223,7 @@ fn write(
         values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
     }
     if is_robot_written(args) {
-        let written = robot::at_line(Path::new(&args.system), |text| robot::rewritten(text, &values))?;
+        let written = system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &values))?;
         return out.write(written.as_bytes());
     }
     let Some(description) = instance.system.with_defaults(&values) else { return Ok(()) };

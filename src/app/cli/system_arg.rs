@@ -1,12 +1,15 @@
 //! The system that a command is about: one of the catalogue by its name, or another one by its file.
 
-use crate::cli::robot::{self, is_robot, parse_robot};
 use crate::cli::{CliError, config, output};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, SystemInstance, find, resolve};
 use crate::network::file::Header;
+use crate::pipeline::{is_robot, parse_robot};
 use std::borrow::Cow;
 use std::path::Path;
+
+/// Largest file of a robot that is read, in bytes.
+const MAX_ROBOT: u64 = 1 << 24;
 
 /// `true` if an argument is the file of a system, not a name of the catalogue.
 pub fn is_file(system: &str) -> bool {
@@ -21,7 +24,7 @@ pub fn is_file(system: &str) -> bool {
 pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
     let path = Path::new(system);
     if is_robot(path) {
-        let (system, notes) = robot::at_line(path, parse_robot)?;
+        let (system, notes) = from_robot(path, parse_robot)?;
         notes.iter().for_each(|note| output::note(&format!("{}: {note}", path.display())));
         return Ok(Cow::Owned(system));
     }
@@ -38,6 +41,15 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
         };
         CliError::usage(format_args!("{error}{file}"))
     })
+}
+
+/// What is made of the text of a robot's file.
+///
+/// # Errors
+/// A usage error with file and line, a data error for a file that cannot be read.
+pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, String)>) -> Result<T, CliError> {
+    let (name, text) = config::read_text_within(path, MAX_ROBOT)?;
+    make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
 }
 
 /// The system of a description as text, TOML.

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// List only this system, by name or by its file.
-    #[arg(long, value_name = "NAME|FILE.toml")]
+    #[arg(long, value_name = "NAME|FILE")]
     system: Option<String>,
     /// One JSON object per line instead of a table.
     #[arg(long)]

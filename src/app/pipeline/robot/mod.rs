@@ -10,18 +10,15 @@ mod urdf;
 mod write;
 mod xml;
 
-use crate::cli::{CliError, config};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, find, inertia_symbols, is_free_name, loss_symbols};
 use crate::pipeline::from_table;
 use rigid::{Body, Place};
 use std::path::Path;
 use toml::{Table, Value};
-pub use write::rewritten;
+pub use write::rewrite_robot;
 use xml::Fault;
 
-/// Largest file that is read, in bytes.
-const MAX_BYTES: u64 = 1 << 24;
 /// Most links that move.
 const MAX_LINKS: usize = 64;
 /// Bounds of joints that have none, in rad and m.
@@ -85,15 +82,6 @@ pub fn parse_robot(text: &str) -> Result<(System, Vec<String>), Fault> {
     let (mut robot, line) = read(text)?;
     let system = robot.system().map_err(|problem| (line, problem))?;
     Ok((system, robot.notes))
-}
-
-/// What is made of the text of a robot's file.
-///
-/// # Errors
-/// A usage error with file and line, a data error for a file that cannot be read.
-pub fn at_line<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, Fault>) -> Result<T, CliError> {
-    let (name, text) = config::read_text_within(path, MAX_BYTES)?;
-    make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
 }
 
 /// A robot, and the line of its root.

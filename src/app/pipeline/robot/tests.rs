@@ -1,6 +1,5 @@
 use super::rigid::Body;
 use super::*;
-use crate::cli::parse_system;
 use crate::lagrangian::{SystemInstance, configure_system, inverse_dynamics};
 use std::borrow::Cow;
 
@@ -77,7 +76,11 @@ velocity_bounds = [-1, 1]
 "#,
         (),
     );
-    let formula = configure_system::<f64>(Cow::Owned(parse_system(formula).unwrap()), &[]).unwrap().build().unwrap();
+    let formula =
+        configure_system::<f64>(Cow::Owned(toml::from_str::<Description>(formula).unwrap().system().unwrap()), &[])
+            .unwrap()
+            .build()
+            .unwrap();
     let mjcf = r#"<mujoco><worldbody><body name="upper"><joint name="shoulder" axis="0 -1 0"/><inertial pos="0 0 -0.35" mass="2" diaginertia="0.03 0.03 0.03"/>
         <body name="lower" pos="0 0 -0.7"><joint name="elbow" axis="0 -2 0"/><inertial pos="0 0 -0.4" mass="0.5" diaginertia="0.02 0.02 0.02"/></body></body></worldbody></mujoco>"#;
     for text in [arm(), mjcf.to_string()] {
@@ -206,15 +209,15 @@ fn what_is_not_changed_stays_byte_by_byte() {
     let picker = instance(PICKER);
     let symbols: Vec<String> = picker.system.parameters.iter().map(|p| p.symbol.to_string()).collect();
     let all: Vec<(&str, f64)> = symbols.iter().map(String::as_str).zip(picker.parameters.iter().copied()).collect();
-    assert_eq!(rewritten(PICKER, &all).unwrap(), PICKER);
+    assert_eq!(rewrite_robot(PICKER, &all).unwrap(), PICKER);
     let marked = format!("\u{feff}{PICKER}");
-    assert_eq!(rewritten(&marked, &all).unwrap(), marked);
-    let other = rewritten(PICKER, &[("Fc1", 0.25)]).unwrap();
+    assert_eq!(rewrite_robot(&marked, &all).unwrap(), marked);
+    let other = rewrite_robot(PICKER, &[("Fc1", 0.25)]).unwrap();
     assert_eq!(changed(PICKER, &other), ["", "5"]);
     // An attribute and an element that were not there.
-    let other = rewritten(PICKER, &[("Fc3", 0.5)]).unwrap();
+    let other = rewrite_robot(PICKER, &[("Fc3", 0.5)]).unwrap();
     assert_eq!(changed(PICKER, &other).map(str::trim), ["", "friction=\"0.5\""]);
-    let other = rewritten(PICKER, &[("Fv4", 0.5)]).unwrap();
+    let other = rewrite_robot(PICKER, &[("Fv4", 0.5)]).unwrap();
     assert_eq!(other.replacen("\n    <dynamics damping=\"0.5\"/>", "", 1), PICKER);
 }
 
@@ -224,12 +227,12 @@ fn other_constants_are_written_and_read_again() {
     let scaled: Vec<(String, f64)> =
         inertia_symbols(2).into_iter().map(|symbol| (symbol.clone(), 1.2 * value(&picker, &symbol))).collect();
     let given: Vec<(&str, f64)> = scaled.iter().map(|(name, x)| (name.as_str(), *x)).collect();
-    let again = instance(&rewritten(PICKER, &given).unwrap());
+    let again = instance(&rewrite_robot(PICKER, &given).unwrap());
     for (symbol, x) in &scaled {
         close(&[value(&again, symbol)], &[*x], 1e-12);
     }
     // The camera stays as it is, the arm takes the rest.
-    let written = rewritten(PICKER, &given).unwrap();
+    let written = rewrite_robot(PICKER, &given).unwrap();
     assert!(
         written.contains("<mass value=\"0.2\"/>") && written.contains("rpy=\"0 1.5707963267948966 0\""),
         "{written}"
@@ -238,19 +241,19 @@ fn other_constants_are_written_and_read_again() {
     let light: Vec<(String, f64)> =
         inertia_symbols(2).into_iter().map(|symbol| (symbol.clone(), 0.1 * value(&picker, &symbol))).collect();
     let given: Vec<(&str, f64)> = light.iter().map(|(name, x)| (name.as_str(), *x)).collect();
-    let written = rewritten(PICKER, &given).unwrap();
+    let written = rewrite_robot(PICKER, &given).unwrap();
     let again = instance(&written);
     for (symbol, x) in &light {
         close(&[value(&again, symbol)], &[*x], 1e-12);
     }
     assert!(!written.contains("<mass value=\"0.2\"/>"));
     // None of a body at all.
-    let (line, problem) = rewritten(PICKER, &[("m1", -1.0)]).unwrap_err();
+    let (line, problem) = rewrite_robot(PICKER, &[("m1", -1.0)]).unwrap_err();
     assert!(line == 6 && problem.contains("turret"), "{line} {problem}");
     // A link without an inertial.
     let bare = "<robot name=\"r\">\n  <link name=\"b\"/>\n  <link name=\"l\"/>\n  <joint name=\"j\" type=\"continuous\"><parent link=\"b\"/><child link=\"l\"/></joint>\n</robot>";
     let given = [("m1", 2.0), ("mx1", 0.4), ("Ixx1", 0.1), ("Iyy1", 0.2), ("Izz1", 0.2)];
-    let again = instance(&rewritten(bare, &given).unwrap());
+    let again = instance(&rewrite_robot(bare, &given).unwrap());
     given.iter().for_each(|(symbol, x)| close(&[value(&again, symbol)], &[*x], 1e-15));
 }
 

@@ -20,7 +20,7 @@ struct Edits(Vec<(Range<usize>, String)>);
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there: with the file, or with the constants of a link.
-pub fn rewritten(text: &str, values: &[(&str, f64)]) -> Result<String, Fault> {
+pub fn rewrite_robot(text: &str, values: &[(&str, f64)]) -> Result<String, Fault> {
     let (robot, _) = read(text)?;
     let value = |symbol: &String, usual: f64| values.iter().find(|(name, _)| name == symbol).map_or(usual, |(_, x)| *x);
     let plain = text.strip_prefix('\u{feff}').unwrap_or(text);
