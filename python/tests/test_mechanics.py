@@ -7,11 +7,14 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import lnn
+
+ROOT = Path(__file__).parents[2]
 
 SPRING = {"lagrangian": "m*x_dot^2/2 - k*x^2/2", "coordinates": ["x"], "parameters": {"m": 1, "k": 4}}
 PENDULUM = """
