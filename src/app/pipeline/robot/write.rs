@@ -110,6 +110,8 @@ impl Edits {
     fn set(&mut self, node: Node<'_, '_>, attributes: &[(&str, String)]) {
         for (key, new) in attributes {
             match node.attribute_node(*key) {
+                // Numbers that stay are left as they are written.
+                Some(attribute) if numbers(attribute.value()) == numbers(new) => {}
                 Some(attribute) => self.0.push((attribute.range_value(), new.clone())),
                 None => {
                     let at = node.range().start + 1 + node.tag_name().name().len();
@@ -187,6 +189,11 @@ impl Edits {
         }
         Ok(())
     }
+}
+
+/// The numbers of an attribute; `None` for those that are none.
+fn numbers(text: &str) -> Vec<Option<f64>> {
+    text.split_whitespace().map(|word| word.parse().ok()).collect()
 }
 
 /// An element without content.
