@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -529,10 +530,18 @@ class System(Mechanics):
     @classmethod
     def from_toml(cls, text: str, **parameters: object) -> System:
         """A system by the text of its file, or by the file's path."""
-        if isinstance(text, os.PathLike) or ("\n" not in text and text.endswith(".toml")):
-            text = files.read(text).decode()
         system = cls.__new__(cls)
-        system._describe(text, False, _texts(parameters))
+        system._describe(files.text(text, ".toml"), False, _texts(parameters))
+        return system
+
+    @classmethod
+    def from_robot(cls, text: str, **parameters: object) -> System:
+        """A robot by the text of its URDF or MJCF file, or by the file's path. Warns of elements that say something of motion and are not read."""
+        description, notes = _lnn.read_robot(files.text(text, ".urdf", ".xml"))
+        for note in notes:
+            warnings.warn(note, stacklevel=2)
+        system = cls.__new__(cls)
+        system._describe(description, True, _texts(parameters))
         return system
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -718,6 +718,14 @@ class Identified(_Shown):
         """The system with the constants that were found."""
         return self._form.with_parameters(**{symbol: constant.value for symbol, constant in self.constants.items()})
 
+    def urdf(self, text: str) -> str:
+        """A URDF, by its text or its path, with the constants that were found: numbers of inertials and dynamics change, all else stays."""
+        from . import _lnn
+        from .reader import files
+
+        values = [(symbol, constant.value) for symbol, constant in self.constants.items()]
+        return _lnn.rewritten_robot(files.text(text, ".urdf"), values)
+
     def to_pandas(self) -> pd.DataFrame:
         """A DataFrame of the constants."""
         import pandas as pd

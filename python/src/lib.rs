@@ -18,6 +18,8 @@ use pyo3::prelude::*;
 fn _lnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<subject::Subject>()?;
     module.add_function(wrap_pyfunction!(subject::systems, module)?)?;
+    module.add_function(wrap_pyfunction!(subject::read_robot, module)?)?;
+    module.add_function(wrap_pyfunction!(subject::rewritten_robot, module)?)?;
     module.add_function(wrap_pyfunction!(learn::configuration, module)?)?;
     module.add_function(wrap_pyfunction!(learn::train, module)?)?;
     module.add_function(wrap_pyfunction!(learn::learn, module)?)?;

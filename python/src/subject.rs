@@ -16,7 +16,9 @@ use lnn::lagrangian::{
 use lnn::linalg::Workspace;
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
-use lnn::pipeline::{CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, trained_on};
+use lnn::pipeline::{
+    CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, parse_robot, rewrite_robot, trained_on,
+};
 use lnn::report::page;
 use lnn::rollout::{Event, Integrator, Occurrence, Options, Rollout, RolloutError, Start, rollout_each};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
@@ -61,6 +63,25 @@ pub fn systems() -> PyResult<String> {
         .map(|system| Ok(Subject::of(configure_system(system, &[]).map_err(value)?)?.summary()))
         .collect();
     Ok(Value::from(all?).to_string())
+}
+
+/// The description of the system of a URDF or MJCF file as JSON, and what of the file is not read.
+#[pyfunction]
+pub fn read_robot(text: &str) -> PyResult<(String, Vec<String>)> {
+    let (system, notes) = parse_robot(text).map_err(at_line)?;
+    let description = system.description().ok_or_else(|| runtime("no description"))?;
+    Ok((serde_json::to_string(description).map_err(runtime)?, notes))
+}
+
+/// A URDF with values of constants by symbol.
+#[pyfunction]
+pub fn rewritten_robot(text: &str, values: Vec<(String, f64)>) -> PyResult<String> {
+    let values: Vec<(&str, f64)> = values.iter().map(|(symbol, x)| (symbol.as_str(), *x)).collect();
+    rewrite_robot(text, &values).map_err(at_line)
+}
+
+fn at_line((line, problem): (usize, String)) -> PyErr {
+    value(format_args!("line {line}: {problem}"))
 }
 
 /// Values of all parameters of a system, its size among them.

@@ -7,11 +7,14 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import lnn
+
+ROOT = Path(__file__).parents[2]
 
 SPRING = {"lagrangian": "m*x_dot^2/2 - k*x^2/2", "coordinates": ["x"], "parameters": {"m": 1, "k": 4}}
 PENDULUM = """
@@ -469,3 +472,36 @@ def test_events_of_a_system_come_with_its_motion():
     assert pickle.loads(pickle.dumps(ball)).rollout([1.0], [0.0], 1.5, 0.01).events[0].t == hit.t
     ended = ball.rollout([1.0], [0.0], 10, 0.1)
     assert not ended.complete and "accumulate" in ended.stop
+
+
+def test_robots_are_read_and_written_back(tmp_path):
+    path = ROOT / "examples/systems/picker.urdf"
+    with pytest.warns(UserWarning, match="<transmission>"):
+        robot = lnn.System.from_robot(path)
+    assert robot.coordinates == ("turn", "lift", "grip")
+    with pytest.warns(UserWarning):
+        light = lnn.System.from_robot(path.read_text(), m2=0.5)
+    states = [[0.1, 0.5, 0.01], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    torque = robot.inverse_dynamics(*states).external
+    assert torque[1] != light.inverse_dynamics(*states).external[1] and torque[0] == pytest.approx(0, abs=1e-12)
+    # What is found goes into the file, and nothing else of it changes.
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 4, 0.01)
+    rates = rng.uniform(1, 4, (3, 3))
+    phases = rng.uniform(0, 6, (3, 3))
+    size = np.array([0.3, 0.3, 0.01])[:, None, None] / rates[..., None]
+    angle = rates[..., None] * t + phases[..., None]
+    q = (size * np.sin(angle)).sum(1).T
+    v = (size * rates[..., None] * np.cos(angle)).sum(1).T
+    a = (-size * rates[..., None] ** 2 * np.sin(angle)).sum(1).T
+    force = light.inverse_dynamics(q, v, a).external
+    noisy = [x + scale * rng.normal(size=x.shape) for x, scale in [(q, 1e-5), (force, 1e-3)]]
+    found = lnn.identify(noisy[0], robot, force=noisy[1], dt=0.01)
+    written = found.urdf(path)
+    assert written != path.read_text() and len(written.splitlines()) == len(path.read_text().splitlines())
+    with pytest.warns(UserWarning):
+        again = lnn.System.from_robot(written)
+    left = again.inverse_dynamics(q, v, a).external - force
+    assert np.abs(left).max() < 0.02 * np.abs(force).max()
+    with pytest.raises(ValueError, match="line 2"):
+        lnn.System.from_robot("<robot>\n<link/></robot>")

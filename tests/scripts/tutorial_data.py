@@ -1,8 +1,9 @@
 """Recordings of the tutorials: python3 tests/scripts/tutorial_data.py LNN [FOLDER]
 
 Writes three films of a mass on a spring (film1.txt to film3.txt, 60 pictures per second, positions with a noise of 0.5 mm, as Tracker exports them
-without the line of the track's name) and the log of an arm of three joints (robot.csv, 125 Hz, encoders with a noise of 0.2 mrad, torques with one of
-2 %), by default to examples/data. LNN computes the motion and the torques; the noise has a fixed seed.
+without the line of the track's name), the log of an arm of three joints (robot.csv, 125 Hz, encoders with a noise of 0.2 mrad, torques with one of
+2 %), the log of a pendulum on a motor (motor.csv, 100 Hz, angles with a noise of 1 mrad, voltages without), and the log of an arm of six joints
+(six_joints.csv, 100 Hz, 0.1 mrad, 1 %), by default to examples/data. LNN computes the motion and the torques; the noise has a fixed seed.
 """
 
 import math
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 SPRING = """
 name = "spring"
@@ -66,40 +68,112 @@ def constants():
     return known
 
 
-def robot(place, system):
-    system.write_text(ARM + "[parameters]\n" + "".join(f"{name} = {value!r}\n" for name, value in constants().items()))
-    rng = random.Random(2)
+def waved(rng, count, middle, sizes):
+    """Position, velocity and acceleration of joints at a time: five waves each about a middle."""
 
     def wave(k):
-        size, pace = rng.uniform(0.25, 0.5) / math.sqrt(k), 2 * math.pi * 0.125 * k * rng.uniform(0.8, 1.2)
+        size, pace = rng.uniform(*sizes) / math.sqrt(k), 2 * math.pi * 0.125 * k * rng.uniform(0.8, 1.2)
         return size, pace, rng.uniform(0, 2 * math.pi)
 
-    waves = [[wave(k) for k in range(1, 6)] for _ in MIDDLE]
+    waves = [[wave(k) for k in range(1, 6)] for _ in range(count)]
 
     def derivative(t, order):
         def one(size, pace, phase):
             return size * pace**order * math.sin(pace * t + phase + order * math.pi / 2)
 
-        shift = MIDDLE if order == 0 else [0, 0, 0]
-        return [middle + sum(one(*w) for w in all_of) for middle, all_of in zip(shift, waves)]
+        shift = middle if order == 0 else [0] * count
+        return [at + sum(one(*w) for w in all_of) for at, all_of in zip(shift, waves)]
 
-    motion = [(0.008 * k, *(derivative(0.008 * k, order) for order in range(3))) for k in range(1250)]
+    return lambda t: [derivative(t, order) for order in range(3)]
+
+
+def log(path, system, joints, motion, times, rng, noise, digits):
+    """Writes positions and the torques that they need, both with noise: that of encoders in rad, that of torques over their size."""
     states = system.with_name("states.csv")
-    header = ["t"] + [f"q{i}{end}" for end in ("", "_dot", "_ddot") for i in (1, 2, 3)]
-    lines = [",".join(repr(x) for x in (t, *q, *v, *a)) for t, q, v, a in motion]
+    header = ["t"] + [f"{joint}{end}" for end in ("", "_dot", "_ddot") for joint in joints]
+    lines = [",".join(repr(x) for x in (t, *sum(motion(t), []))) for t in times]
     states.write_text("\n".join([",".join(header), *lines]) + "\n")
     forces = program("inspect", "--system", str(system), "--inverse", "--states", str(states), "--format", "csv")
-    torques = [row[1:] for row in forces]
-    sizes = [math.sqrt(sum(row[j] ** 2 for row in torques) / len(torques)) for j in range(3)]
-    text = "t,q1,q2,q3,tau1,tau2,tau3\n"
-    for (t, q, _, _), torque in zip(motion, torques):
-        angles = [f"{x + rng.gauss(0, 2e-4):.4f}" for x in q]
-        loads = [f"{x + rng.gauss(0, 0.02 * size):.2f}" for x, size in zip(torque, sizes)]
+    torques = [row[-len(joints) :] for row in forces]
+    sizes = [math.sqrt(sum(row[j] ** 2 for row in torques) / len(torques)) for j in range(len(joints))]
+    text = ",".join(["t", *joints, *(f"tau{j + 1}" for j in range(len(joints)))]) + "\n"
+    for t, torque in zip(times, torques):
+        angles = [f"{x + rng.gauss(0, noise[0]):.{digits[0]}f}" for x in motion(t)[0]]
+        loads = [f"{x + rng.gauss(0, noise[1] * size):.{digits[1]}f}" for x, size in zip(torque, sizes)]
         text += ",".join([f"{t:.3f}", *angles, *loads]) + "\n"
-    (place / "robot.csv").write_text(text)
+    path.write_text(text)
+
+
+def robot(place, system):
+    system.write_text(ARM + "[parameters]\n" + "".join(f"{name} = {value!r}\n" for name, value in constants().items()))
+    rng = random.Random(2)
+    motion = waved(rng, 3, MIDDLE, (0.25, 0.5))
+    log(place / "robot.csv", system, ["q1", "q2", "q3"], motion, [0.008 * k for k in range(1250)], rng, (2e-4, 0.02), (4, 2))
+
+
+MOTOR = """
+name = "motor"
+lagrangian = "m*l^2*theta_dot^2/2 + m*g*l*cos(theta)"
+dissipation = "b*theta_dot^2/2"
+coordinates = [{ name = "theta", unit = "rad", periodic = true, velocity_bounds = [-20, 20] }]
+inputs = { u = "V" }
+forces = { theta = "K*u - Fc*tanh(theta_dot/0.02)" }
+parameters = { m = 0.5, l = 0.2, g = 9.81, K = 0.15, b = 0.01, Fc = 0.03 }
+"""
+
+
+def motor(place, system):
+    system.write_text(MOTOR)
+    rng = random.Random(3)
+    times = [0.01 * k for k in range(2000)]
+    levels = [round(rng.uniform(-4, 4), 1) for _ in range(len(times) // 30 + 1)]
+    voltages = [levels[k // 30] for k in range(len(times))]
+    given = system.with_name("voltage.csv")
+    given.write_text("t,u\n" + "".join(f"{t!r},{u!r}\n" for t, u in zip(times, voltages)))
+    drive = ["--force", str(given), "--between", "held", "--rtol", "1e-9", "--atol", "1e-11"]
+    motion = program("rollout", "--system", str(system), "--state=0.3,0", *drive, "--t-end", "19.99", "--dt", "0.01", "--out", "-")
+    rows = [f"{t:.2f},{row[1] + rng.gauss(0, 1e-3):.4f},{u}\n" for t, row, u in zip(times, motion, voltages)]
+    (place / "motor.csv").write_text("t,theta,u\n" + "".join(rows))
+
+
+# The real arm beside its drawings: factors of mass, of moments of inertia, a shift of the centre of mass in m, viscous and dry friction.
+REAL = {
+    "shoulder": (1.2, 1.3, (0, 0.01, 0), 6.0, 8.0),
+    "upper_arm": (1.1, 1.15, (0.015, 0, 0.01), 6.0, 9.0),
+    "forearm": (1.25, 1.2, (-0.01, 0.004, 0), 4.0, 5.0),
+    "wrist_1": (1.1, 1.4, (0, -0.004, 0.006), 1.0, 1.5),
+    "wrist_2": (1.15, 1.3, (0.003, 0, 0), 1.0, 1.2),
+    "flange": (1.3, 1.2, (0, 0.002, 0.004), 0.8, 0.9),
+}
+SIX = ["base_turn", "shoulder_lift", "elbow", "wrist_lift", "wrist_turn", "tool_turn"]
+
+
+def six_joints(place, system):
+    drawn = Path(__file__).parents[2] / "examples/systems/six_joints.urdf"
+    tree = ElementTree.parse(drawn)
+    for link in tree.getroot().iter("link"):
+        if link.get("name") in REAL:
+            mass, inertia, shift, _, _ = REAL[link.get("name")]
+            own = link.find("inertial")
+            own.find("mass").set("value", repr(mass * float(own.find("mass").get("value"))))
+            centre = [float(x) + by for x, by in zip(own.find("origin").get("xyz").split(), shift)]
+            own.find("origin").set("xyz", " ".join(repr(x) for x in centre))
+            for key in ("ixx", "iyy", "izz"):
+                own.find("inertia").set(key, repr(inertia * float(own.find("inertia").get(key))))
+    for joint in tree.getroot().iter("joint"):
+        child = joint.find("child").get("link")
+        if child in REAL:
+            ElementTree.SubElement(joint, "dynamics", damping=repr(REAL[child][3]), friction=repr(REAL[child][4]))
+    system = system.with_suffix(".urdf")
+    tree.write(system)
+    rng = random.Random(4)
+    motion = waved(rng, 6, [0, -0.8, 0.9, 0, 0.5, 0], (0.15, 0.4))
+    log(place / "six_joints.csv", system, SIX, motion, [0.01 * k for k in range(2000)], rng, (1e-4, 0.01), (5, 3))
 
 
 folder = Path(sys.argv[2] if len(sys.argv) > 2 else "examples/data")
 with tempfile.TemporaryDirectory() as scratch:
     films(folder, Path(scratch) / "spring.toml")
     robot(folder, Path(scratch) / "arm.toml")
+    motor(folder, Path(scratch) / "motor.toml")
+    six_joints(folder, Path(scratch) / "six.toml")

@@ -23,6 +23,13 @@ def read(path: str | os.PathLike, most: int = MOST_BYTES) -> bytes:
     return path.read_bytes()
 
 
+def text(given: str | os.PathLike, *ends: str) -> str:
+    """A text as it is given, or that of the file that a path names; a line with one of these endings is a path."""
+    if isinstance(given, os.PathLike) or ("\n" not in given and given.lower().endswith(ends)):
+        return read(given).decode()
+    return given
+
+
 def write(path: str | os.PathLike, data: bytes, overwrite: bool) -> None:
     """Writes a file whole or not at all.
 

@@ -18,7 +18,7 @@ pub struct Args {
     model: PathBuf,
     /// System to compare with, by name or by its file, instead of the learned one. Use it with a model of recorded motion,
     /// such as one of lnn fit.
-    #[arg(long, value_name = "NAME|FILE.toml")]
+    #[arg(long, value_name = "NAME|FILE")]
     system: Option<String>,
     /// A parameter of that system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", requires = "system", value_parser = source::parameter)]

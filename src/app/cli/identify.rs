@@ -10,6 +10,7 @@ use crate::cli::{CliError, output, parse_system, system_arg};
 use crate::identification::{Between, Identified, IdentifyError, IdentifyOptions, identify};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::pluralize;
+use crate::pipeline::{is_robot, rewrite_robot};
 use crate::recording::{Columns, LoadedRecording, Targets};
 use crate::report::identification_figures;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
     /// The system whose constants are unknown, by name or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml")]
+    #[arg(long, value_name = "NAME|FILE")]
     system: String,
     /// The unknown constants, by symbol [default: those with learn = true in the file; all if there are none].
     #[arg(long, value_name = "SYMBOL,..", value_delimiter = ',')]
@@ -62,7 +63,7 @@ pub struct Args {
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write the system with the identified constants, as a file for rollout, train and grey boxes.
+    /// Write the system with the identified constants, as a file for rollout, train and grey boxes; FILE.urdf of a URDF writes that URDF.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -111,7 +112,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let inputs: Vec<&Path> =
         args.recording.data.iter().map(PathBuf::as_path).chain([Path::new(&args.system)]).collect();
-    let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
+    let out = args.out.as_deref().map(|out| claim(args, out, &inputs)).transpose()?;
     let page = args.page.claim(&inputs, args.overwrite)?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
@@ -136,7 +137,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let found = identify(&instance, &reading.recording, &options).map_err(refused)?;
     drop(options);
     if let Some(out) = &out {
-        write(out, &instance, &found)?;
+        write(args, out, &instance, &found)?;
     }
     let found = found.with_rows_of(&reading);
     let title = format!("Constants of {}", instance.system.name);
@@ -192,12 +193,38 @@ fn refused(error: IdentifyError) -> CliError {
     }
 }
 
-/// Writes the description with the values that were found.
-fn write(out: &OutputFile<'_>, instance: &SystemInstance<f64>, found: &Identified) -> Result<(), CliError> {
+/// `true` if the result goes into a robot's file.
+fn is_robot_written(args: &Args) -> bool {
+    args.out.as_deref().is_some_and(is_robot)
+}
+
+/// The file of the result: a system file, or that of a robot if the system is one.
+fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<'a>, CliError> {
+    match is_robot_written(args) && is_robot(Path::new(&args.system)) {
+        true => {
+            // What cannot be written is said before the search.
+            system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &[]))?;
+            OutputFile::claim(out, inputs, args.overwrite)
+        }
+        false => OutputFile::claim_system(out, inputs, args.overwrite),
+    }
+}
+
+/// Writes the description, or the robot's file, with the values that were found.
+fn write(
+    args: &Args,
+    out: &OutputFile<'_>,
+    instance: &SystemInstance<f64>,
+    found: &Identified,
+) -> Result<(), CliError> {
     let given = instance.system.parameters.iter().zip(&instance.parameters);
     let mut values: Vec<(&str, f64)> = given.map(|(parameter, value)| (parameter.symbol.as_ref(), *value)).collect();
     for constant in &found.constants {
         values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
+    }
+    if is_robot_written(args) {
+        let written = system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &values))?;
+        return out.write(written.as_bytes());
     }
     let Some(description) = instance.system.with_defaults(&values) else { return Ok(()) };
     let text = toml::to_string(&description).map_err(CliError::data)?;

@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(required_unless_present = "system")]
     model: Option<PathBuf>,
     /// Predict the exact motion of a system instead of a model, by name (`lnn systems` lists them) or by its file.
-    #[arg(long, value_name = "NAME|FILE.toml", conflicts_with = "model")]
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "model")]
     system: Option<String>,
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", conflicts_with = "model", value_parser = parameter)]

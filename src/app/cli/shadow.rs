@@ -27,7 +27,7 @@ const PIXEL_BYTES: u64 = 112;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A system by name (`lnn systems` lists them), or by the file that describes it: the exact metric.
-    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model")]
+    #[arg(long, value_name = "NAME|FILE", required_unless_present = "model")]
     system: Option<String>,
     /// A trained model, a file or the directory of a run: the learned metric, beside the exact one if that is given.
     #[arg(long, value_name = "MODEL")]

@@ -87,7 +87,7 @@ pub fn require_at_most(most: usize, found: usize) -> Result<(), CliError> {
 #[derive(Debug, clap::Args)]
 pub struct SystemOrModel {
     /// A system by name (`lnn systems` lists them), or by the file that describes it.
-    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
+    #[arg(long, value_name = "NAME|FILE", required_unless_present = "model", conflicts_with = "model")]
     pub system: Option<String>,
     /// A trained model, a file or the directory of a run.
     #[arg(long, value_name = "MODEL")]

@@ -4,28 +4,52 @@ use crate::cli::{CliError, config, output};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, SystemInstance, find, resolve};
 use crate::network::file::Header;
+use crate::pipeline::{is_robot, parse_robot};
 use std::borrow::Cow;
 use std::path::Path;
 
+/// Largest file of a robot that is read, in bytes.
+const MAX_ROBOT: u64 = 1 << 24;
+
 /// `true` if an argument is the file of a system, not a name of the catalogue.
 pub fn is_file(system: &str) -> bool {
-    Path::new(system).extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
+    let path = Path::new(system);
+    is_robot(path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
 }
 
-/// The system of a name, or of a file whose name ends in `.toml`.
+/// The system of a name, or of a file whose name ends in `.toml`, or in `.urdf` or `.xml` for a robot.
 ///
 /// # Errors
 /// A usage error for an unknown name and for a mistake in a file, a data error for a file that cannot be read.
 pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
+    let path = Path::new(system);
+    if is_robot(path) {
+        let (system, notes) = from_robot(path, parse_robot)?;
+        notes.iter().for_each(|note| output::note(&format!("{}: {note}", path.display())));
+        return Ok(Cow::Owned(system));
+    }
     if is_file(system) {
-        let (name, text) = config::read_text(Path::new(system))?;
+        let (name, text) = config::read_text(path)?;
         let refused = |(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}"));
         return parse_system(&text).map(Cow::Owned).map_err(refused);
     }
     resolve(system).map_err(|error| {
-        let file = if Path::new(system).is_file() { "; a file of a system ends in .toml" } else { "" };
+        let file = if Path::new(system).is_file() {
+            "; a file of a system ends in .toml, of a robot in .urdf or .xml"
+        } else {
+            ""
+        };
         CliError::usage(format_args!("{error}{file}"))
     })
+}
+
+/// What is made of the text of a robot's file.
+///
+/// # Errors
+/// A usage error with file and line, a data error for a file that cannot be read.
+pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, String)>) -> Result<T, CliError> {
+    let (name, text) = config::read_text_within(path, MAX_ROBOT)?;
+    make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
 }
 
 /// The system of a description as text, TOML.

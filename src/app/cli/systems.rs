@@ -10,7 +10,7 @@ use std::borrow::Cow;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// List only this system, by name or by its file.
-    #[arg(long, value_name = "NAME|FILE.toml")]
+    #[arg(long, value_name = "NAME|FILE")]
     system: Option<String>,
     /// One JSON object per line instead of a table.
     #[arg(long)]
@@ -66,6 +66,7 @@ fn describe(system: &System) -> Value {
         "time_like": system.time_like.map(|i| coordinates[i].name.as_ref()),
         "constraint": system.constraint,
         "constraints": system.description().map(|description| &description.constraints),
+        "links": Some(system.shown_links()).filter(|links| !links.is_empty()),
         "parameters": parameters,
         "inputs": system.description().map(|description| &description.inputs),
         "bounds": { "training": box_of(system.training(n)), "validation": box_of(system.validation(n)) },
@@ -93,6 +94,13 @@ fn table(system: &System) -> String {
     }
     for (name, formula) in system.description().into_iter().flat_map(|description| &description.constraints) {
         text += &format!("  {name:<12} {formula} = 0\n");
+    }
+    for (k, link) in system.shown_links().iter().enumerate() {
+        let moves = if link.prismatic { "slides" } else { "turns" };
+        let ratio = if link.ratio == 1.0 { String::new() } else { format!("{}*", link.ratio) };
+        let on = if link.parent == 0 { "the base".to_string() } else { format!("link {}", link.parent) };
+        let name = link.name.map_or(String::new(), |name| format!("  {name}"));
+        text += &format!("  {:<12} {moves} by {ratio}{}, on {on}{name}\n", format!("link {}", k + 1), link.coordinate);
     }
     for [symbol, default, unit, range] in parameters(system) {
         text += &format!("  --param {:<12} {unit:<6} {range}\n", format!("{symbol}={default}"));

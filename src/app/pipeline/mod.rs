@@ -77,6 +77,7 @@ mod physics_report;
 mod prediction;
 mod prepared_fit;
 mod report_files;
+mod robot;
 mod run_table;
 mod start;
 mod sweep;
@@ -130,6 +131,7 @@ pub use output::{Directory, InMemory, Output};
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
 #[doc(hidden)]
 pub use prepared_fit::PreparedFit;
+pub use robot::{is_robot, parse_robot, rewrite_robot};
 pub(crate) use start::StartModel;
 pub use sweep::{Sweep, Swept, sweep};
 pub use train::{RunOptions, TrainFigures, TrainReport, train};

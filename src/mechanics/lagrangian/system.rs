@@ -1,6 +1,8 @@
 //! Facts about a hand-written system apart from its Lagrangian.
 
 use super::Lagrangian;
+#[cfg(feature = "cli")]
+use super::description::ShownLink;
 use super::description::{Described, Description};
 use crate::scalar::Real;
 use alloc::borrow::Cow;
@@ -305,9 +307,18 @@ impl System {
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Option<Description> {
         self.described.as_deref().map(|described| described.with_defaults(values))
     }
-    /// `true` for a chain of links.
+    /// `true` for links, a chain or a tree.
     pub(crate) fn is_chain(&self) -> bool {
         self.described.as_ref().is_some_and(|described| described.is_chain())
+    }
+    /// Its links as one can show them.
+    #[cfg(feature = "cli")]
+    pub(crate) fn shown_links(&self) -> Vec<ShownLink<'_>> {
+        self.described.as_ref().map_or_else(Vec::new, |described| described.shown_links())
+    }
+    /// Number of its links.
+    pub(crate) fn links(&self) -> usize {
+        self.described.as_ref().map_or(0, |described| described.links())
     }
     /// Coordinates, in order, of the system of `n` coordinates.
     pub fn coordinates(&self, n: usize) -> Vec<Coordinate> {

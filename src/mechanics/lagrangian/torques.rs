@@ -12,7 +12,7 @@ pub(super) fn recursive_forces<S: Scalar>(
     [q, v, a]: [&[S]; 3],
 ) -> Option<InverseDynamics<S>> {
     let mut external = vec![S::nan(); q.len()];
-    if !write_torques(model, [q, v, a], &mut Vec::new(), &mut external) {
+    if !write_torques(model, [q, v, a], &mut Passes::default(), &mut external) {
         return None;
     }
     let (mut generalized, mut friction, n) = (external.clone(), Vec::new(), model.coordinates());
@@ -68,7 +68,7 @@ pub struct Torques<'a, S> {
 impl<'a, S: Scalar> Torques<'a, S> {
     /// Buffers for a model.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
-        Self { model, buffer: Vec::new() }
+        Self { model, buffer: Passes::default() }
     }
 
     /// The forces of states `q`, `v` with accelerations `a`, all `(batch, n)` in physical units.

@@ -97,7 +97,7 @@ fn links(instance: &SystemInstance<f64>, problem: &Problem<'_>, x: &[f64]) -> Ve
         let unknown = places.map(|at| at.and_then(|at| problem.chosen.iter().position(|&chosen| chosen == at)));
         Link { given: places.map(|at| at.map_or(0.0, |at| values[at])), unknown }
     };
-    (1..=instance.coordinates).map(of).collect()
+    (1..=instance.system.links()).map(of).collect()
 }
 
 /// Moves the constants of a chain to physical ones, as near as the determined sums allow; `None` for a system that is not a chain.
@@ -111,7 +111,7 @@ pub(super) fn physical(
         return None;
     }
     let links = links(instance, problem, x);
-    let losses: Vec<usize> = (1..=instance.coordinates)
+    let losses: Vec<usize> = (1..=links.len())
         .flat_map(loss_symbols)
         .collect::<Vec<_>>()
         .iter()

@@ -25,6 +25,7 @@ mod physics;
 mod pipes;
 mod ranges;
 mod resume;
+mod robots;
 mod screen;
 mod shadow;
 mod signals;

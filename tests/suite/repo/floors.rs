@@ -17,7 +17,7 @@ const FLOORS: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates with the only places that name them.
-const ADAPTERS: [(&str, &[&str]); 14] = [
+const ADAPTERS: [(&str, &[&str]); 15] = [
     ("pulp", &["numerics/scalar/"]),
     ("libm", &["numerics/scalar/"]),
     ("spin", &["numerics/platform.rs"]),
@@ -30,6 +30,7 @@ const ADAPTERS: [(&str, &[&str]); 14] = [
     ("postcard", &["support/storage/container/"]),
     ("zip", &["learning/recording/read/"]),
     ("flate2", &["app/report/plot/png.rs", "learning/recording/read/gzip.rs"]),
+    ("roxmltree", &["app/pipeline/robot/"]),
     ("clap", &["app/cli/"]),
     ("signal_hook", &["app/cli/interrupt.rs"]),
 ];

@@ -125,6 +125,11 @@ fn system_file() {
 }
 
 #[test]
+fn robot_file() {
+    try_target("robot_file", 1000, targets::robot_file::run);
+}
+
+#[test]
 fn fit_config() {
     try_target("fit_config", 2000, targets::fit_config::run);
 }

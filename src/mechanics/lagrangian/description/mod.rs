@@ -26,6 +26,8 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use chain::{ChainDescription, LinkDescription};
+#[cfg(feature = "cli")]
+pub(crate) use chain::{ShownLink, turned};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use events::EventDescription;
 pub use per_trajectory::Per;
@@ -33,6 +35,8 @@ pub(crate) use per_trajectory::PerTrajectory;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
+#[cfg(feature = "cli")]
+pub(crate) use system::is_free_name;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
 #[derive(Clone, Debug, PartialEq)]
@@ -335,6 +339,18 @@ impl Described {
     /// `true` if it was written as a chain of links.
     pub fn is_chain(&self) -> bool {
         self.written.is_some()
+    }
+
+    /// Number of the links that it was written with.
+    pub(crate) fn links(&self) -> usize {
+        self.written.as_ref().map_or(0, |written| written.links.len())
+    }
+
+    /// Its links as one can show them.
+    #[cfg(feature = "cli")]
+    pub(crate) fn shown_links(&self) -> Vec<ShownLink<'_>> {
+        let names: Vec<&str> = self.description.coordinates.iter().map(|c| c.name.as_str()).collect();
+        self.written.as_ref().map_or_else(Vec::new, |written| written.shown_links(&names))
     }
 
     /// The description as it was given, with other values of parameters, by name.

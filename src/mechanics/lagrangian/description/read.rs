@@ -49,6 +49,11 @@ impl<'de> Deserialize<'de> for Decimal {
     }
 }
 
+/// The name or the number of a link, as text.
+pub(super) fn reference<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    deserializer.deserialize_any(Written("the name or the number of a link")).map(Some)
+}
+
 /// The table of a parameter.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

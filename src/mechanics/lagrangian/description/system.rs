@@ -23,6 +23,9 @@ const MAX_COORDINATES: usize = 64;
 /// Most parameters, most definitions, and most constraints.
 const MAX_NAMES: usize = 256;
 
+/// Constants of a link and its joint.
+const CONSTANTS: usize = 13;
+
 /// Name of the time in formulas.
 const TIME: &str = "t";
 
@@ -72,11 +75,11 @@ impl Description {
     /// Compiles a description without links, which may be `written` with some; it is of the catalogue or of a file.
     fn compile_plain(self, written: &Self, catalogued: bool) -> Outcome<System> {
         let chain = written.shape(&self.parameters).map(Arc::new);
-        let written = (self != *written).then(|| written.clone());
         self.check_texts()?;
         if !catalogued {
-            self.check_counts()?;
+            written.check_counts(&self)?;
         }
+        let written = (self != *written).then(|| written.clone());
         let n = self.coordinates.len();
         let mut compiler = Compiler::default();
         let (mut scope, timed) = self.scope()?;
@@ -170,23 +173,24 @@ impl Description {
         Ok(())
     }
 
-    /// How much there may be in a file.
-    fn check_counts(&self) -> Outcome<()> {
-        let n = self.coordinates.len();
+    /// How much there may be in a file; the constants of its links, written out, come on top.
+    fn check_counts(&self, plain: &Self) -> Outcome<()> {
+        let n = plain.coordinates.len();
+        let of_links = self.links.len() * CONSTANTS;
         if n == 0 || n > MAX_COORDINATES {
             let problem = format!("expected 1 to {MAX_COORDINATES} tables [[coordinates]], found {n}");
             return Err(DescriptionError::new("coordinates", problem));
         }
         let counts = [
-            ("parameters", self.parameters.len()),
-            ("definitions", self.definitions.len()),
-            ("inputs", self.inputs.len()),
-            ("constraints", self.constraints.len()),
-            ("events", self.events.len()),
+            ("parameters", self.parameters.len(), MAX_NAMES + of_links),
+            ("definitions", self.definitions.len(), MAX_NAMES),
+            ("inputs", self.inputs.len(), MAX_NAMES),
+            ("constraints", self.constraints.len(), MAX_NAMES),
+            ("events", self.events.len(), MAX_NAMES),
         ];
-        for (key, count) in counts {
-            if count > MAX_NAMES {
-                return Err(DescriptionError::new(key, format!("expected at most {MAX_NAMES} names, found {count}")));
+        for (key, count, most) in counts {
+            if count > most {
+                return Err(DescriptionError::new(key, format!("expected at most {most} names, found {count}")));
             }
         }
         Ok(())
@@ -574,6 +578,12 @@ impl Description {
         };
         self.parameters.iter().map(parameter).collect()
     }
+}
+
+/// `true` if a coordinate may have a name that nothing else in the file has.
+#[cfg(feature = "cli")]
+pub(crate) fn is_free_name(name: &str) -> bool {
+    is_name(name) && !is_reserved(name)
 }
 
 fn coordinate(described: &super::CoordinateDescription) -> Coordinate {

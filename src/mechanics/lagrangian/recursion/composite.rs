@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 impl<R: Real> Body<R> {
     /// In and about the frame before.
     fn seen(&self, frame: &Frame<R>) -> Self {
-        let turned = frame.outward(self.first);
+        let turned = frame.outward::<true>(self.first);
         let first = add(turned, scaled(self.mass, frame.place));
         let shifted = sum(&outer(frame.place, turned), &outer(first, frame.place));
         Self { mass: self.mass, first, second: symmetric(sum(&frame.turned(self.second), &shifted)) }
@@ -30,21 +30,35 @@ impl<R: Real> Body<R> {
 impl<R: Real> Chain<R> {
     /// The lower triangle of the mass matrix, row by row.
     pub(super) fn mass_matrix(&self, q: &[R]) -> Vec<Vec<R>> {
-        let frames = self.frames(q);
+        let own = self.of_joints(q);
+        let joints = own.as_deref().unwrap_or(q);
+        let frames: Vec<Frame<R>> = self.links.iter().zip(joints).map(|(link, &q)| link.frame(q)).collect();
         let mut bodies: Vec<Body<R>> = self.links.iter().map(|link| link.body).collect();
-        for k in (1..q.len()).rev() {
-            bodies[k - 1] = bodies[k - 1].with(bodies[k].seen(&frames[k]));
-        }
-        let row = |(k, body): (usize, &Body<R>)| {
-            let mut load = body.pushed(self.links[k].slides);
-            let mut row = vec![load.along(self.links[k].slides) + self.links[k].armature];
-            for before in (0..k).rev() {
-                load = load.seen(&frames[before + 1]);
-                row.push(load.along(self.links[before].slides));
+        for (k, link) in self.links.iter().enumerate().rev() {
+            if let Some(parent) = link.parent {
+                bodies[parent] = bodies[parent].with(bodies[k].seen(&frames[k]));
             }
-            row.reverse();
-            row
-        };
-        bodies.iter().enumerate().map(row).collect()
+        }
+        let mut rows: Vec<Vec<R>> = (1..=q.len()).map(|length| vec![R::zero(); length]).collect();
+        for (k, link) in self.links.iter().enumerate() {
+            let mut load = bodies[k].pushed(link.slides);
+            self.add_element(&mut rows, [k, k], load.along(link.slides) + link.armature);
+            let mut from = k;
+            while let Some(before) = self.links[from].parent {
+                load = load.seen::<true>(&frames[from]);
+                self.add_element(&mut rows, [k, before], load.along(self.links[before].slides));
+                from = before;
+            }
+        }
+        rows
+    }
+
+    /// Adds an element of the mass matrix of the joints to that of the coordinates.
+    fn add_element(&self, rows: &mut [Vec<R>], [i, j]: [usize; 2], element: R) {
+        let Some(drives) = &self.drives else { return rows[i][j] = element };
+        let ((a, first), (b, second)) = (drives[i], drives[j]);
+        let element = first * second * element;
+        // The matrix of the joints is symmetric: of two joints of one coordinate the element counts twice.
+        rows[a.max(b)][a.min(b)] += if i != j && a == b { R::two() * element } else { element };
     }
 }

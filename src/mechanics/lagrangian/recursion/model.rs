@@ -1,6 +1,6 @@
 //! A chain of links as a model: terms by its Lagrangian, accelerations and forces of single states by recursion.
 
-use super::{Chain, Shape};
+use super::{Chain, Passes, Shape};
 use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::Balance;
@@ -38,7 +38,7 @@ impl<S: Scalar> Recursive<S> {
     /// Records the accelerations: the mass matrix is eliminated in the program. What the constants leave out is not computed.
     fn solve(&self) -> Option<Solved<'static, S>> {
         let recursion = Recursion { shape: Arc::clone(&self.shape), parameters: self.parameters.clone() };
-        Solved::record(Arc::new(recursion), self.shape.rows.len(), &[], usize::MAX)
+        Solved::record(Arc::new(recursion), self.shape.coordinates, &[], usize::MAX)
     }
 }
 
@@ -51,11 +51,11 @@ struct Recursion<S> {
 
 impl<S: Scalar> RecordMotion<S> for Recursion<S> {
     fn record<'t>(&self, state: &[Tracer<'t, S>], _: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>> {
-        let n = self.shape.rows.len();
+        let n = self.shape.coordinates;
         let constants: Vec<_> = self.parameters.iter().map(|&value| Tracer::constant(value)).collect();
         let (chain, (q, v)) = (Chain::new(&self.shape, &constants), state.split_at(n));
         let (still, mut right) = (vec![Tracer::zero(); n], vec![Tracer::zero(); n]);
-        chain.inverse_dynamics([q, v, &still], &mut Vec::new(), &mut right);
+        chain.inverse_dynamics([q, v, &still], &mut Passes::default(), &mut right);
         for (k, force) in right.iter_mut().enumerate() {
             *force = chain.friction(k, v[k]) - *force;
         }
@@ -63,9 +63,9 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
         Some(Balance { coordinates: n, lower, right })
     }
 
-    /// By forward tangents: links before a joint do not move with it.
+    /// By forward tangents: links that carry a joint do not move with it.
     fn record_slopes<'t>(&self, x: &[Tracer<'t, S>], _: &[Tracer<'t, S>]) -> Option<SparseRows<Tracer<'t, S>>> {
-        let n = self.shape.rows.len();
+        let n = self.shape.coordinates;
         let constants: Vec<_> = self.parameters.iter().map(|&value| Dual::lift(Tracer::constant(value))).collect();
         let chain = Chain::new(&self.shape, &constants);
         let (mut rows, mut torques) = (vec![BTreeMap::new(); n], vec![Dual::lift(Tracer::zero()); n]);
@@ -73,7 +73,7 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
         for column in 0..2 * n {
             state[column].tangent = Tracer::one();
             let [q, v, a] = [0, 1, 2].map(|field| &state[field * n..][..n]);
-            chain.inverse_dynamics([q, v, a], &mut Vec::new(), &mut torques);
+            chain.inverse_dynamics([q, v, a], &mut Passes::default(), &mut torques);
             for (k, row) in rows.iter_mut().enumerate() {
                 let slope = (chain.friction(k, v[k]) - torques[k]).tangent;
                 if !slope.is_exact_zero() {

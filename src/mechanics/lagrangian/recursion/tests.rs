@@ -1,4 +1,4 @@
-use super::Chain;
+use super::{Chain, Passes};
 use crate::lagrangian::{
     Accelerations, Description, EulerLagrange, Linearization, Linearizer, Request, SystemInstance, Terms, Torques,
     configure_system, inertia_symbols, inverse_dynamics, loss_symbols,
@@ -11,23 +11,36 @@ use std::borrow::Cow;
 /// Links at most.
 const MOST: usize = 8;
 
-/// A system file of a chain of links, and values of its constants.
+/// A system file of links, and values of its constants.
 struct Arm {
     text: String,
+    coordinates: usize,
     constants: Vec<(String, String)>,
 }
 
-/// A chain of links that could be built, with joints of both kinds, quarter turns and other twists.
-fn arm(links: usize, rng: &mut impl Rng, friction: bool, armature: bool) -> Arm {
-    let (mut rows, mut constants) = (Vec::new(), Vec::new());
+/// Links that could be built, with joints of both kinds, quarter turns and other twists; a chain, or a tree some of whose joints follow others.
+fn arm(links: usize, rng: &mut impl Rng, (friction, armature, tree): (bool, bool, bool)) -> Arm {
+    let (mut rows, mut constants, mut coordinates) = (Vec::new(), Vec::new(), 0);
     for k in 1..=links {
+        let carried = rng.random_range(0..k);
         let mut draw = |size: f64| rng.random_range(-size..size);
         let (a, d, theta) = (draw(0.5), draw(0.5), draw(3.0));
         let alpha = if draw(1.0) > 0.0 { "\"pi/2\"".to_string() } else { draw(3.0).to_string() };
-        rows.push(format!(
-            r#"{{"a": {a}, "alpha": {alpha}, "d": {d}, "theta": {theta}, "prismatic": {}}}"#,
-            draw(1.0) > 0.3
-        ));
+        let mut keys = match tree && draw(1.0) > 0.0 {
+            true => {
+                format!(r#""xyz": [{a}, {d}, 0.1], "rpy": [{theta}, {alpha}, {}], "axis": [{a}, 0, {d}]"#, draw(3.0))
+            }
+            false => format!(r#""a": {a}, "alpha": {alpha}, "d": {d}, "theta": {theta}"#),
+        };
+        keys += &format!(r#", "prismatic": {}"#, draw(1.0) > 0.3);
+        if tree {
+            keys += &format!(r#", "parent": {carried}"#);
+        }
+        match tree && k > 2 && draw(1.0) > 0.5 {
+            true => keys += &format!(r#", "mimic": "1", "ratio": {}, "offset": {}"#, draw(2.0), draw(1.0)),
+            false => coordinates += 1,
+        }
+        rows.push(format!("{{{keys}}}"));
         let (m, c, own) =
             (1.0 + draw(0.5), [draw(0.3), draw(0.3), draw(0.3)], [0.2 + draw(0.1), 0.2, 0.25 + draw(0.1)]);
         let square: f64 = c.iter().map(|c| c * c).sum();
@@ -39,12 +52,13 @@ fn arm(links: usize, rng: &mut impl Rng, friction: bool, armature: bool) -> Arm 
         let given = loss_symbols(k).into_iter().zip(losses);
         constants.extend(given.filter(|(_, (has, _))| *has).map(|(name, (_, value))| (name, value)));
     }
-    let convention = if rng.random_range(0..2) == 0 { "standard" } else { "modified" };
+    let convention = if rng.random_range(0..2) == 0 && !tree { "standard" } else { "modified" };
     let chain = format!(
         r#"{{"convention": "{convention}", "gravity": [1.5, -2, -9], "friction": {friction}, "armature": {armature}, "coulomb_speed": 0.5}}"#
     );
     Arm {
         text: format!(r#"{{"name": "arm", "chain": {chain}, "links": [{}]}}"#, rows.join(", ")),
+        coordinates,
         constants: constants.into_iter().map(|(name, value)| (name, value.to_string())).collect(),
     }
 }
@@ -62,7 +76,7 @@ fn chain(arm: &SystemInstance<f64>) -> Chain<f64> {
 
 fn torques(chain: &Chain<f64>, state: [&[f64]; 3]) -> Vec<f64> {
     let mut torques = vec![0.0; state[0].len()];
-    chain.inverse_dynamics(state, &mut Vec::new(), &mut torques);
+    chain.inverse_dynamics(state, &mut Passes::default(), &mut torques);
     torques
 }
 
@@ -77,9 +91,10 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 fn with_arms(mut show: impl FnMut(&Arm, [&[f64]; 3], &str)) {
     let mut rng = RngStream::Region.generator(17);
     for links in 1..=MOST {
-        for case in 0..6 {
-            let arm = arm(links, &mut rng, case % 2 == 0, case % 3 == 0);
-            let mut draw = |size: f64| -> Vec<f64> { (0..links).map(|_| rng.random_range(-size..size)).collect() };
+        for case in 0..9 {
+            let arm = arm(links, &mut rng, (case % 2 == 0, case % 3 == 0, case > 5));
+            let mut draw =
+                |size: f64| -> Vec<f64> { (0..arm.coordinates).map(|_| rng.random_range(-size..size)).collect() };
             let (q, v, a) = (draw(3.0), draw(2.0), draw(5.0));
             show(&arm, [&q, &v, &a], &format!("{links} links, case {case}: {}", arm.text));
         }
@@ -108,6 +123,29 @@ fn recursions_are_the_terms_of_the_lagrangian() {
                 "friction: {what}"
             );
         }
+    });
+}
+
+#[test]
+fn torques_are_the_power_that_changes_the_energy() {
+    with_arms(|arm, [q, v, a], what| {
+        let configured = arm.configured::<f64>();
+        let (chain, model) = (chain(&configured), configured.build().unwrap());
+        let mut terms = Terms::default();
+        let mut energy = |time: f64| {
+            let at = |k: usize| q[k] + v[k] * time + a[k] * time * time / 2.0;
+            let q: Vec<f64> = (0..q.len()).map(at).collect();
+            let v: Vec<f64> = v.iter().zip(a).map(|(v, a)| v + a * time).collect();
+            model.terms(&q, &v, Request::ACCELERATION | Request::LAGRANGIAN, &mut terms).unwrap();
+            let n = q.len();
+            // Twice the kinetic energy less L.
+            (0..n * n).map(|at| v[at / n] * terms.mass_matrix[at] * v[at % n]).sum::<f64>() - terms.lagrangian[0]
+        };
+        let step = 1e-4;
+        let change = (8.0 * (energy(step) - energy(-step)) - energy(2.0 * step) + energy(-2.0 * step)) / (12.0 * step);
+        let power: Vec<f64> = torques(&chain, [q, v, a]).iter().zip(v).map(|(torque, v)| torque * v).collect();
+        let size = power.iter().fold(1.0f64, |most, x| most.max(x.abs()));
+        assert!((power.iter().sum::<f64>() - change).abs() < 1e-7 * size, "{power:?} {change}: {what}");
     });
 }
 
@@ -148,7 +186,7 @@ fn linearizations_by_recursion_are_those_of_the_lagrangian() {
 
 #[test]
 fn single_precision_and_wide_numbers_have_their_own_digits() {
-    let arm = arm(5, &mut RngStream::Region.generator(3), true, false);
+    let arm = arm(5, &mut RngStream::Region.generator(3), (true, false, false));
     let (q, v) = ([0.3, -1.0, 0.7, 2.0, -0.4], [1.0, 0.5, -0.8, 0.2, 1.4]);
     let exact = arm.configured::<f64>().build().unwrap().acceleration(&q, &v).unwrap();
     let (model, mut a) = (arm.configured::<f32>().build().unwrap(), [0f32; 5]);
@@ -161,7 +199,7 @@ fn single_precision_and_wide_numbers_have_their_own_digits() {
 
 #[test]
 fn what_stands_beside_the_links_and_singular_masses_are_left_to_the_lagrangian() {
-    let arm = arm(3, &mut RngStream::Region.generator(5), false, false);
+    let arm = arm(3, &mut RngStream::Region.generator(5), (false, false, false));
     let with = |more: &str| {
         let text = arm.text.replacen('{', &format!("{{{more}, "), 1);
         let description: Description = serde_json::from_str(&text).unwrap();
@@ -172,7 +210,8 @@ fn what_stands_beside_the_links_and_singular_masses_are_left_to_the_lagrangian()
     assert!(!described(&with(r#""lagrangian": "-q1^2/2""#)) && !described(&with(r#""dissipation": "q1_dot^2""#)));
     let massless: Vec<(String, String)> =
         arm.constants.iter().map(|(name, _)| (name.clone(), "0".to_string())).collect();
-    let model = Arm { text: arm.text.clone(), constants: massless }.configured::<f64>().build().unwrap();
+    let model =
+        Arm { text: arm.text.clone(), constants: massless, coordinates: 3 }.configured::<f64>().build().unwrap();
     let mut a = [0.0; 3];
     assert!(Accelerations::new(model.as_ref()).at(&[0.1; 3], &[0.2; 3], &mut a).is_err());
     let model = arm.configured::<f64>().build().unwrap();

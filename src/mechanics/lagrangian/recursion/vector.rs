@@ -2,8 +2,8 @@
 
 use crate::scalar::Real;
 
-pub(super) type Vector<R> = [R; 3];
-pub(super) type Matrix<R> = [Vector<R>; 3];
+pub(crate) type Vector<R> = [R; 3];
+pub(crate) type Matrix<R> = [Vector<R>; 3];
 
 pub(super) fn add<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
@@ -14,7 +14,7 @@ pub(super) fn scaled<R: Real>(factor: R, a: Vector<R>) -> Vector<R> {
 }
 
 /// `a x b`.
-pub(super) fn cross<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+pub(crate) fn cross<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
@@ -27,11 +27,22 @@ pub(super) fn sum<R: Real>(a: &Matrix<R>, b: &Matrix<R>) -> Matrix<R> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
-pub(super) fn transposed<R: Real>(m: Matrix<R>) -> Matrix<R> {
+pub(crate) fn transposed<R: Real>(m: Matrix<R>) -> Matrix<R> {
     [0, 1, 2].map(|k| [m[0][k], m[1][k], m[2][k]])
 }
 
 /// The same matrix by its upper triangle, of one that is symmetric: what stands below is not computed apart.
 pub(super) fn symmetric<R: Real>(m: Matrix<R>) -> Matrix<R> {
     [m[0], [m[0][1], m[1][1], m[1][2]], [m[0][2], m[1][2], m[2][2]]]
+}
+
+/// `M a`.
+pub(crate) fn applied<R: Real>(m: &Matrix<R>, a: Vector<R>) -> Vector<R> {
+    m.map(|row| row[0] * a[0] + row[1] * a[1] + row[2] * a[2])
+}
+
+/// `A B`.
+pub(crate) fn product<R: Real>(a: &Matrix<R>, b: &Matrix<R>) -> Matrix<R> {
+    let columns = transposed(*b);
+    a.map(|row| applied(&columns, row))
 }

@@ -1,0 +1,226 @@
+//! Robots in files of other programs: URDF and MJCF. A file is read as links, and these become the description of a system, as if the
+//! user had written it: `[[links]]` with their constants.
+
+mod geoms;
+mod mjcf;
+mod rigid;
+#[cfg(test)]
+mod tests;
+mod urdf;
+mod write;
+mod xml;
+
+use crate::lagrangian::system::System;
+use crate::lagrangian::{Description, find, inertia_symbols, is_free_name, loss_symbols};
+use crate::pipeline::from_table;
+use rigid::{Body, Place};
+use std::path::Path;
+use toml::{Table, Value};
+pub use write::rewrite_robot;
+use xml::Fault;
+
+/// Most links that move.
+const MAX_LINKS: usize = 64;
+/// Bounds of joints that have none, in rad and m.
+const USUAL: (f64, f64) = (std::f64::consts::PI, 1.0);
+/// Bound of speeds that have none, in rad/s or m/s.
+const USUAL_SPEED: f64 = 3.0;
+
+/// A robot: its links that move, each after the one that carries it.
+#[derive(Debug)]
+struct Robot {
+    name: String,
+    gravity: [f64; 3],
+    links: Vec<Link>,
+    /// What is read otherwise than it stands, or not at all.
+    notes: Vec<String>,
+}
+
+/// A link that moves, with what is fixed to it.
+#[derive(Debug)]
+struct Link {
+    name: String,
+    /// Name of the joint that moves it.
+    joint: String,
+    /// Index of the link that carries it; `None` for the base.
+    parent: Option<usize>,
+    place: Place,
+    axis: [f64; 3],
+    slides: bool,
+    /// `true` for a joint that turns without end.
+    is_free: bool,
+    bounds: Option<(f64, f64)>,
+    speed: Option<f64>,
+    /// The whole, about the frame of the joint.
+    body: Body,
+    /// What it is made of: names of links in the file, with their places and bodies; its own one first.
+    parts: Vec<Part>,
+    /// Inertia of the drive, viscous and dry friction.
+    losses: [f64; 3],
+    /// Index of the link whose coordinate moves it, ratio and offset.
+    follows: Option<(usize, f64, f64)>,
+}
+
+/// A rigid part of a link: the name of its element, its place in the frame of the joint, and its body in its own frame.
+#[derive(Clone, Debug)]
+struct Part {
+    name: String,
+    place: Place,
+    body: Body,
+}
+
+/// `true` if a file is that of a robot, by its name.
+pub fn is_robot(path: &Path) -> bool {
+    path.extension().is_some_and(|end| ["urdf", "xml"].iter().any(|known| end.eq_ignore_ascii_case(known)))
+}
+
+/// The system of a robot's file, and what of the file was not read.
+///
+/// # Errors
+/// Line, from 1, and what is wrong there.
+pub fn parse_robot(text: &str) -> Result<(System, Vec<String>), Fault> {
+    let (mut robot, line) = read(text)?;
+    let system = robot.system().map_err(|problem| (line, problem))?;
+    Ok((system, robot.notes))
+}
+
+/// A robot, and the line of its root.
+fn read(text: &str) -> Result<(Robot, usize), Fault> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let document = xml::parse(text)?;
+    let root = document.root_element();
+    let (line, _) = xml::fault(root, "");
+    let robot = match root.tag_name().name() {
+        "robot" => urdf::read(root)?,
+        "mujoco" => mjcf::read(root)?,
+        _ => return Err(xml::fault(root, "expected <robot> of a URDF or <mujoco> of an MJCF file")),
+    };
+    match robot.links.len() {
+        1..=MAX_LINKS => Ok((robot, line)),
+        count => Err((line, format!("expected 1 to {MAX_LINKS} joints that move, found {count}"))),
+    }
+}
+
+impl Robot {
+    /// Its system: the description without constants says which there are, and then has those of the file.
+    fn system(&mut self) -> Result<System, String> {
+        let table = self.table();
+        let description: Description =
+            from_table(Value::Table(table)).map_err(|(path, problem)| format!("{path}: {problem}"))?;
+        let plain = description.system().map_err(|error| error.to_string())?;
+        let values = self.constants();
+        let values: Vec<(&str, f64)> = values.iter().map(|(name, x)| (name.as_str(), *x)).collect();
+        let full = plain.with_defaults(&values).ok_or("no description")?;
+        full.system().map_err(|error| error.to_string())
+    }
+
+    /// Constants of the links and joints, by symbol.
+    fn constants(&self) -> Vec<(String, f64)> {
+        let of = |(k, link): (usize, &Link)| {
+            let bodies = inertia_symbols(k + 1).into_iter().zip(link.body.0);
+            bodies.chain(loss_symbols(k + 1).into_iter().zip(link.losses)).collect::<Vec<_>>()
+        };
+        self.links.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// The description without constants.
+    fn table(&mut self) -> Table {
+        let numbers = |x: &[f64]| Value::Array(x.iter().map(|&x| Value::Float(x)).collect());
+        let mut chain = Table::new();
+        chain.insert("gravity".into(), numbers(&self.gravity));
+        chain.insert("friction".into(), true.into());
+        if self.links.iter().any(|link| link.losses[0] != 0.0) {
+            chain.insert("armature".into(), true.into());
+        }
+        let number = |at: Option<usize>| Value::Integer(at.map_or(0, |at| at as i64 + 1));
+        let mut rows = Vec::new();
+        for (k, link) in self.links.iter().enumerate() {
+            let mut row = Table::new();
+            let named = |other: &Link| other.name == link.name;
+            if is_shown(&link.name) && link.name.parse::<usize>().is_err() && !self.links[..k].iter().any(named) {
+                row.insert("name".into(), link.name.clone().into());
+            }
+            row.insert("parent".into(), number(link.parent));
+            row.insert("xyz".into(), numbers(&link.place.at));
+            row.insert("rpy".into(), numbers(&link.place.angles()));
+            row.insert("axis".into(), numbers(&link.axis));
+            row.insert("prismatic".into(), link.slides.into());
+            if let Some((leader, ratio, offset)) = link.follows {
+                row.insert("mimic".into(), number(Some(leader)));
+                row.insert("ratio".into(), ratio.into());
+                row.insert("offset".into(), offset.into());
+            }
+            rows.push(Value::Table(row));
+        }
+        let mut table = Table::new();
+        table.insert("name".into(), self.plain_name().into());
+        if is_shown(&self.name) {
+            table.insert("title".into(), self.name.clone().into());
+        }
+        table.insert("chain".into(), chain.into());
+        table.insert("links".into(), rows.into());
+        table.insert("coordinates".into(), self.coordinates().into());
+        table
+    }
+
+    /// A name as systems have them.
+    fn plain_name(&self) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
+        let name: String = self.name.chars().map(plain).take(60).collect();
+        let name = name.trim_start_matches('-');
+        match name.is_empty() || find(name).is_ok() {
+            true => format!("{name}_robot"),
+            false => name.to_string(),
+        }
+    }
+
+    /// Coordinates with the names of the joints, as far as formulas can have them.
+    fn coordinates(&mut self) -> Vec<Value> {
+        let constants: Vec<String> = self.constants().into_iter().map(|(name, _)| name).collect();
+        let (mut names, mut renamed): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut tables = Vec::new();
+        for link in self.links.iter().filter(|link| link.follows.is_none()) {
+            let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+            let mut name: String = link.joint.chars().map(plain).take(40).collect();
+            if !name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+                name.insert(0, 'q');
+            }
+            while is_taken(&name, &constants, &names) {
+                name.push('_');
+            }
+            if name != link.joint {
+                renamed.push(format!("{} is {name}", link.joint));
+            }
+            let mut table = Table::new();
+            let pair = |(low, high): (f64, f64)| Value::Array(vec![low.into(), high.into()]);
+            let usual = if link.slides { USUAL.1 } else { USUAL.0 };
+            let speed = link.speed.unwrap_or(USUAL_SPEED);
+            table.insert("name".into(), name.clone().into());
+            table.insert("unit".into(), if link.slides { "m" } else { "rad" }.into());
+            table.insert("periodic".into(), link.is_free.into());
+            table.insert("bounds".into(), pair(link.bounds.unwrap_or((-usual, usual))));
+            table.insert("velocity_bounds".into(), pair((-speed, speed)));
+            tables.push(Value::Table(table));
+            names.push(name);
+        }
+        if !renamed.is_empty() {
+            self.notes.push(format!("joints whose names are none of coordinates have others: {}", xml::list(&renamed)));
+        }
+        tables
+    }
+}
+
+/// `true` if a name can be shown.
+fn is_shown(name: &str) -> bool {
+    !name.is_empty() && name.chars().count() <= 100 && !name.chars().any(char::is_control)
+}
+
+/// `true` if a coordinate cannot have a name: something else in the description or in results has it.
+fn is_taken(name: &str, constants: &[String], names: &[String]) -> bool {
+    let ends = ["_dot", "_ddot", "_force"];
+    // Definitions of links, such as `link1_wx`.
+    let part = name.strip_prefix("link").and_then(|rest| rest.split_once('_'));
+    let of_part = part.is_some_and(|(number, rest)| number.parse::<usize>().is_ok() && rest.len() <= 3);
+    let of_result = ["energy", "t", "tau"].contains(&name) || ends.iter().any(|end| name.ends_with(end));
+    !is_free_name(name) || of_part || of_result || constants.iter().chain(names).any(|known| known == name)
+}

@@ -1,0 +1,209 @@
+//! A URDF with other constants: the text stays, and only the numbers of inertials and of the dynamics of joints are replaced.
+
+use super::rigid::{Body, Place, back, turned};
+use super::urdf::origin;
+use super::xml::{Fault, child, children, fault};
+use super::{Link, read, xml};
+use crate::lagrangian::{applied, inertia_symbols, loss_symbols};
+use roxmltree::Node;
+use std::ops::Range;
+
+/// Largest difference, over the size of a link's constants, between what is written and what is read again.
+const ROUNDING: f64 = 1e-9;
+
+/// Parts of a text with what takes their places.
+struct Edits(Vec<(Range<usize>, String)>);
+
+/// The text of a URDF with values of constants by symbol; those that are left out, or as they are, change nothing.
+///
+/// What is fixed to a link keeps its body, and the link takes the rest. Where the rest is none of a body, all parts are stretched alike.
+///
+/// # Errors
+/// Line, from 1, and what is wrong there: with the file, or with the constants of a link.
+pub fn rewrite_robot(text: &str, values: &[(&str, f64)]) -> Result<String, Fault> {
+    let (robot, _) = read(text)?;
+    let value = |symbol: &String, usual: f64| values.iter().find(|(name, _)| name == symbol).map_or(usual, |(_, x)| *x);
+    let plain = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let document = xml::parse(plain)?;
+    let root = document.root_element();
+    if !root.has_tag_name("robot") {
+        return Err(fault(
+            root,
+            "only a URDF is written with other constants; let the name of the result end in .toml",
+        ));
+    }
+    let mut edits = Edits(Vec::new());
+    let named = |tag: &str, name: &str| children(root, tag).find(|node| node.attribute("name") == Some(name));
+    let mut expected = Vec::new();
+    for (k, link) in robot.links.iter().enumerate() {
+        let symbols = inertia_symbols(k + 1);
+        let whole = Body(std::array::from_fn(|i| value(&symbols[i], link.body.0[i])));
+        expected.push(whole);
+        let parts = if whole == link.body { Vec::new() } else { shares(link, &whole) };
+        for (part, own) in link.parts.iter().zip(&parts) {
+            let Some(node) = named("link", &part.name) else { continue };
+            let body = own.ok_or_else(|| {
+                fault(node, "its constants are none of a body: the sum with what is fixed to it has no room for it")
+            })?;
+            if body != part.body {
+                edits.set_body(node, &body)?;
+            }
+        }
+        let [_, viscous, dry] = loss_symbols(k + 1);
+        let losses = [value(&viscous, link.losses[1]), value(&dry, link.losses[2])];
+        if let Some(node) = named("joint", &link.joint).filter(|_| losses != link.losses[1..]) {
+            edits.set_dynamics(node, losses, [link.losses[1], link.losses[2]])?;
+        }
+    }
+    let mark = &text[..text.len() - plain.len()];
+    let written = mark.to_string() + &edits.applied_to(plain);
+    let (again, line) = read(&written)?;
+    for (link, whole) in again.links.iter().zip(&expected) {
+        let size = whole.0.iter().fold(0f64, |most, x| most.max(x.abs()));
+        let is_same = link.body.0.iter().zip(whole.0).all(|(a, b)| (a - b).abs() <= ROUNDING * size);
+        if !is_same {
+            return Err((
+                line,
+                format!("link {:?}: its constants cannot be written as mass, centre and inertia", link.name),
+            ));
+        }
+    }
+    Ok(written)
+}
+
+/// The bodies of the parts of a link, each in its own frame; `None` for a body that there is none of.
+fn shares(link: &Link, whole: &Body) -> Vec<Option<Body>> {
+    let seen: Vec<Body> = link.parts.iter().map(|part| part.body.seen(&part.place)).collect();
+    let rest = seen[1..].iter().fold(*whole, |rest, part| rest.plus(part, -1.0));
+    let fixed = link.parts[1..].iter().map(|part| Some(part.body));
+    if rest.exists() {
+        return std::iter::once(Some(rest)).chain(fixed).collect();
+    }
+    match Body::stretched(&seen, whole).filter(|_| seen.len() > 1) {
+        Some(bodies) => {
+            let away = |place: &Place| {
+                let turn = back(&place.turn);
+                let at = applied(&turn, place.at).map(|x| -x);
+                Place { turn, at }
+            };
+            link.parts.iter().zip(bodies).map(|(part, body)| Some(body.seen(&away(&part.place)))).collect()
+        }
+        None => std::iter::once(None).chain(fixed).collect(),
+    }
+}
+
+impl Edits {
+    /// The text with them.
+    fn applied_to(mut self, text: &str) -> String {
+        // Of several at one place, the order in which they came.
+        self.0.sort_by_key(|(range, _)| range.start);
+        let (mut out, mut at) = (String::with_capacity(text.len()), 0);
+        for (range, new) in self.0 {
+            out += &text[at..range.start];
+            out += &new;
+            at = range.end;
+        }
+        out + &text[at..]
+    }
+
+    /// Gives an element these attributes, in place where they are.
+    fn set(&mut self, node: Node<'_, '_>, attributes: &[(&str, String)]) {
+        for (key, new) in attributes {
+            match node.attribute_node(*key) {
+                // Numbers that stay are left as they are written.
+                Some(attribute) if numbers(attribute.value()) == numbers(new) => {}
+                Some(attribute) => self.0.push((attribute.range_value(), new.clone())),
+                None => {
+                    let at = node.range().start + 1 + node.tag_name().name().len();
+                    self.0.push((at..at, format!(" {key}=\"{new}\"")));
+                }
+            }
+        }
+    }
+
+    /// Puts elements into another one, before what is in it.
+    fn insert(&mut self, node: Node<'_, '_>, elements: &str) {
+        let (text, range) = (node.document().input_text(), node.range());
+        let line = text[..range.start].rfind('\n').map_or(0, |at| at + 1);
+        let indent: String = text[line..range.start].chars().take_while(|c| c.is_whitespace()).collect();
+        let (mut quoted, mut end) = (None, range.end);
+        for (at, c) in text[range.clone()].char_indices() {
+            match (quoted, c) {
+                (None, '"' | '\'') => quoted = Some(c),
+                (Some(open), c) if c == open => quoted = None,
+                (None, '>') => {
+                    end = range.start + at;
+                    break;
+                }
+                _ => {}
+            }
+        }
+        let inside: String = elements.lines().map(|line| format!("\n{indent}  {line}")).collect();
+        match text[..end].ends_with('/') {
+            true => self.0.push((end - 1..end + 1, format!(">{inside}\n{indent}</{}>", node.tag_name().name()))),
+            false => self.0.push((end + 1..end + 1, inside)),
+        }
+    }
+
+    /// Gives a link this body about the origin of its frame. Where its inertial is turned, it stays so.
+    fn set_body(&mut self, link: Node<'_, '_>, body: &Body) -> Result<(), Fault> {
+        let (mass, centre, inertia) = body.central();
+        let node = child(link, "inertial")?;
+        let turn = back(&node.map_or(Ok(Place::HERE), origin)?.turn);
+        let i = turned(&turn, &inertia);
+        let keys = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
+        let entries = [i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]].map(number);
+        let inertia: Vec<(&str, String)> = keys.into_iter().zip(entries).collect();
+        let elements = [
+            ("inertia", inertia),
+            ("mass", vec![("value", number(mass))]),
+            ("origin", vec![("xyz", centre.map(number).join(" "))]),
+        ];
+        let Some(node) = node else {
+            let lines: Vec<String> =
+                elements.iter().rev().map(|(tag, own)| format!("  {}", element(tag, own))).collect();
+            self.insert(link, &format!("<inertial>\n{}\n</inertial>", lines.join("\n")));
+            return Ok(());
+        };
+        let mut missing = Vec::new();
+        for (tag, own) in elements.iter().rev() {
+            match child(node, tag)? {
+                Some(found) => self.set(found, own),
+                None => missing.push(element(tag, own)),
+            }
+        }
+        if !missing.is_empty() {
+            self.insert(node, &missing.join("\n"));
+        }
+        Ok(())
+    }
+
+    /// Gives a joint these constants of viscous and dry friction, as far as they are not those that it has.
+    fn set_dynamics(&mut self, joint: Node<'_, '_>, [viscous, dry]: [f64; 2], before: [f64; 2]) -> Result<(), Fault> {
+        let both = [("damping", viscous, before[0]), ("friction", dry, before[1])];
+        let changed = both.iter().filter(|(_, new, old)| new != old);
+        let own: Vec<(&str, String)> = changed.map(|(key, new, _)| (*key, number(*new))).collect();
+        match child(joint, "dynamics")? {
+            Some(node) => self.set(node, &own),
+            None => self.insert(joint, &element("dynamics", &own)),
+        }
+        Ok(())
+    }
+}
+
+/// The numbers of an attribute; `None` for those that are none.
+fn numbers(text: &str) -> Vec<Option<f64>> {
+    text.split_whitespace().map(|word| word.parse().ok()).collect()
+}
+
+/// An element without content.
+fn element(tag: &str, attributes: &[(&str, String)]) -> String {
+    let own: String = attributes.iter().map(|(key, x)| format!(" {key}=\"{x}\"")).collect();
+    format!("<{tag}{own}/>")
+}
+
+/// A number that reads back to the same one, without a point where it needs none.
+fn number(x: f64) -> String {
+    let text = format!("{:?}", x + 0.0);
+    text.strip_suffix(".0").map(String::from).unwrap_or(text)
+}
