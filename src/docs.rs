@@ -4,6 +4,8 @@
 //! |---|---|
 //! | [`tutorial_film`] | a quarter of an hour: from a film's tracked points to a law with its constants |
 //! | [`tutorial_robot`] | the same from a robot's log of angles and torques to its constants and to inverse dynamics |
+//! | [`tutorial_urdf`] | the same from the URDF of an arm and a log to the URDF of the arm that was built |
+//! | [`tutorial_motor`] | the same from a log of voltages and angles to the constants of a motor and its pendulum |
 //! | [`tutorial_metric`] | the same from a metric to its curvature, its geodesics, and a picture of its sky |
 //! | [`commands`] | every command and option of the program, exit codes, files |
 //! | [`many_machines`] | running an experiment on a cluster or in many processes |
@@ -44,6 +46,7 @@ macro_rules! page {
             "[system-files]: crate::docs::system_files\n",
             "[links]: crate::docs::system_files#a-chain-of-links\n",
             "[forces]: crate::docs::system_files#forces\n",
+            "[robots]: crate::docs::system_files#robots-from-files\n",
             "[inputs]: crate::docs::system_files#inputs\n",
             "[events]: crate::docs::system_files#events\n",
             "[time]: crate::docs::system_files#time\n",
@@ -101,6 +104,8 @@ macro_rules! page {
             "[limits]: crate::docs::limits\n",
             "[tutorial-film]: crate::docs::tutorial_film\n",
             "[tutorial-robot]: crate::docs::tutorial_robot\n",
+            "[tutorial-urdf]: crate::docs::tutorial_urdf\n",
+            "[tutorial-motor]: crate::docs::tutorial_motor\n",
             "[tutorial-metric]: crate::docs::tutorial_metric\n",
             "[fitted-to-forces]: crate::docs::identify#constants-fitted-to-forces\n",
             "[functions]: crate::docs::symmetries#functions\n",
@@ -123,6 +128,8 @@ macro_rules! pages {
 pages! {
     tutorial_film "tutorial-film.md";
     tutorial_robot "tutorial-robot.md";
+    tutorial_urdf "tutorial-urdf.md";
+    tutorial_motor "tutorial-motor.md";
     tutorial_metric "tutorial-metric.md";
     commands "commands.md";
     many_machines "many-machines.md";

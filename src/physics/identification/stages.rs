@@ -38,6 +38,8 @@ const MOST_SUBSTEPS: usize = 64;
 const WORSE: f64 = 1.5;
 /// Smallest decrease of the mean log standard error that longer segments must bring.
 const GAIN: f64 = 0.01;
+/// Newton decrement over the variance of the noise up to which longer segments count as fitted: constants within a standard error.
+const FOLLOWED: f64 = 1.0;
 /// Smallest number of segments whose scatter is used to widen errors.
 const MANY: usize = 8;
 /// Residual over the spread of a coordinate up to which it is due to the integration, a few times [`LEAST_NOISE`].
@@ -233,6 +235,7 @@ pub fn identify(
         choose_steps(&mut problem, &fitted.x, &fitted.segments);
     }
     refit(&problem, &mut fitted, LAST_ITERATIONS);
+    smooth(&mut problem, &mut fitted);
     // Longer segments exclude more of the interpolations.
     (fitted, rivals) = best_between(&mut problem, fitted, &rivals);
     fitted = unturned(&problem, released(&problem, fitted, &given), &given);
@@ -383,6 +386,19 @@ fn unturned(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted 
 pub(super) fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
     fitted.substeps = problem.course.substeps;
     fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
+}
+
+/// Takes smaller steps of integration until the search converges: where a force turns sharply, such as dry friction, the error of the steps
+/// depends roughly on the constants, and the sum of squares with it.
+fn smooth(problem: &mut Problem<'_>, fitted: &mut Fitted) {
+    while !fitted.normal.converged && fitted.normal.failed == 0 && problem.course.substeps < MOST_SUBSTEPS {
+        if problem.cancellation.is_cancelled() {
+            break;
+        }
+        problem.course.substeps *= 2;
+        refit(problem, fitted, ITERATIONS);
+        log(fitted, "smaller steps");
+    }
 }
 
 fn log(fitted: &Fitted, what: &str) {
@@ -539,7 +555,9 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         problem.settle(&longer.x, &mut longer.segments, 6);
         refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");
-        let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square();
+        // Along chaotic motion the search gets stuck on the roughness of the sum of squares.
+        let is_followed = longer.normal.decrement < FOLLOWED || !fitted.normal.converged;
+        let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square() && is_followed;
         if wanted.is_none() && !(met && longer.spread() < fitted.spread() - GAIN) {
             problem.course.substeps = fitted.substeps;
             break;

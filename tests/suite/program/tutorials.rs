@@ -245,6 +245,58 @@ fn a_log_of_an_arm_gives_its_constants_and_its_torques() {
 }
 
 #[test]
+fn a_urdf_becomes_that_of_the_arm_that_was_built() {
+    let arm = follow("tutorial-urdf.md", |_| ());
+    let found = arm.step("--out built.urdf").json();
+    assert_eq!(found["explained"], true);
+    // Friction, and a first moment of the forearm with the wrist, as `tests/scripts/tutorial_data.py` has them.
+    for (name, truth) in [("Fc1", 8.0), ("Fc2", 9.0), ("Fc3", 5.0), ("Fv1", 6.0), ("Fv3", 4.0), ("Fv6", 0.8)] {
+        states(&found, name, truth);
+    }
+    let [forearm, wrist] = [1.25 * 4.0, 1.1 * 1.8 + 1.15 * 1.5 + 1.3 * 0.4 + 0.9];
+    states(&found, "mx3 + 0.3900*m4 + 0.3900*m5 + 0.3900*m6", 0.17 * forearm + 0.39 * wrist);
+    let torque = |step: &Step| -> f64 {
+        let row = step.stdout.lines().nth(1).unwrap();
+        row.split(',').nth(1).unwrap().parse().unwrap()
+    };
+    let upper = 1.1 * 12.0 * 0.215 + 0.42 * (forearm + wrist);
+    let truth = -9.81 * (upper + 0.17 * forearm + 0.39 * wrist);
+    let [drawn, built] = ["inspect --system examples", "inspect --system built"].map(|part| torque(arm.step(part)));
+    assert!((built - truth).abs() < 0.01 * (drawn - truth).abs(), "{built} and {drawn}, not {truth}");
+    // Every byte beside numbers of bodies and friction stays.
+    let drawings = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/systems/six_joints.urdf"));
+    let written = fs::read_to_string(arm.folder.path("built.urdf")).unwrap();
+    let kept = |text: &str| -> Vec<String> {
+        let own = ["<inertia ", "<mass ", "<dynamics ", "<origin "];
+        let other = text.lines().filter(|line| !own.iter().any(|tag| line.contains(tag)));
+        other.map(String::from).collect()
+    };
+    assert_eq!(kept(&written), kept(&drawings.unwrap()));
+    assert_eq!(arm.step("--constants m2").json()["explained"], false);
+    assert!(arm.quoted >= 7, "{} values quoted", arm.quoted);
+}
+
+#[test]
+fn voltages_and_angles_give_the_constants_of_a_motor() {
+    let motor = follow("tutorial-motor.md", |_| ());
+    let found = motor.step("--html motor.html").json();
+    assert_eq!(found["explained"], true);
+    for (name, truth) in [("l", 0.2), ("K", 0.15), ("b", 0.01), ("Fc", 0.03)] {
+        states(&found, name, truth);
+    }
+    assert_eq!(motor.step("smooth.toml").json()["explained"], false);
+    // Without the mass only its ratios are known.
+    let open = motor.step("--constants").json();
+    states(&open, "l", 0.2);
+    states(&open, "K/m", 0.3);
+    assert!(!determined(&open).contains_key("K") && !determined(&open).contains_key("m"));
+    assert!(motor.quoted >= 6, "{} values quoted", motor.quoted);
+    // Two volts hold the pendulum out: K u = m g l sin(theta).
+    let last = motor.column("held.csv", "theta").pop().unwrap();
+    assert!((last - (0.3_f64 / 0.981).asin()).abs() < 0.04, "{last}");
+}
+
+#[test]
 fn a_metric_has_a_curvature_a_fall_and_a_sky() {
     // Few pixels, few places of the edge.
     let metric = follow("tutorial-metric.md", |words| {
