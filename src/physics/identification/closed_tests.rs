@@ -21,7 +21,7 @@ struct Mechanism {
 }
 
 const SLIDER: Mechanism = Mechanism {
-    text: r#"{"name": "slider crank", "dissipation": "c*x2_dot^2/2",
+    text: r#"{"name": "slider-crank", "dissipation": "c*x2_dot^2/2",
         "lagrangian": "m1*(x1_dot^2 + y1_dot^2)/2 - m1*g*y1 + m2*x2_dot^2/2 - k*(x2 - 2)^2/2",
         "coordinates": [{"name": "x1", "bounds": [-2, 2], "velocity_bounds": [-2, 2]},
             {"name": "y1", "bounds": [-2, 2], "velocity_bounds": [-2, 2]},

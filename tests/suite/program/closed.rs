@@ -6,7 +6,7 @@ use std::fs;
 
 const SYSTEM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/slider_crank.toml");
 const POINTS: &str = r#"
-name = "slider by points"
+name = "slider-by-points"
 lagrangian = "m1*(x1_dot^2 + y1_dot^2)/2 - m1*g*y1 + m2*x2_dot^2/2"
 [[coordinates]]
 name = "x1"
