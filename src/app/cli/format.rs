@@ -55,6 +55,7 @@ pub fn explain(error: MechanicsError) -> String {
             format!("the mass matrix is singular (condition number {condition:.3e})")
         }
         MechanicsError::NotFinite { what, .. } => format!("{what} is not finite"),
+        MechanicsError::Undriven { .. } => "it can move while the drives stand still".to_string(),
         other => other.to_string(),
     }
 }

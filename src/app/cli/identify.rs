@@ -187,7 +187,8 @@ fn refused(error: IdentifyError) -> CliError {
         IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
         IdentifyError::Description(_)
         | IdentifyError::System(_)
-        | IdentifyError::Constrained { .. }
+        | IdentifyError::Unknown { .. }
+        | IdentifyError::MovesConstraints { .. }
         | IdentifyError::Nothing { .. } => CliError::usage(format_args!("--system: {error}")),
         _ => CliError::data(error),
     }

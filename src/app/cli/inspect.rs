@@ -34,6 +34,10 @@ pub struct Args {
     /// ignored.
     #[arg(long)]
     inverse: bool,
+    /// Coordinates on which the external force of --inverse acts, such as that of a motor, for systems under constraints: at least as many as
+    /// degrees of freedom. With more, the external force is the shortest. [default: all, with the shortest external force]
+    #[arg(long, value_name = "COORD,..", value_delimiter = ',', requires = "inverse")]
+    drives: Vec<String>,
     /// Fix factor and gauge of L, which motion does not determine, at a base state, coordinates before velocities [default: the first state
     /// of the file]. The terms are those of s (L - L0 - p0.(v - v0)) with |det M0| |s|^n = 1, for which L = 0 and p = 0 there.
     #[arg(
@@ -89,7 +93,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         return Err(CliError::usage("the system depends on the time: its states have their terms and nothing else"));
     }
     if args.inverse {
-        return inverse(file, format, &source);
+        return inverse(file, format, &source, &args.drives);
     }
     if format == Format::Csv {
         return Err(CliError::usage("--format csv needs --inverse; use json or table"));

@@ -5,6 +5,7 @@ use crate::cli::source::Source;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, input, json, output, states};
 use crate::lagrangian::{ForceParts, InverseDynamics, MechanicsError, force_parts_by_rows, inverse_dynamics_by_rows};
+use crate::names::unknown;
 use crate::scalar::Scalar;
 use std::path::Path;
 
@@ -12,8 +13,9 @@ use std::path::Path;
 ///
 /// # Errors
 /// A usage or data error; after the last state, a data error if the forces of any state are not finite.
-pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Result<(), CliError> {
+pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drives: &[String]) -> Result<(), CliError> {
     let n = source.columns.len() / 2;
+    let drives = driven(&source.columns[..n], drives)?;
     let accelerations = source.columns[..n].iter().map(|name| format!("{name}_ddot"));
     let mut columns: Vec<String> = source.columns.iter().cloned().chain(accelerations).collect();
     let place = input::name(path);
@@ -40,7 +42,11 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         };
         let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
         let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
-        let (forces, failed) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| refused(&e))?;
+        let (forces, failed) =
+            inverse_dynamics_by_rows(source.model.as_ref(), &drives, [&q, &v, &a]).map_err(|e| match e {
+                MechanicsError::Drives { .. } => CliError::usage(format_args!("--{e}")),
+                e => refused(&e),
+            })?;
         let parts = match format {
             Format::Csv => None,
             _ => Some(force_parts_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| refused(&e))?.0),
@@ -62,6 +68,16 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         output::print(&text)?;
     }
     report_failures(&place, &failures)
+}
+
+/// Numbers of the coordinates on which drives act.
+fn driven(coordinates: &[String], drives: &[String]) -> Result<Vec<usize>, CliError> {
+    let of = |name: &String| {
+        let known = || unknown("coordinate", name, coordinates.iter().map(String::as_str));
+        let place = coordinates.iter().position(|coordinate| coordinate == name);
+        place.ok_or_else(|| CliError::usage(format_args!("--drives: {}", known())))
+    };
+    drives.iter().map(of).collect()
 }
 
 /// The forces on state `k` of a batch.

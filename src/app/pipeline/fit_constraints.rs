@@ -1,16 +1,12 @@
 //! Constraints of a fit: found in the motion that is learned from, or given.
 
-use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
+use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, OBEDIENCE, find_constraints};
 use crate::data::{Dataset, RecordingSplit};
 use crate::lagrangian::FormulaConstraints;
 use crate::names::{pluralize, rounded};
 use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitConstraints, FitOptions};
 use crate::recording::smooth::Smoothed;
-
-/// Distance of smoothed positions from their constraints, root mean square, in standard deviations of the noise and over the size of the
-/// positions, up to which the motion is said to obey them.
-const OBEDIENCE: (f64, f64) = (5.0, 0.01);
 
 /// Constraints that hold recorded motion.
 #[derive(Debug)]

@@ -253,6 +253,19 @@ impl<S: Scalar> SystemInstance<S> {
     pub(crate) fn constraints(&self) -> Option<&ExpressionConstraints> {
         self.system.described.as_ref()?.constraints.as_ref()
     }
+    /// Numbers of the constraints that act; those that follow from others are left out.
+    ///
+    /// # Errors
+    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion.
+    #[cfg(feature = "training")]
+    pub(crate) fn acting_constraints(&self) -> Result<Vec<usize>, SystemError> {
+        use super::Constraints;
+        let Some(constraints) = self.constraints() else { return Ok(Vec::new()) };
+        let model = self.build()?;
+        let acting = model.manifold().map_or(&[][..], |manifold| manifold.names());
+        let all = constraints.names().into_iter().enumerate();
+        Ok(all.filter(|(_, name)| acting.contains(name)).map(|(row, _)| row).collect())
+    }
     /// The dissipation function of a system by its description; its parameters are the Lagrangian's.
     pub(crate) fn dissipation(&self) -> Option<&ExpressionLagrangian> {
         self.system.described.as_ref()?.dissipation.as_ref()

@@ -5,7 +5,9 @@
 
 use super::linearization::{ProgramSlopes, Rate, SlopePrograms, SparseRows, add};
 use super::programs::derivatives;
-use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Rayleigh, Request, Slopes, SystemInstance};
+use super::{
+    ExpressionLagrangian, Lagrangian, LagrangianVisitor, Rayleigh, Request, RowEquations, Slopes, SystemInstance,
+};
 use crate::scalar::Real;
 use crate::tape::{Program, ROWS, TapeError, Tracer};
 use alloc::boxed::Box;
@@ -24,16 +26,24 @@ pub struct Equations {
     pub motion: Arc<Program<f64>>,
     /// Of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
     pub slopes: Arc<Program<f64>>,
+    /// The constraints that act, if there are any; their forces are not in `h`.
+    pub rows: Option<RowEquations>,
 }
 
 impl Equations {
-    /// Records the equations of a system, with slopes by the parameters of these indices; `None` under constraints.
+    /// Records the equations of a system, with slopes by the parameters of these indices, under the constraints that act; `None` of a system
+    /// that is not of the catalogue.
     ///
     /// # Errors
     /// [`TapeError`] for a Lagrangian that branches on its data.
-    pub fn record(instance: &SystemInstance<f64>, chosen: &[usize]) -> Result<Option<Self>, TapeError> {
+    pub fn record(
+        instance: &SystemInstance<f64>,
+        chosen: &[usize],
+        acting: &[usize],
+    ) -> Result<Option<Self>, TapeError> {
         let (n, count) = (instance.coordinates, instance.parameters.len());
-        let Some(value) = instance.visit(Value { parameters: count }).transpose()? else { return Ok(None) };
+        let visited = instance.visit_unconstrained(Value { parameters: count });
+        let Some(value) = visited.transpose()? else { return Ok(None) };
         let mut parts = vec![EquationPart::of(value, false)?];
         if let Some(dissipation) = instance.dissipation() {
             parts.push(EquationPart::record(dissipation, count, true)?);
@@ -41,7 +51,9 @@ impl Equations {
         if let Some(forces) = instance.forces() {
             parts.push(EquationPart::Forces(forces.programs()?));
         }
-        Self::of(n, count, &parts, (chosen, &[])).map(Some)
+        let rows = instance.constraints().filter(|_| !acting.is_empty());
+        let rows = rows.map(|rows| RowEquations::record(rows, acting, (count, chosen))).transpose()?;
+        Ok(Some(Self { rows, ..Self::of(n, count, &parts, (chosen, &[]))? }))
     }
 
     /// Records the equations of a sum of parts of `count` parameters, with slopes by chosen parameters and then by the factors of
@@ -113,7 +125,7 @@ impl Equations {
             let columns = || (0..n).chain(all..all + n).chain(2 * all..width + terms.len());
             Some(rows[..n].iter().flat_map(|row| columns().map(move |column| element(row, column))).collect())
         })?;
-        Ok(Self { n, known, motion: Arc::new(motion), slopes: Arc::new(slopes) })
+        Ok(Self { n, known, motion: Arc::new(motion), slopes: Arc::new(slopes), rows: None })
     }
 }
 
@@ -281,7 +293,7 @@ mod tests {
         description.forces = forces.map(|(name, text)| (name.to_string(), text.to_string())).into();
         let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         let p = instance.parameters.clone();
-        let equations = Equations::record(&instance, &[4, 3, 0]).unwrap().unwrap();
+        let equations = Equations::record(&instance, &[4, 3, 0], &[]).unwrap().unwrap();
         assert!(equations.known == 1 && instance.is_timed());
         let (x, a, t) = ([0.3, 1.1, 0.7, -0.4], [0.2, -0.9], [2.5]);
         let residual = |x: &[f64], t: f64, p: &[f64]| -> Vec<f64> {
@@ -290,7 +302,7 @@ mod tests {
         };
         // Beside equations without the time.
         let free = configure_system::<f64>(Cow::Owned(damped().system().unwrap()), &[]).unwrap();
-        let free = Equations::record(&free, &[4, 3, 0]).unwrap().unwrap();
+        let free = Equations::record(&free, &[4, 3, 0], &[]).unwrap().unwrap();
         let [own, other] = [
             evaluated(&equations.motion, &[&x[..2], &x[2..], &t], &p, 6),
             evaluated(&free.motion, &[&x[..2], &x[2..]], &p, 6),
@@ -383,7 +395,7 @@ mod tests {
         // Parameters stand in the order of their names: c, e, g, k, m.
         let names = ["c", "e", "g", "k", "m"];
         let values = instance.parameters.clone();
-        let equations = Equations::record(&instance, &[4, 0, 1]).unwrap().unwrap();
+        let equations = Equations::record(&instance, &[4, 0, 1], &[]).unwrap().unwrap();
         let (q, v) = ([0.3, 1.1], [0.7, -0.4]);
         let a = accelerations(&description, &[], &q, &v);
         let (mut mass, mut rest) = ([0.0; 4], [0.0; 2]);

@@ -41,6 +41,18 @@ pub enum MechanicsError {
         /// Distance to the nearest one that they allow.
         distance: f64,
     },
+    /// Fewer drives than degrees of freedom, or a drive that is given twice.
+    Drives {
+        /// Degrees of freedom.
+        expected: usize,
+        /// Different drives.
+        found: usize,
+    },
+    /// A state that can move while the drives stand still.
+    Undriven {
+        /// Row of the batch.
+        row: usize,
+    },
     /// A term is not finite.
     NotFinite {
         /// Row of the batch.
@@ -78,6 +90,13 @@ impl core::fmt::Display for MechanicsError {
                 f,
                 "the acceleration of state {row} is {distance:.3e} away from what the constraints allow, most by constraint {constraint}"
             ),
+            Self::Drives { expected, found } => write!(
+                f,
+                "drives: expected at least {expected} different coordinates, as many as degrees of freedom, found {found}"
+            ),
+            Self::Undriven { row } => {
+                write!(f, "state {row} can move while the drives stand still: their forces do not give its acceleration")
+            }
             Self::NotFinite { row, what } => write!(f, "{what} of state {row} is not finite"),
             Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
             Self::Interrupted => f.write_str("interrupted"),
@@ -99,9 +118,12 @@ impl MechanicsError {
             Self::Singular { row, .. }
             | Self::Dependent { row, .. }
             | Self::OffConstraints { row, .. }
+            | Self::Undriven { row }
             | Self::NotFinite { row, .. }
             | Self::Uncertified { row } => Some(row),
-            Self::Shape { .. } | Self::Interrupted | Self::Timed | Self::Derivatives { .. } => None,
+            Self::Shape { .. } | Self::Drives { .. } | Self::Interrupted | Self::Timed | Self::Derivatives { .. } => {
+                None
+            }
         }
     }
 
@@ -110,6 +132,7 @@ impl MechanicsError {
         if let Self::Singular { row, .. }
         | Self::Dependent { row, .. }
         | Self::OffConstraints { row, .. }
+        | Self::Undriven { row }
         | Self::NotFinite { row, .. }
         | Self::Uncertified { row } = &mut self
         {

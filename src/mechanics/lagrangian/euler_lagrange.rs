@@ -1,6 +1,7 @@
 //! Solves for accelerations and energy, given the terms `L`, `p`, `g`, `M`, `c`, `Q`; solves for the forces that make a motion.
 
 use super::constraints::{Motion, accelerate, along_rows, dot, length};
+use super::drives::{driven, require};
 use super::error::not_finite;
 use super::torques::recursive_forces;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
@@ -251,7 +252,21 @@ pub fn inverse_dynamics<S: Scalar>(
     v: &[S],
     a: &[S],
 ) -> Result<InverseDynamics<S>, MechanicsError> {
-    let (forces, failures) = inverse_dynamics_by_rows(model, q, v, a)?;
+    inverse_dynamics_by_drives(model, &[], [q, v, a])
+}
+
+/// [`inverse_dynamics`] by drives, the numbers of the coordinates on which forces from outside act: the external force is 0 on all others, the
+/// only one if there are as many drives as degrees of freedom, and the shortest one if there are more. Without drives, any coordinate is driven.
+///
+/// # Errors
+/// As of [`inverse_dynamics`]; [`MechanicsError::Drives`] for fewer drives than degrees of freedom, [`MechanicsError::Undriven`] for a state
+/// that can move while they stand still.
+pub fn inverse_dynamics_by_drives<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    drives: &[usize],
+    states: [&[S]; 3],
+) -> Result<InverseDynamics<S>, MechanicsError> {
+    let (forces, failures) = inverse_dynamics_by_rows(model, drives, states)?;
     failures.first().map_or(Ok(forces), |&error| Err(error))
 }
 
@@ -294,7 +309,7 @@ pub(crate) fn force_parts_by_rows<S: Scalar>(
     a: &[S],
 ) -> Result<(ForceParts<S>, Vec<MechanicsError>), MechanicsError> {
     let still = vec![<S as Real>::zero(); v.len()];
-    let (moving, failures) = inverse_dynamics_by_rows(model, q, v, a)?;
+    let (moving, failures) = inverse_dynamics_by_rows(model, &[], [q, v, a])?;
     let generalized = |v: &[S]| match recursive_forces(model, [q, v, &still]) {
         Some(found) => Ok(found.generalized),
         None => Ok(all_forces(model, q, v, &still)?.0),
@@ -305,22 +320,24 @@ pub(crate) fn force_parts_by_rows<S: Scalar>(
     Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
 }
 
-/// [`inverse_dynamics`] with an error for every row that fails, whose forces are `NaN`.
+/// [`inverse_dynamics_by_drives`] with an error for every row that fails, whose forces are `NaN`.
 ///
 /// # Errors
 /// [`MechanicsError`] that is about no row.
 pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
+    drives: &[usize],
+    [q, v, a]: [&[S]; 3],
 ) -> Result<(InverseDynamics<S>, Vec<MechanicsError>), MechanicsError> {
+    let n = model.coordinates();
+    if !drives.is_empty() {
+        require(n, model.manifold(), drives)?;
+    }
     if let Some(found) = recursive_forces(model, [q, v, a]) {
         return Ok((found, Vec::new()));
     }
-    let n = model.coordinates();
     let (mut generalized, mut terms) = all_forces(model, q, v, a)?;
-    let held = Held::of(n, &terms, (&generalized, a));
+    let held = Held::of(n, &terms, (&generalized, a), drives);
     terms.prepend_failures(held.refused);
     let Held { mut external, mut constraint, mut multipliers, .. } = held;
     let (mut friction, failures, m) = (terms.force, terms.failures, terms.constraints);
@@ -368,13 +385,13 @@ struct Held<S> {
     external: Vec<S>,
     constraint: Vec<S>,
     multipliers: Vec<S>,
-    /// Rows whose accelerations the constraints do not allow.
+    /// Rows whose accelerations the constraints do not allow, or the drives do not give.
     refused: Vec<MechanicsError>,
 }
 
 impl<S: Scalar> Held<S> {
     /// Of all forces, `(batch, n)`, friction in the terms.
-    fn of(n: usize, terms: &Terms<S>, (generalized, a): (&[S], &[S])) -> Self {
+    fn of(n: usize, terms: &Terms<S>, (generalized, a): (&[S], &[S]), drives: &[usize]) -> Self {
         let mut external = generalized.to_vec();
         external.iter_mut().zip(&terms.force).for_each(|(all, &friction)| *all -= friction);
         let (m, zero) = (terms.constraints, <S as Real>::zero());
@@ -387,8 +404,17 @@ impl<S: Scalar> Held<S> {
             held.external.chunks_mut(n).zip(a.chunks(n)).zip(rows).enumerate()
         {
             let by = |x: &[S]| -> Vec<S> { matrix.chunks_exact(n).map(|row| dot(row, x)).collect() };
-            let (carried, multipliers) = along_rows(n, matrix, &by(external));
-            external.iter_mut().zip(&carried).for_each(|(x, &carried)| *x -= carried);
+            let by_drives = if drives.is_empty() { None } else { driven(drives, matrix, external) };
+            if by_drives.is_none() && !drives.is_empty() {
+                held.refused.push(MechanicsError::Undriven { row });
+            }
+            let beside = by_drives.unwrap_or_else(|| vec![zero; n]);
+            let rest: Vec<S> = external.iter().zip(&beside).map(|(&x, &beside)| x - beside).collect();
+            let (carried, multipliers) = along_rows(n, matrix, &by(&rest));
+            match drives.is_empty() {
+                true => external.iter_mut().zip(&carried).for_each(|(x, &carried)| *x -= carried),
+                false => external.copy_from_slice(&beside),
+            }
             held.constraint.extend(carried);
             held.multipliers.extend(multipliers);
             let mut missed = by(a);

@@ -9,6 +9,7 @@ mod constrained_systems;
 mod constraints;
 mod derivatives;
 mod description;
+mod drives;
 mod elimination;
 mod equations;
 mod error;
@@ -42,6 +43,9 @@ pub use configure::{SystemError, SystemInstance, build, configure, systems};
 pub use configure::{configure_system, configure_values, find};
 #[doc(hidden)]
 pub use constrained_systems::constrained_systems;
+pub(crate) use constraints::RowEquations;
+#[cfg(feature = "training")]
+pub(crate) use constraints::Tangent;
 pub(crate) use constraints::dot;
 #[cfg(feature = "data")]
 pub(crate) use constraints::take_out;
@@ -68,7 +72,7 @@ pub(crate) use description::{is_free_name, turned};
 pub(crate) use equations::{EquationPart, Equations};
 pub use error::MechanicsError;
 #[doc(hidden)]
-pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
+pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics, inverse_dynamics_by_drives};
 #[cfg(feature = "cli")]
 pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
 pub use expression::ExpressionLagrangian;

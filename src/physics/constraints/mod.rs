@@ -31,6 +31,10 @@ use regular::{branching, phases};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Distance of smoothed positions from their constraints, root mean square, in standard deviations of the noise and over the size of the
+/// motion, up to which it is said to obey them.
+pub(crate) const OBEDIENCE: (f64, f64) = (5.0, 0.01);
+
 /// Largest number of terms that are searched together.
 const MOST_TERMS: usize = 1000;
 /// Largest degree of terms.

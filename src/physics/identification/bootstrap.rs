@@ -59,7 +59,7 @@ pub(super) fn copies(
         .map(|(at, track)| {
             let mut motion = wider.apply(track).ok()?;
             integrate(&mut motion, n);
-            let force = asked(problem, x, (at, &motion));
+            let force = asked(problem, (states, x), (at, &motion));
             Some((motion, force))
         })
         .collect();
@@ -79,7 +79,8 @@ pub(super) fn copies(
         let mut course = problem.course.clone();
         course.recording = &copied;
         let problem = Problem { course, ..problem.clone() };
-        let mut own = States { averaged: states.averaged, ..States::new(&problem, &smoothed) };
+        let (averaged, units) = (states.averaged, states.units.clone());
+        let mut own = States { averaged, units, ..States::new(&problem, &smoothed) };
         own.share = share(&own);
         let weights = states.weight.iter().take(n).copied().collect::<Vec<_>>();
         own.weight = (0..own.places.len() * n).map(|at| weights[at % n]).collect();
@@ -137,8 +138,8 @@ fn integrate(motion: &mut Smoothed, n: usize) {
     }
 }
 
-/// The forces that a motion needs, `(samples, n)`.
-fn asked(problem: &Problem<'_>, x: &[f64], (track, motion): (usize, &Smoothed)) -> Vec<f64> {
+/// The forces that a motion needs, `(samples, n)`: under constraints their part that these cannot balance.
+fn asked(problem: &Problem<'_>, (states, x): (&States, &[f64]), (track, motion): (usize, &Smoothed)) -> Vec<f64> {
     let (n, values) = (problem.course.equations.n, problem.parameters(x));
     let mut follower = Follower::new(&problem.course);
     let mut force = vec![0.0; motion.q.len()];
@@ -152,7 +153,9 @@ fn asked(problem: &Problem<'_>, x: &[f64], (track, motion): (usize, &Smoothed)) 
             &[],
             &mut scratch[..range.len()],
         );
-        follower.lacking_forces(&motion.a[range.clone()], &mut force[range]);
+        let found = &mut force[range.clone()];
+        follower.lacking_forces(&motion.a[range], found);
+        states.free_part(&follower, |free| free.take_all(found, 1));
     }
     // Without known forces, the force that the motion needs is missing, with opposite sign.
     force.iter_mut().for_each(|f| *f = -*f);

@@ -3,6 +3,9 @@
 //! The residual is `r = M a + c - dL/dq + dD/dv - Q`. It does not solve for accelerations, so the mass matrix may be singular during the search.
 //! The weight of a coordinate is the inverse of the size of its residuals. If the equations are linear in the constants, a single step suffices
 //! for given weights.
+//!
+//! Under constraints the residual is the part that no force of constraint can balance. Of its `n` numbers `n - m` are independent, and count as
+//! so many.
 
 use super::IdentifyError;
 use super::bootstrap::{self, COPIES};
@@ -53,11 +56,20 @@ pub(super) fn identify(
     if count == 0 {
         return Err(IdentifyError::Lost);
     }
+    problem.require_constraints(&x, (&states.q, &states.v))?;
+    let moving = problem.moves_constraints(&x, (&states.q, &states.v));
+    if !moving.is_empty() {
+        let symbol = |k: usize| instance.system.parameters[problem.chosen[k]].symbol.to_string();
+        return Err(IdentifyError::MovesConstraints { symbols: moving.into_iter().map(symbol).collect() });
+    }
     let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
     // A coordinate without a force gets the weight of the others.
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
     let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
+    if problem.course.equations.rows.is_some() {
+        states.units = units(problem, &states, &x, &least);
+    }
     let normal = weighed(problem, (&mut states, &mut x), (sigma, &least))?;
     let ForceResiduals { raw, averages, errors, scaled: single } = ForceResiduals::of(problem, &states, &x, &least);
     let usual_raw: Vec<f64> = (0..n).map(|i| usual(std::slice::from_ref(&raw), n, i).max(least[i])).collect();
@@ -172,7 +184,10 @@ fn weighed(
     (mut sigma, least): (Vec<f64>, &[f64]),
 ) -> Result<Normal, IdentifyError> {
     let n = sigma.len();
-    let weights = |states: &States, sigma: &[f64]| (0..states.q.len()).map(|at| sigma[at % n].recip()).collect();
+    // Equations of which constraints leave fewer.
+    let rows = problem.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len());
+    let counts = ((n - rows) as f64 / n as f64).sqrt();
+    let weights = |states: &States, sigma: &[f64]| (0..states.q.len()).map(|at| counts / sigma[at % n]).collect();
     let mut search = Normal::default();
     for _ in 0..ROUNDS {
         states.weight = weights(states, &sigma);
@@ -267,14 +282,34 @@ fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> V
     let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma).collect();
     let mut all = vec![0.0; states.q.len()];
     states.batches(problem, x, |follower, range, _| {
-        let rows = follower.mass().chunks_exact(n).zip(&mut all[range.clone()]).enumerate();
+        let (all, of_acceleration) = (&mut all[range.clone()], &states.a_error[range]);
+        let rows = follower.mass().chunks_exact(n).zip(&mut *all).enumerate();
         for (at, (row, error)) in rows {
-            let first = range.start + at / n * n;
-            let square: f64 = row.iter().zip(&states.a_error[first..first + n]).map(|(m, e)| (m * e).powi(2)).sum();
+            let first = at / n * n;
+            let square: f64 = row.iter().zip(&of_acceleration[first..first + n]).map(|(m, e)| (m * e).powi(2)).sum();
             *error = of_force[at % n].hypot(square.sqrt()).max(least[at % n]);
         }
+        states.free_part(follower, |free| {
+            let of_states = follower.mass().chunks_exact(n * n).zip(of_acceleration.chunks_exact(n));
+            for (state, ((mass, of_acceleration), all)) in of_states.zip(all.chunks_exact_mut(n)).enumerate() {
+                let found = free.errors(state, mass, (of_acceleration, &of_force));
+                all.iter_mut().zip(found).zip(least).for_each(|((all, found), least)| *all = found.max(*least));
+            }
+        });
     });
     all
+}
+
+/// Smallest unit of a force over the largest.
+const LEAST_UNIT: f64 = 1e-3;
+
+/// Units in which forces under constraints are compared, `(n)`: the typical errors of the equations without them.
+fn units(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
+    let n = least.len();
+    let errors = errors(problem, states, x, least);
+    let usual: Vec<f64> = (0..n).map(|i| quantile(&mut column(&errors, (n, i)), 0.5)).collect();
+    let most = usual.iter().copied().filter(|unit| unit.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
+    usual.into_iter().map(|unit| if unit.is_finite() { unit.max(LEAST_UNIT * most) } else { most }).collect()
 }
 
 impl Problem<'_> {

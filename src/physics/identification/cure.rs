@@ -124,6 +124,7 @@ impl Examiner<'_> {
     /// Changes of accelerations along directions over `sizes`, a column each, and the summed separate effects of their unknowns.
     fn effects(&self, place: &Place<'_>, probe: &Probe, sizes: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
         let (n, m) = (self.n(), self.problem.chosen.len());
+        let probe = &self.allowed(place.x, probe.clone());
         let values = self.problem.parameters(place.x);
         let mut follower = Follower::new(&self.problem.course);
         let mut a = vec![0.0; probe.q.len()];
@@ -131,6 +132,12 @@ impl Examiner<'_> {
         let slopes = follower.slopes(&values, (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
         effects((&rows, 1.0), &place.changes, |at| sizes[at % n])
+    }
+
+    /// States on the constraints.
+    fn allowed(&self, x: &[f64], mut probe: Probe) -> Probe {
+        self.problem.bring_states(x, (&mut probe.q, &mut probe.v));
+        probe
     }
 
     /// Root mean square of the accelerations of every coordinate.
@@ -280,7 +287,7 @@ impl Examiner<'_> {
     /// Open directions of equations that are linear in the constants, by what would determine them.
     pub fn by_forces(&self, x: &[f64], (changes, size): (&[Vec<f64>], &[f64])) -> ByForces {
         let (n, m) = (self.n(), self.problem.chosen.len());
-        let probe = self.wild(&self.recorded(x));
+        let probe = self.allowed(x, self.wild(&self.recorded(x)));
         let largest = probe.v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut a = vec![0.0; probe.v.len()];
         (0..n).for_each(|i| spread((&mut a, n), (i, DRIVE), [-largest, largest]));

@@ -8,6 +8,7 @@
 //! variance of the noise: no constant is then farther from the minimum than a small part of its standard error. A constant at the bound of
 //! its range stays there as long as the gradient points out of the range (Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
 
+use super::closed::advance;
 use super::follow::Segment;
 use super::linear::times;
 use super::solve::{Linear, Normal, Problem, Sensor, SensorKind};
@@ -161,6 +162,7 @@ impl Problem<'_> {
 
     /// Fits unknowns and initial states; the undamped normal equations at the end show whether the search has converged.
     pub fn fit(&self, x: &mut Vec<f64>, segments: &mut [Segment], iterations: usize) -> Normal {
+        self.bring(x, segments);
         let mut best = self.all(x, segments);
         let mut normal = self.normal(&best, segments);
         let mut muted = self.muted(x, &normal, SILENT);
@@ -175,10 +177,10 @@ impl Problem<'_> {
             let moved = self.moved(x, &change, &normal);
             let real: Vec<f64> = moved.iter().zip(x.iter()).map(|(after, before)| after - before).collect();
             let starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
+            let mover = self.mover(x, &moved);
             for (segment, linear) in segments.iter_mut().zip(&best) {
                 let Some(linear) = linear else { continue };
-                let step = self.start_step(linear, &real, damping);
-                segment.start.iter_mut().zip(step).for_each(|(s, d)| *s += d);
+                advance(mover.as_ref(), &mut segment.start, &self.start_step(linear, &real, damping));
             }
             let tried = self.all(&moved, segments);
             let after = self.normal(&tried, segments);
@@ -214,6 +216,8 @@ impl Problem<'_> {
     /// Moves only the initial states, each segment separately; `false` if they could still gain.
     pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
         let still = vec![0.0; self.unknowns()];
+        self.bring(x, segments);
+        let mover = self.mover(x, x);
         let mut best = self.all(x, segments);
         let mut starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
         let mut damping = vec![1e-6; segments.len()];
@@ -222,8 +226,7 @@ impl Problem<'_> {
             for (k, segment) in segments.iter_mut().enumerate() {
                 segment.start.clone_from(&starts[k]);
                 if let Some(linear) = &best[k] {
-                    let step = self.start_step(linear, &still, damping[k]);
-                    segment.start.iter_mut().zip(step).for_each(|(s, d)| *s += d);
+                    advance(mover.as_ref(), &mut segment.start, &self.start_step(linear, &still, damping[k]));
                 }
             }
             let tried = self.all(x, segments);

@@ -1,7 +1,7 @@
 //! Errors of identification.
 
 use crate::cancellation::Cancelled;
-use crate::names::unknown;
+use crate::names::{rounded, unknown};
 use crate::recording::TrajectoryError;
 use crate::recording::smooth::SmoothError;
 use crate::tape::TapeError;
@@ -22,11 +22,34 @@ pub enum IdentifyError {
     /// A Lagrangian that cannot be recorded.
     #[error(transparent)]
     Lagrangian(#[from] TapeError),
-    /// A system under constraints.
-    #[error("{system} has constraints; identification needs a system without them, in independent coordinates")]
-    Constrained {
+    /// A system whose Lagrangian is not known.
+    #[error("{system}: expected a system of the catalogue or of a file")]
+    Unknown {
         /// The system.
         system: String,
+    },
+    /// Recorded positions that a constraint does not allow.
+    #[error(
+        "the positions miss the constraint `{constraint}` by {}, root mean square, at a noise of {}: expected positions on it; check its constants, or let them be identified",
+        rounded(*distance, 3),
+        rounded(*noise, 3)
+    )]
+    OffConstraint {
+        /// The constraint.
+        constraint: String,
+        /// Root mean square distance.
+        distance: f64,
+        /// Noise of the positions across the constraint.
+        noise: f64,
+    },
+    /// Constants that move constraints, of which forces tell nothing.
+    #[error(
+        "constants: {} move the constraints, of which forces tell nothing: expected constants of the Lagrangian, the dissipation or the forces, or --targets motion",
+        symbols.join(", ")
+    )]
+    MovesConstraints {
+        /// Their symbols.
+        symbols: Vec<String>,
     },
     /// The number of coordinates differs from that of the system.
     #[error("expected {expected} coordinates, found {found}")]

@@ -1,7 +1,8 @@
 //! Integrates many segments side by side, with derivatives by initial states and constants.
 
 use super::Between;
-use crate::lagrangian::Equations;
+use super::closed::Closed;
+use crate::lagrangian::{Equations, Tangent};
 use crate::linalg::{self, Workspace};
 use crate::recording::{RecordedTrajectory, Recording};
 use crate::tape::Replay;
@@ -77,14 +78,27 @@ impl State {
         Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
     }
 
-    /// Derivatives of positions and velocities by the initial states, `(lanes, 2n, 2n)`, taken from derivatives with `columns` numbers.
-    pub fn by_starts(&self, n: usize, columns: usize) -> Vec<f64> {
+    /// Derivatives of positions and velocities by the initial states, `(lanes, 2n, starts)`, taken from derivatives with `columns` numbers.
+    pub fn by_starts(&self, n: usize, (starts, columns): (usize, usize)) -> Vec<f64> {
         let lane = |(q, v): (&[f64], &[f64])| {
             let rows = q.chunks_exact(columns).chain(v.chunks_exact(columns));
-            rows.flat_map(|row| &row[..2 * n]).copied().collect::<Vec<f64>>()
+            rows.flat_map(|row| &row[..starts]).copied().collect::<Vec<f64>>()
         };
         let lanes = self.q_slopes.chunks_exact(n * columns).zip(self.v_slopes.chunks_exact(n * columns));
         lanes.flat_map(lane).collect()
+    }
+
+    /// Derivatives at the beginning of segments under constraints, by their tangents.
+    fn begin_within(&mut self, n: usize, columns: usize, tangents: &[Tangent]) {
+        for (lane, Tangent { free, following }) in tangents.iter().enumerate() {
+            let directions = free.chunks_exact(2 * n).chain(following.chunks_exact(2 * n));
+            for (column, direction) in directions.enumerate() {
+                for i in 0..n {
+                    let at = (lane * n + i) * columns + column;
+                    (self.q_slopes[at], self.v_slopes[at]) = (direction[i], direction[n + i]);
+                }
+            }
+        }
     }
 
     /// `from` advanced by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
@@ -121,6 +135,8 @@ pub(super) struct Follower<'a> {
     /// The time and inputs of the states, `(lanes, known)`, as far as the equations depend on them.
     known: Vec<f64>,
     row: Vec<f64>,
+    /// Of systems under constraints.
+    closed: Option<Closed>,
 }
 
 impl<'a> Follower<'a> {
@@ -138,6 +154,7 @@ impl<'a> Follower<'a> {
             force: Vec::new(),
             known: Vec::new(),
             row: Vec::new(),
+            closed: equations.rows.as_ref().map(|rows| Closed::new(equations.n, rows)),
         }
     }
 
@@ -169,6 +186,27 @@ impl<'a> Follower<'a> {
         &self.mass
     }
 
+    /// Rows of the constraints of the states evaluated last, `(lanes, m, n)`; none without constraints.
+    pub fn rows(&self) -> &[f64] {
+        self.closed.as_ref().map_or(&[], Closed::matrix)
+    }
+
+    /// Number of constraints.
+    pub fn constraints(&self) -> usize {
+        self.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len())
+    }
+
+    /// What a unit of force on each coordinate accelerates at the states evaluated last, `(lanes, n, n)`: the inverse of the mass matrix without
+    /// constraints. `NaN` where there is none.
+    pub fn mobility(&self) -> Vec<f64> {
+        if let Some(closed) = &self.closed {
+            return closed.mobility();
+        }
+        let mut inverse = vec![0.0; self.mass.len()];
+        let _ = linalg::inverse(self.course.equations.n, &self.mass, &mut inverse, &mut Workspace::new());
+        inverse
+    }
+
     /// Accelerations of states under forces, `(lanes, n)` each, forces empty for none; `NaN` where they have no solution.
     pub fn accelerate(&mut self, values: &[f64], (q, v): (&[f64], &[f64]), force: &[f64], a: &mut [f64]) {
         let n = self.course.equations.n;
@@ -183,7 +221,9 @@ impl<'a> Follower<'a> {
         if !force.is_empty() {
             self.rest.iter_mut().zip(force).for_each(|(rest, force)| *rest += force);
         }
-        if n == 1 {
+        if let Some(closed) = &mut self.closed {
+            closed.accelerate(values, (q, v), (&self.mass, &self.rest), (a, &mut self.workspace));
+        } else if n == 1 {
             a.iter_mut().zip(self.rest.iter().zip(&self.mass)).for_each(|(a, (rest, mass))| *a = rest / mass);
         } else {
             // Lanes that fail are NaN.
@@ -214,18 +254,23 @@ impl<'a> Follower<'a> {
         let n = self.course.equations.n;
         let (lanes, width) = (q.len() / n, 2 * n + self.course.chosen);
         self.force_slopes(values, (q, v, a));
-        self.inverse.resize(lanes * n * n, 0.0);
-        if n == 1 {
-            self.inverse.iter_mut().zip(&self.mass).for_each(|(inverse, mass)| *inverse = mass.recip());
+        let closed = self.closed.as_mut().map(|closed| closed.slopes(values, [q, v, a], &self.by_state));
+        let matrices = closed.map_or(&self.mass[..], |(_, matrices)| matrices);
+        // Coordinates and constraints.
+        let k = (matrices.len() / lanes.max(1)).isqrt();
+        self.inverse.resize(matrices.len(), 0.0);
+        if k == 1 {
+            self.inverse.iter_mut().zip(matrices).for_each(|(inverse, mass)| *inverse = mass.recip());
         } else {
-            let _ = linalg::inverse(n, &self.mass, &mut self.inverse, &mut self.workspace);
+            let _ = linalg::inverse(k, matrices, &mut self.inverse, &mut self.workspace);
         }
         self.row.resize(n * width, 0.0);
-        for (block, inverse) in self.by_state.chunks_exact_mut(n * width).zip(self.inverse.chunks_exact(n * n)) {
+        let blocks = self.by_state.chunks_exact_mut(n * width).zip(self.inverse.chunks_exact(k * k)).enumerate();
+        for (lane, (block, inverse)) in blocks {
+            let whole = closed.map_or(&*block, |(whole, _)| &whole[lane * k * width..][..k * width]);
             self.row.fill(0.0);
-            for i in 0..n {
-                let row = &mut self.row[i * width..(i + 1) * width];
-                for (x, from) in inverse[i * n..(i + 1) * n].iter().zip(block.chunks_exact(width)) {
+            for (row, inverse) in self.row.chunks_exact_mut(width).zip(inverse.chunks_exact(k)) {
+                for (x, from) in inverse.iter().zip(whole.chunks_exact(width)) {
                     row.iter_mut().zip(from).for_each(|(r, f)| *r -= x * f);
                 }
             }
@@ -245,7 +290,7 @@ impl<'a> Follower<'a> {
             return;
         }
         rate.q_slopes.copy_from_slice(&at.v_slopes);
-        let width = 2 * n + self.course.chosen;
+        let (width, starts) = (2 * n + self.course.chosen, columns - self.course.chosen);
         let a = std::mem::take(&mut rate.v);
         let slopes = self.slopes(values, (&at.q, &at.v, &a));
         rate.v_slopes.fill(0.0);
@@ -258,14 +303,14 @@ impl<'a> Follower<'a> {
                     let pairs = sq[j * columns..(j + 1) * columns].iter().zip(&sv[j * columns..(j + 1) * columns]);
                     out.iter_mut().zip(pairs).for_each(|(o, (q, v))| *o += x * q + y * v);
                 }
-                out[2 * n..].iter_mut().zip(&row[2 * n..]).for_each(|(o, p)| *o += p);
+                out[starts..].iter_mut().zip(&row[2 * n..]).for_each(|(o, p)| *o += p);
             }
         }
         rate.v = a;
     }
 
     /// Integrates segments, longest first, and calls `visit` with every sample, counted from the first of each segment, and the states of all
-    /// lanes; ignore those of segments that have ended. With `derivatives` by initial states and constants, `2n + chosen` columns.
+    /// lanes; ignore those of segments that have ended. With `derivatives` by initial states and constants, `starts + chosen` columns.
     pub fn follow(
         &mut self,
         values: &[f64],
@@ -275,15 +320,18 @@ impl<'a> Follower<'a> {
     ) {
         let course = self.course;
         let (n, lanes) = (course.equations.n, segments.len());
-        let columns = if derivatives { 2 * n + course.chosen } else { 0 };
+        let columns = if derivatives { course.starts() + course.chosen } else { 0 };
         let mut now = State::sized(lanes, n, columns);
         for (lane, segment) in segments.iter().enumerate() {
             now.q[lane * n..(lane + 1) * n].copy_from_slice(&segment.start[..n]);
             now.v[lane * n..(lane + 1) * n].copy_from_slice(&segment.start[n..]);
-            for i in (0..n).filter(|_| derivatives) {
+            for i in (0..n).filter(|_| derivatives && course.equations.rows.is_none()) {
                 now.q_slopes[(lane * n + i) * columns + i] = 1.0;
                 now.v_slopes[(lane * n + i) * columns + n + i] = 1.0;
             }
+        }
+        if derivatives {
+            now.begin_within(n, columns, &course.tangents(values, segments));
         }
         let mut scratch = Scratch::like(&now);
         let longest = segments.iter().map(|segment| segment.samples).max().unwrap_or(0);

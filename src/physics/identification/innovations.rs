@@ -9,7 +9,7 @@
 use super::follow::{LANES, Segment};
 use super::linear::inverses;
 use super::solve::Problem;
-use crate::linalg::{self, Workspace, dot};
+use crate::linalg::dot;
 use crate::recording::smooth::noise;
 
 /// Standard deviation of an unknown initial state, in units of what a single position determines of it.
@@ -31,16 +31,16 @@ pub(crate) struct Disturbances {
 /// The filter of one segment.
 pub(super) struct Filter {
     unknown_start: Option<f64>,
-    /// Variance of the start, `(2n, 2n)`.
+    /// Variance of the start, `(starts, starts)`.
     variance: Vec<f64>,
-    /// Expected deviation of the initial state, of residuals and of each of their slopes: `(1 + width, 2n)`.
+    /// Expected deviation of the initial state, of residuals and of each of their slopes: `(1 + width, starts)`.
     expected: Vec<Vec<f64>>,
     /// Sum of the logarithms of the variances of innovations over those of the noise.
     pub log_variance: f64,
 }
 
 impl Filter {
-    /// Passes a residual and its slopes, the first `2n` of them by the initial state, through the filter; returns the innovation.
+    /// Passes a residual and its slopes, the first `starts` of them by the initial state, through the filter; returns the innovation.
     pub fn pass(&mut self, residual: f64, row: &mut [f64]) -> f64 {
         let size = self.expected[0].len();
         let slopes = row[..size].to_vec();
@@ -64,7 +64,7 @@ impl Filter {
         if self.unknown_start.is_some() && variance > MOST_VARIANCE { f64::NAN } else { innovation }
     }
 
-    /// Adds the effect of force errors to the initial state, each by one row of `(n, 2n)`.
+    /// Adds the effect of force errors to the initial state, each by one row of `(n, starts)`.
     pub fn disturb(&mut self, impulses: &[f64]) {
         let size = self.expected[0].len();
         for impulse in impulses.chunks_exact(size) {
@@ -145,12 +145,17 @@ impl Problem<'_> {
         if force.is_empty() && unknown_start.is_none() {
             return Vec::new();
         }
-        let mut variance = vec![0.0; 4 * n * n];
-        for k in (0..2 * n).filter(|_| unknown_start.is_some()) {
-            let time = if k < n { 1.0 } else { self.course.step };
-            variance[k * (2 * n + 1)] = (UNKNOWN * self.sigma[k % n] / time).powi(2);
+        let (starts, closed) = (self.course.starts(), self.course.equations.rows.as_ref());
+        // Changes of positions come first.
+        let positions = closed.map_or(n, |rows| n - rows.holonomic());
+        let most = self.sigma.iter().copied().fold(0.0, f64::max);
+        let mut variance = vec![0.0; starts * starts];
+        for k in (0..starts).filter(|_| unknown_start.is_some()) {
+            let time = if k < positions { 1.0 } else { self.course.step };
+            let sigma = if closed.is_some() { most } else { self.sigma[k % n] };
+            variance[k * (starts + 1)] = (UNKNOWN * sigma / time).powi(2);
         }
-        let expected = vec![vec![0.0; 2 * n]; 1 + width];
+        let expected = vec![vec![0.0; starts]; 1 + width];
         let filter = || Filter {
             unknown_start: *unknown_start,
             variance: variance.clone(),
@@ -160,30 +165,44 @@ impl Problem<'_> {
         (0..lanes).map(|_| filter()).collect()
     }
 
-    /// Changes of the initial states by force errors over one interval, `(lanes, n, 2n)`; `slopes` are the derivatives of states by initial
-    /// states, `(lanes, 2n, 2n)`, `mass` is `(lanes, n, n)`. Empty for exact forces.
-    pub(super) fn impulses(&self, slopes: &[f64], mass: &[f64], step: f64) -> Vec<f64> {
-        let (n, force) = (self.course.equations.n, &self.disturbances.force);
-        let size = 2 * n;
-        let mut inverse_mass = vec![0.0; mass.len()];
+    /// Changes of the initial states by force errors over one interval, `(lanes, n, starts)`; `slopes` are the derivatives of states by initial
+    /// states, `(lanes, 2n, starts)`, `mobility` what a unit of force accelerates, `(lanes, n, n)`.
+    pub(super) fn impulses(&self, slopes: &[f64], mobility: &[f64], step: f64) -> Vec<f64> {
+        let (n, force, starts) = (self.course.equations.n, &self.disturbances.force, self.course.starts());
         // Lanes that fail are NaN: their segments fail with them.
-        let _ = linalg::inverse(n, mass, &mut inverse_mass, &mut Workspace::new());
-        let back = inverses(size, slopes);
+        let back = if starts == 2 * n { inverses(starts, slopes) } else { within(starts, slopes, 2 * n) };
         let mut impulses = vec![0.0; slopes.len() / 2];
-        for ((into, back), mass) in impulses
-            .chunks_exact_mut(n * size)
-            .zip(back.chunks_exact(size * size))
-            .zip(inverse_mass.chunks_exact(n * n))
+        for ((into, back), mobility) in impulses
+            .chunks_exact_mut(n * starts)
+            .zip(back.chunks_exact(starts * 2 * n))
+            .zip(mobility.chunks_exact(n * n))
         {
-            for (j, into) in into.chunks_exact_mut(size).enumerate() {
-                let kick = &mass[j * n..(j + 1) * n];
+            for (j, into) in into.chunks_exact_mut(starts).enumerate() {
+                let kick = &mobility[j * n..(j + 1) * n];
                 into.iter_mut()
-                    .zip(back.chunks_exact(size))
+                    .zip(back.chunks_exact(2 * n))
                     .for_each(|(x, line)| *x = force[j] * step * dot(&line[n..], kick));
             }
         }
         impulses
     }
+}
+
+/// Left inverses `(S' S)^-1 S'` of matrices `S`, `(batch, rows, columns)`: what changes of states within the constraints were at the start.
+fn within(columns: usize, matrices: &[f64], rows: usize) -> Vec<f64> {
+    let size = rows * columns;
+    let gram = |matrix: &[f64]| -> Vec<f64> {
+        let column = |k: usize| matrix.iter().skip(k).step_by(columns).copied().collect::<Vec<f64>>();
+        let all: Vec<Vec<f64>> = (0..columns).map(column).collect();
+        all.iter().flat_map(|a| all.iter().map(|b| dot(a, b))).collect()
+    };
+    let grams: Vec<f64> = matrices.chunks_exact(size).flat_map(gram).collect();
+    let inverses = inverses(columns, &grams);
+    let lanes = matrices.chunks_exact(size).zip(inverses.chunks_exact(columns * columns));
+    let of = |(matrix, inverse): (&[f64], &[f64])| -> Vec<f64> {
+        inverse.chunks_exact(columns).flat_map(|line| matrix.chunks_exact(columns).map(|row| dot(line, row))).collect()
+    };
+    lanes.flat_map(of).collect()
 }
 
 #[cfg(test)]

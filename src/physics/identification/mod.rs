@@ -29,6 +29,9 @@ mod bodies;
 mod bootstrap;
 mod by_forces;
 mod choices;
+mod closed;
+#[cfg(test)]
+mod closed_tests;
 mod covariance;
 mod cure;
 mod descent;

@@ -71,7 +71,7 @@ fn a_constant_at_its_bound_is_called_that() {
 fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
     let form = damped(40.0, 0.05);
     let recording = recorded(&damped(2.0, 8.0), &[&[1.3, 0.2]], (4.0, 0.02), &[1e-3], 1);
-    let equations = crate::lagrangian::Equations::record(&form, &[1, 2]).unwrap().unwrap();
+    let equations = crate::lagrangian::Equations::record(&form, &[1, 2], &[]).unwrap().unwrap();
     let course = Course {
         recording: &recording,
         equations: &equations,

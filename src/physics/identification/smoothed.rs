@@ -1,5 +1,6 @@
 //! Least-squares fits to smoothed motion: to its accelerations, where the fit to the motion begins, or to known forces.
 
+use super::closed::FreePart;
 use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
 use super::solve::{Normal, Problem};
@@ -30,6 +31,8 @@ pub(super) struct States {
     pub averaged: usize,
     /// Weights of the force equations in averages, `(states, n)`; empty for equal weights.
     pub share: Vec<f64>,
+    /// Units in which forces on the coordinates are compared under constraints, `(n)`.
+    pub units: Vec<f64>,
 }
 
 /// What the constants are fitted to.
@@ -134,11 +137,12 @@ impl States {
                 Met::Forces => {
                     residual.resize(a.len(), 0.0);
                     follower.lacking_forces(measured, &mut residual);
-                    let slopes = follower.force_slopes(&values, (q, v, measured)).chunks_exact(width);
-                    residual.iter().zip(slopes).for_each(|(r, slopes)| {
+                    let (slopes, added) = (follower.force_slopes(&values, (q, v, measured)), rows.len());
+                    residual.iter().zip(slopes.chunks_exact(width)).for_each(|(r, slopes)| {
                         rows.push(*r);
                         rows.extend_from_slice(slopes);
                     });
+                    self.free_part(follower, |free| free.take_all(&mut rows[added..], width + 1));
                 }
             }
         });
@@ -148,6 +152,14 @@ impl States {
                 rows.chunks_exact(width + 1).flat_map(|row| &row[range.clone()]).copied().collect::<Vec<_>>()
             });
             visit(part * LANES * n, &residual, &slopes);
+        }
+    }
+
+    /// Calls `act` with what tells the part of forces on the states evaluated last that constraints cannot balance; not without constraints.
+    pub fn free_part(&self, follower: &Follower<'_>, act: impl FnOnce(FreePart<'_>)) {
+        let (n, rows) = (self.units.len(), follower.rows());
+        if n > 0 && !rows.is_empty() {
+            act(FreePart { rows, constraints: follower.constraints(), units: &self.units });
         }
     }
 
@@ -222,7 +234,11 @@ impl States {
     /// Force residuals, `(states, n)`, and their averages.
     pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> [Vec<f64>; 2] {
         let mut all = vec![0.0; self.q.len()];
-        self.batches(problem, x, |follower, range, _| follower.lacking_forces(&self.a[range.clone()], &mut all[range]));
+        self.batches(problem, x, |follower, range, _| {
+            let found = &mut all[range.clone()];
+            follower.lacking_forces(&self.a[range], found);
+            self.free_part(follower, |free| free.take_all(found, 1));
+        });
         let mut averages = all.clone();
         self.average(problem.course.equations.n, &mut averages);
         [all, averages]
@@ -336,6 +352,7 @@ impl States {
             places: kept.iter().map(|&at| self.places[at]).collect(),
             weight: of(&self.weight),
             share: of(&self.share),
+            units: self.units.clone(),
             ..*self
         }
     }

@@ -191,7 +191,8 @@ impl Problem<'_> {
     ) -> f64 {
         let (n, m) = (self.n(), self.chosen.len());
         let values = self.parameters(x);
-        let columns = 2 * n + m;
+        let starts = self.course.starts();
+        let columns = starts + m;
         let mut filters = self.filters(segments.len(), columns + self.sensors.len());
         let derivatives = derivatives || !filters.is_empty();
         let sensors: Vec<[f64; 3]> = (0..n).map(|i| self.sensor(x, i)).collect();
@@ -245,8 +246,9 @@ impl Problem<'_> {
             }
             if noisy {
                 follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
-                let impulses = self.impulses(&state.by_starts(n, columns), follower.mass(), self.course.step);
-                filters.iter_mut().zip(impulses.chunks_exact(2 * n * n)).for_each(|(filter, own)| filter.disturb(own));
+                let slopes = state.by_starts(n, (starts, columns));
+                let impulses = self.impulses(&slopes, &follower.mobility(), self.course.step);
+                filters.iter_mut().zip(impulses.chunks_exact(n * starts)).for_each(|(filter, own)| filter.disturb(own));
             }
         };
         Follower::new(&self.course).follow(&values, segments, derivatives, read);
@@ -255,13 +257,13 @@ impl Problem<'_> {
 
     /// Normal equations of a batch of segments; `None` for those that cannot be followed.
     fn batch(&self, x: &[f64], segments: &[&Segment]) -> Vec<Option<Linear>> {
-        let n = self.n();
-        let width = 2 * n + self.unknowns();
+        let starts = self.course.starts();
+        let width = starts + self.unknowns();
         let empty = |segment: &&Segment| Linear {
             matrix: vec![0.0; width * width],
             right: vec![0.0; width],
             square: 0.0,
-            count: self.readings(std::slice::from_ref(*segment)) - 2.0 * n as f64,
+            count: self.readings(std::slice::from_ref(*segment)) - starts as f64,
         };
         let mut found: Vec<Linear> = segments.iter().map(empty).collect();
         self.residuals(x, segments, true, |lane, _, _, residual, row| {
@@ -346,7 +348,8 @@ impl Problem<'_> {
     /// The normal equations after eliminating the initial states.
     pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment]) -> Normal {
         let (n, m) = (self.n(), self.unknowns());
-        let (starts, width) = (2 * n, 2 * n + m);
+        let starts = self.course.starts();
+        let width = starts + m;
         let mut normal = Normal::empty(m);
         for (linear, segment) in found.iter().zip(segments) {
             let Some(linear) = linear else {
@@ -385,7 +388,7 @@ impl Problem<'_> {
 
     /// Inverse of the block of the initial state, damped by a share of its diagonal.
     pub(super) fn start_inverse(&self, linear: &Linear, damping: f64) -> Vec<f64> {
-        let starts = 2 * self.n();
+        let starts = self.course.starts();
         let width = starts + self.unknowns();
         let own = (0..starts * starts).map(|at| {
             let x = linear.matrix[at / starts * width + at % starts];

@@ -108,7 +108,7 @@ impl Fitted {
 /// Identifies the constants of a system from recorded motion; angles are unwrapped, numbers are in the units of the system.
 ///
 /// # Errors
-/// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and systems under constraints.
+/// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and positions that constraints do not allow.
 /// Constants that the motion does not determine are not an error, nor is a model that does not fit: the result reports them.
 pub fn identify(
     instance: &SystemInstance<f64>,
@@ -135,8 +135,9 @@ pub fn identify(
     let met = met(instance, recording, options)?;
     let stop = &options.cancellation;
     stop.stage("equations of motion");
-    let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
-    let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
+    let unknown = || IdentifyError::Unknown { system: instance.system.name.to_string() };
+    let acting = instance.acting_constraints()?;
+    let equations = Equations::record(instance, &chosen, &acting)?.ok_or_else(unknown)?;
     stop.check()?;
     stop.stage("smoothed motion");
     let pieces = Pieces::new(recording, filled.as_ref(), options)?;
@@ -194,6 +195,7 @@ pub fn identify(
         return Ok(found.named(recording, options.robust));
     }
     let states = States::new(&on_pieces, &pieces.smoothed);
+    on_pieces.require_constraints(&x, (&states.q, &states.v))?;
     let cut = match equations.known {
         _ if states.len(n) == 0 => Some(Vec::new()),
         0 => states.fit(&on_pieces, &mut x, met).map(|_| Vec::new()),
@@ -260,7 +262,8 @@ pub fn identify(
         let [low, high] = [low, high].map(|x| rounded(*x, 4));
         format!("{symbol} was searched from {low} to {high}; begin nearer if it may lie outside")
     };
-    found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect()].concat();
+    let off = on_pieces.off_constraints(&fitted.x, (&states.q, &states.v));
+    found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect(), off].concat();
     rivals.widen(&mut found);
     Ok(found.named(recording, options.robust))
 }
@@ -336,6 +339,7 @@ fn first(problem: &mut Problem<'_>, starts: [Vec<f64>; 2], segments: Vec<Segment
 /// The fit of the first segments from given values.
 fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Option<Fitted> {
     problem.course.substeps = 1;
+    problem.bring(&x, &mut segments);
     choose_steps(problem, &x, &segments);
     let followed = problem.all(&x, &segments);
     let mut kept = followed.iter().map(Option::is_some);

@@ -350,7 +350,7 @@ fn what_does_not_fit_together_is_refused() {
         }],
     };
     let error = identify(&constrained, &plane, &Default::default()).unwrap_err();
-    assert!(matches!(error, IdentifyError::Constrained { .. }), "{error}");
+    assert!(matches!(error, IdentifyError::OffConstraint { .. }), "{error}");
 }
 
 /// An oscillator under a force of which eight samples a period are known: curves between them leave less than straight lines do.

@@ -2,6 +2,7 @@
 
 mod certify;
 mod check;
+mod closed;
 mod configuration;
 mod constraints;
 mod conveniences;

@@ -1,5 +1,6 @@
 //! A model under constraints.
 
+use super::equations::evaluate;
 use super::programs::{RecordedRows, RowPrograms, Under, most_products};
 use super::projection::project;
 use super::rows::independent;
@@ -147,6 +148,13 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
         Self { shared: true, ..self }
     }
 
+    /// The same under only those rows.
+    pub(crate) fn only(mut self, kept: Vec<usize>) -> Self {
+        self.names = kept.iter().map(|&row| self.names[row].clone()).collect();
+        self.kept = kept;
+        self
+    }
+
     /// The same without the constraints that follow from those before them at all of some states, `(batch, n)` each, which are
     /// projected onto the constraints first.
     ///
@@ -211,44 +219,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
     }
 
     fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>) {
-        let (n, m, zero, one) = (q.len(), self.kept.len(), <S as Real>::zero(), <S as Real>::one());
-        let holonomic: Vec<bool> = self.kept.iter().map(|&row| self.constraints.is_holonomic(row)).collect();
-        rows.matrix.clear();
-        rows.matrix.resize(m * n, zero);
-        let lift = |x: &[S]| x.iter().map(|&x| Dual::lift(x)).collect::<Vec<_>>();
-        let (parameters, mut state) = (lift(&self.parameters), [lift(q), lift(v)]);
-        let mut values = vec![Dual::lift(zero); self.rows];
-        // A function of coordinates has its gradient by them, a row that is linear in the velocities by those.
-        for (by, kind) in [(0, true), (1, false)] {
-            if !holonomic.contains(&kind) {
-                continue;
-            }
-            for i in 0..n {
-                state[by][i].tangent = one;
-                self.constraints.values(&parameters, &state[0], &state[1], &mut values);
-                state[by][i].tangent = zero;
-                for (k, &row) in self.kept.iter().enumerate().filter(|(k, _)| holonomic[*k] == kind) {
-                    rows.matrix[k * n + i] = values[row].tangent;
-                }
-            }
-        }
-        // Along the motion: value, rate and second derivative of a function; value and rate of a row.
-        let parameters: Vec<HyperDual<S>> = self.parameters.iter().map(|&x| HyperDual::lift(x)).collect();
-        let q: Vec<HyperDual<S>> = q.iter().zip(v).map(|(&q, &v)| HyperDual::new(q, v, v, zero)).collect();
-        let v: Vec<HyperDual<S>> = v.iter().map(|&v| HyperDual::lift(v)).collect();
-        let mut values = vec![HyperDual::lift(zero); self.rows];
-        self.constraints.values(&parameters, &q, &v, &mut values);
-        for field in [&mut rows.values, &mut rows.rates, &mut rows.drift] {
-            field.clear();
-        }
-        for (&row, &holonomic) in self.kept.iter().zip(&holonomic) {
-            let found = values[row];
-            let (value, rate, drift) =
-                if holonomic { (found.value, found.s, found.st) } else { (zero, found.value, found.s) };
-            rows.values.push(value);
-            rows.rates.push(rate);
-            rows.drift.push(drift);
-        }
+        evaluate(&self.constraints, (self.rows, &self.kept), &self.parameters, (q, v), rows);
     }
 
     fn programs(&self) -> Option<&RowPrograms<S>> {

@@ -71,7 +71,7 @@ impl From<ConstraintError> for FormulaError {
 }
 
 /// A point in space that nothing moves: what constraints are beside before there is a model.
-struct Free(usize);
+pub(super) struct Free(pub usize);
 
 impl Lagrangian for Free {
     fn coordinates(&self) -> usize {

@@ -13,6 +13,7 @@
 
 mod constrained;
 mod described;
+mod equations;
 mod formulas;
 mod kkt;
 mod least_norm;
@@ -26,6 +27,7 @@ mod tests;
 
 pub use constrained::{Constrained, ConstraintError};
 pub use described::ExpressionConstraints;
+pub(crate) use equations::{RowEquations, Tangent};
 pub use formulas::{FormulaConstraints, FormulaError};
 pub(crate) use kkt::Bordered;
 pub(super) use kkt::{Motion, accelerate};
@@ -34,12 +36,10 @@ pub use manifold::{Manifold, ManifoldRows, RowAdjoint};
 pub(super) use projection::along_rows;
 pub use projection::{OffManifold, project, project_acceleration};
 pub use reduced::ReducedMass;
-pub(crate) use rows::dot;
-#[cfg(feature = "training")]
-pub(crate) use rows::independent_rows;
-pub(super) use rows::length;
 #[cfg(feature = "data")]
 pub(crate) use rows::take_out;
+pub(super) use rows::{complement, length};
+pub(crate) use rows::{dot, independent_rows};
 
 use crate::scalar::Real;
 use alloc::string::String;

@@ -64,7 +64,7 @@ pub(crate) fn independent_rows<S: Scalar>(n: usize, matrix: &[S]) -> (Vec<usize>
 }
 
 /// An orthonormal basis, `(n - k, n)`, of what is perpendicular to orthonormal rows, `(k, n)`.
-pub(super) fn complement<S: Scalar>(n: usize, rows: &[S]) -> Vec<S> {
+pub(in crate::mechanics::lagrangian) fn complement<S: Scalar>(n: usize, rows: &[S]) -> Vec<S> {
     let mut all = rows.to_vec();
     while all.len() < n * n {
         // The axis with the largest part outside what there is.

@@ -1,0 +1,48 @@
+//! Forces of drives on some coordinates that give constrained motion its accelerations.
+
+use super::constraints::{along_rows, complement, independent_rows};
+use super::{Manifold, MechanicsError, dot};
+use crate::linalg::{Workspace, eigh};
+use crate::scalar::{Real, Scalar};
+use alloc::vec::Vec;
+
+/// Smallest motion of the drives, over that of all coordinates, that they can hold.
+const LEAST_MOTION: f64 = 1e-6;
+
+/// Refuses drives, by the numbers of their coordinates, that are fewer than the degrees of freedom.
+///
+/// # Errors
+/// [`MechanicsError::Drives`].
+pub(super) fn require<S: Scalar>(
+    n: usize,
+    manifold: Option<&dyn Manifold<S>>,
+    drives: &[usize],
+) -> Result<(), MechanicsError> {
+    let expected = n - manifold.map_or(0, |manifold| manifold.names().len());
+    let distinct = (0..n).filter(|i| drives.contains(i)).count();
+    if distinct < expected || drives.len() != distinct {
+        return Err(MechanicsError::Drives { expected, found: distinct });
+    }
+    Ok(())
+}
+
+/// The shortest force `(n)` on driven coordinates alone that does to motion along rows `A`, `(m, n)`, what `force` does: `Z' B u = Z' f` with a
+/// basis `Z` of the motion that they leave. `None` where some of this motion does not move the drives.
+pub(super) fn driven<S: Scalar>(drives: &[usize], rows: &[S], force: &[S]) -> Option<Vec<S>> {
+    let (n, count) = (force.len(), drives.len());
+    let free = complement(n, &independent_rows(n, rows).1);
+    let moved: Vec<S> = free.chunks_exact(n).flat_map(|z| drives.iter().map(move |&i| z[i])).collect();
+    let asked: Vec<S> = free.chunks_exact(n).map(|z| dot(z, force)).collect();
+    let d = asked.len();
+    let gram: Vec<S> =
+        (0..d * d).map(|at| dot(&moved[at / d * count..][..count], &moved[at % d * count..][..count])).collect();
+    let (mut values, mut vectors) = (asked.clone(), gram.clone());
+    eigh(d, &gram, &mut values, &mut vectors, &mut Workspace::new()).ok()?;
+    let least = values.iter().fold(1.0, |least: f64, value| least.min(value.to_f64()));
+    if least < LEAST_MOTION * LEAST_MOTION {
+        return None;
+    }
+    let mut found = vec![<S as Real>::zero(); n];
+    drives.iter().zip(along_rows(count, &moved, &asked).0).for_each(|(&i, u)| found[i] = u);
+    Some(found)
+}

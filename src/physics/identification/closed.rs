@@ -1,0 +1,323 @@
+//! Systems under constraints, such as closed chains: their accelerations, the initial states that they allow, and the part of forces that no
+//! force of constraint can balance.
+//!
+//! With multipliers `lambda` the equations are `M a - h - A^T lambda = Q`, `A a = -gamma`. A change of anything that they depend on changes
+//! accelerations by the solution with the same matrix `[M A^T; A 0]`. Initial states move within the constraints: along the directions of a
+//! tangent, by the least change where a constant moves the constraints, and back onto them by projection.
+
+use super::IdentifyError;
+use super::follow::{Course, LANES, Segment};
+use super::solve::Problem;
+use crate::constraints::OBEDIENCE;
+use crate::lagrangian::{
+    Bordered, Manifold, ManifoldRows, RowEquations, Tangent, dot, independent_rows, project, take_out,
+};
+use crate::linalg::{self, Workspace};
+use crate::names::rounded;
+use crate::tape::Replay;
+use std::sync::Arc;
+
+/// Share of a force, in units of the forces of its state, that is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Constraints of the states that are evaluated side by side; the buffers are reused.
+pub(super) struct Closed {
+    size: (usize, usize),
+    rows: Replay<f64>,
+    slopes: Replay<f64>,
+    /// The rows `A`, `(lanes, m, n)`, and `-gamma`, `(lanes, m)`.
+    matrix: Vec<f64>,
+    drift: Vec<f64>,
+    bordered: Bordered<f64>,
+    /// The multipliers with opposite sign, `(lanes, m)`.
+    load: Vec<f64>,
+    /// Derivatives of the equations, `(lanes, n + m, columns)`.
+    by_state: Vec<f64>,
+}
+
+impl Closed {
+    pub fn new(n: usize, rows: &RowEquations) -> Self {
+        let (drift, load, by_state) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            size: (n, rows.names.len()),
+            rows: Replay::new(Arc::clone(&rows.rows)),
+            slopes: Replay::new(Arc::clone(&rows.slopes)),
+            matrix: Vec::new(),
+            drift,
+            bordered: Bordered::default(),
+            load,
+            by_state,
+        }
+    }
+
+    /// The rows of the states evaluated last, `(lanes, m, n)`.
+    pub fn matrix(&self) -> &[f64] {
+        &self.matrix
+    }
+
+    /// Accelerations of states `(q, v)` with these mass matrices and forces; those that have none are `NaN`.
+    pub fn accelerate(
+        &mut self,
+        values: &[f64],
+        (q, v): (&[f64], &[f64]),
+        (mass, forces): (&[f64], &[f64]),
+        (a, workspace): (&mut [f64], &mut Workspace<f64>),
+    ) {
+        let (n, m) = self.size;
+        let lanes = q.len() / n;
+        self.matrix.resize(lanes * m * n, 0.0);
+        self.drift.resize(lanes * m, 0.0);
+        self.load.resize(lanes * m, 0.0);
+        // Shapes are those of the recorded program.
+        let _ = self.rows.evaluate(lanes, &[q, v], values, &mut [&mut self.matrix, &mut self.drift]);
+        self.drift.iter_mut().for_each(|drift| *drift = -*drift);
+        self.bordered.set((n, m), mass, &self.matrix);
+        self.bordered.solve(forces, &self.drift, a, &mut self.load, workspace);
+    }
+
+    /// The equations' derivatives, `(lanes, n + m, columns)`, of which `unconstrained`, `(lanes, n, columns)`, are those without forces of
+    /// constraint, and the matrices `[M A^T; A 0]`, at the states whose accelerations were found last.
+    pub fn slopes(&mut self, values: &[f64], [q, v, a]: [&[f64]; 3], unconstrained: &[f64]) -> (&[f64], &[f64]) {
+        let (n, m) = self.size;
+        let lanes = q.len() / n;
+        let columns = unconstrained.len() / q.len().max(1);
+        self.by_state.resize(lanes * (n + m) * columns, 0.0);
+        let lambda: Vec<f64> = self.load.iter().map(|load| -load).collect();
+        let _ = self.slopes.evaluate(lanes, &[q, v, a, &lambda], values, &mut [&mut self.by_state]);
+        let blocks = self.by_state.chunks_exact_mut((n + m) * columns).zip(unconstrained.chunks_exact(n * columns));
+        blocks.for_each(|(whole, own)| whole.iter_mut().zip(own).for_each(|(x, own)| *x += own));
+        (&self.by_state, self.bordered.matrices())
+    }
+
+    /// What a unit of force on each coordinate accelerates at the states whose accelerations were found last, `(lanes, n, n)`.
+    pub fn mobility(&self) -> Vec<f64> {
+        let (n, m) = self.size;
+        let k = n + m;
+        let mut inverse = vec![0.0; self.bordered.matrices().len()];
+        // Lanes that fail are NaN.
+        let _ = linalg::inverse(k, self.bordered.matrices(), &mut inverse, &mut Workspace::new());
+        inverse
+            .chunks_exact(k * k)
+            .flat_map(|inverse| inverse.chunks_exact(k).take(n).flat_map(|row| &row[..n]))
+            .copied()
+            .collect()
+    }
+}
+
+/// The part of forces that no force of constraint can balance, at states with rows `A`, `(states, m, n)`. Forces are compared in units of
+/// their own, `(n)`.
+#[derive(Clone, Copy)]
+pub(super) struct FreePart<'a> {
+    pub rows: &'a [f64],
+    pub constraints: usize,
+    pub units: &'a [f64],
+}
+
+impl FreePart<'_> {
+    /// An orthonormal basis of what the constraints of a state can carry, in the units.
+    fn carried(&self, state: usize) -> Vec<f64> {
+        let n = self.units.len();
+        let size = self.constraints * n;
+        let rows = self.rows[state * size..(state + 1) * size].iter().zip(self.units.iter().cycle());
+        independent_rows(n, &rows.map(|(a, unit)| a / unit).collect::<Vec<_>>()).1
+    }
+
+    /// Takes out of forces on one state what its constraints can carry.
+    fn take(&self, carried: &[f64], force: &mut [f64]) {
+        force.iter_mut().zip(self.units).for_each(|(force, unit)| *force /= unit);
+        let size = dot(force, force).sqrt();
+        take_out(force, carried);
+        let rounded = |x: f64| if x.abs() <= ROUNDING * size { 0.0 } else { x };
+        force.iter_mut().zip(self.units).for_each(|(force, unit)| *force = rounded(*force) * unit);
+    }
+
+    /// The same with rows of numbers for every coordinate, `(states, n, numbers)`.
+    pub fn take_all(&self, forces: &mut [f64], numbers: usize) {
+        let n = self.units.len();
+        let mut column = vec![0.0; n];
+        for (state, block) in forces.chunks_exact_mut(n * numbers).enumerate() {
+            let carried = self.carried(state);
+            for k in 0..numbers {
+                (0..n).for_each(|i| column[i] = block[i * numbers + k]);
+                self.take(&carried, &mut column);
+                (0..n).for_each(|i| block[i * numbers + k] = column[i]);
+            }
+        }
+    }
+
+    /// Standard deviations, `(n)`, of the part for independent errors of accelerations and of forces at one state.
+    pub fn errors(&self, state: usize, mass: &[f64], (of_acceleration, of_force): (&[f64], &[f64])) -> Vec<f64> {
+        let (n, carried) = (self.units.len(), self.carried(state));
+        let mut squares = vec![0.0; n];
+        let mut add = |mut effect: Vec<f64>| {
+            self.take(&carried, &mut effect);
+            squares.iter_mut().zip(&effect).for_each(|(square, x)| *square += x * x);
+        };
+        for k in 0..n {
+            add((0..n).map(|i| mass[i * n + k] * of_acceleration[k]).collect());
+            add((0..n).map(|i| if i == k { of_force[k] } else { 0.0 }).collect());
+        }
+        squares.into_iter().map(f64::sqrt).collect()
+    }
+}
+
+/// Moves initial states within the constraints when unknowns change.
+pub(super) struct Mover<'a> {
+    rows: &'a RowEquations,
+    values: Vec<f64>,
+    /// Changes of the constants.
+    change: Vec<f64>,
+    before: Box<dyn Manifold<f64>>,
+    after: Box<dyn Manifold<f64>>,
+}
+
+impl Course<'_> {
+    /// Number of independent changes of an initial state.
+    pub fn starts(&self) -> usize {
+        self.equations.rows.as_ref().map_or(2 * self.equations.n, RowEquations::freedom)
+    }
+
+    /// How initial states may change within the constraints; none of a system without constraints.
+    pub(super) fn tangents(&self, values: &[f64], segments: &[&Segment]) -> Vec<Tangent> {
+        let Some((rows, manifold)) = self.manifold(values) else { return Vec::new() };
+        segments.iter().map(|segment| rows.tangent(&*manifold, values, &segment.start)).collect()
+    }
+
+    fn manifold(&self, values: &[f64]) -> Option<(&RowEquations, Box<dyn Manifold<f64>>)> {
+        let rows = self.equations.rows.as_ref()?;
+        // As many values as the constraints were recorded with.
+        Some((rows, Box::new(rows.manifold(values).ok()?)))
+    }
+}
+
+impl Mover<'_> {
+    /// Moves a start by a step along its free directions, lets it follow the constants, and brings it back to the constraints.
+    fn advance(&self, start: &mut [f64], step: &[f64]) {
+        let Tangent { free, following } = self.rows.tangent(&*self.before, &self.values, start);
+        let directions =
+            free.chunks_exact(start.len()).zip(step).chain(following.chunks_exact(start.len()).zip(&self.change));
+        directions.for_each(|(direction, size)| start.iter_mut().zip(direction).for_each(|(x, d)| *x += size * d));
+        bring(&*self.after, start);
+    }
+}
+
+/// Brings a start to the constraints by the least change; one from which no way leads there stays.
+fn bring(manifold: &dyn Manifold<f64>, start: &mut [f64]) {
+    let mut state = start.to_vec();
+    let (q, v) = state.split_at_mut(start.len() / 2);
+    if project(manifold, q, v).is_ok() {
+        start.copy_from_slice(&state);
+    }
+}
+
+/// How far smoothed positions are from a constraint.
+struct Distance {
+    name: String,
+    /// Root mean squares across the constraint: the distance, the noise of the positions, their spread.
+    missed: f64,
+    noise: f64,
+    size: f64,
+    /// `true` if an unknown constant moves the constraint.
+    open: bool,
+}
+
+impl Problem<'_> {
+    /// Takes the step from unknowns `x` to others.
+    pub(super) fn mover(&self, x: &[f64], moved: &[f64]) -> Option<Mover<'_>> {
+        let values = self.parameters(x);
+        let (rows, before) = self.course.manifold(&values)?;
+        let (_, after) = self.course.manifold(&self.parameters(moved))?;
+        let change = x.iter().zip(moved).take(self.chosen.len()).map(|(x, moved)| moved - x).collect();
+        Some(Mover { rows, values, change, before, after })
+    }
+
+    /// Brings the starts of segments to the constraints that constants give.
+    pub(super) fn bring(&self, x: &[f64], segments: &mut [Segment]) {
+        if let Some((_, manifold)) = self.course.manifold(&self.parameters(x)) {
+            segments.iter_mut().for_each(|segment| bring(&*manifold, &mut segment.start));
+        }
+    }
+
+    /// The same for states `(q, v)`; those from which no way leads to the constraints become `NaN`.
+    pub(super) fn bring_states(&self, x: &[f64], (q, v): (&mut [f64], &mut [f64])) {
+        let (n, found) = (self.course.equations.n, self.course.manifold(&self.parameters(x)));
+        let Some((_, manifold)) = found else { return };
+        for (q, v) in q.chunks_exact_mut(n).zip(v.chunks_exact_mut(n)) {
+            if project(&*manifold, q, v).is_err() {
+                q.fill(f64::NAN);
+            }
+        }
+    }
+
+    /// Constraints of coordinates alone from which smoothed states `(q, v)` are farther than motion that obeys them, with constants `x`.
+    fn distances(&self, x: &[f64], (q, v): (&[f64], &[f64])) -> Vec<Distance> {
+        let (n, values) = (self.course.equations.n, self.parameters(x));
+        let Some((rows, manifold)) = self.course.manifold(&values) else { return Vec::new() };
+        let m = rows.names.len();
+        let (mut squares, mut open, mut count) = (vec![[0.0; 3]; m], vec![false; m], 0.0);
+        let mut found = ManifoldRows::default();
+        for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+            manifold.rows(q, v, &mut found);
+            let gradients = found.matrix.chunks_exact(n);
+            for ((sums, gradient), missed) in squares.iter_mut().zip(gradients).zip(&found.values) {
+                let across =
+                    |sizes: &[f64]| gradient.iter().zip(sizes).map(|(a, size)| (a * size).powi(2)).sum::<f64>();
+                let length = dot(gradient, gradient);
+                let all = [missed * missed, across(&self.sigma), across(&self.spread)];
+                sums.iter_mut().zip(all).for_each(|(sum, x)| *sum += if length > 0.0 { x / length } else { 0.0 });
+            }
+            for (at, by) in rows.by_parameters(&values, (q, v)).chunks_exact(2).enumerate() {
+                open[at % m] |= by != [0.0; 2];
+            }
+            count += 1.0;
+        }
+        let of = |(row, (sums, open)): (usize, ([f64; 3], bool))| {
+            let [missed, noise, size] = sums.map(|sum| (sum / f64::max(count, 1.0)).sqrt());
+            Distance { name: rows.names[row].clone(), missed, noise, size, open }
+        };
+        let all = squares.into_iter().zip(open).enumerate().map(of);
+        all.filter(|of| of.missed > f64::max(OBEDIENCE.0 * of.noise, OBEDIENCE.1 * of.size)).collect()
+    }
+
+    /// Refuses smoothed positions that are off a constraint whatever the unknown constants are.
+    ///
+    /// # Errors
+    /// [`IdentifyError::OffConstraint`].
+    pub(super) fn require_constraints(&self, x: &[f64], states: (&[f64], &[f64])) -> Result<(), IdentifyError> {
+        let off = self.distances(x, states).into_iter().find(|distance| !distance.open);
+        off.map_or(Ok(()), |Distance { name: constraint, missed: distance, noise, .. }| {
+            Err(IdentifyError::OffConstraint { constraint, distance, noise })
+        })
+    }
+
+    /// Messages about constraints from which smoothed positions are off with the constants that were found.
+    pub(super) fn off_constraints(&self, x: &[f64], states: (&[f64], &[f64])) -> Vec<String> {
+        let say = |Distance { name, missed, noise, .. }: Distance| {
+            let [missed, noise] = [missed, noise].map(|x| rounded(x, 3));
+            format!("the positions miss the constraint `{name}` by {missed}, root mean square, at a noise of {noise}")
+        };
+        self.distances(x, states).into_iter().map(say).collect()
+    }
+
+    /// The unknown constants that move constraints, at some of the recorded states `(q, v)`.
+    pub(super) fn moves_constraints(&self, x: &[f64], (q, v): (&[f64], &[f64])) -> Vec<usize> {
+        let (n, values) = (self.course.equations.n, self.parameters(x));
+        let Some(rows) = &self.course.equations.rows else { return Vec::new() };
+        let mut moves = vec![false; self.chosen.len()];
+        let states = q.chunks_exact(n).zip(v.chunks_exact(n));
+        for state in states.step_by((q.len() / n).div_ceil(LANES).max(1)) {
+            let by = rows.by_parameters(&values, state);
+            let of = |by: &[f64]| by.iter().any(|by| *by != 0.0);
+            moves.iter_mut().zip(by.chunks_exact(2 * rows.names.len())).for_each(|(moves, by)| *moves |= of(by));
+        }
+        (0..moves.len()).filter(|&k| moves[k]).collect()
+    }
+}
+
+/// Moves a start by a step: the whole of it without constraints, within them otherwise.
+pub(super) fn advance(mover: Option<&Mover<'_>>, start: &mut [f64], step: &[f64]) {
+    match mover {
+        Some(mover) => mover.advance(start, step),
+        None => start.iter_mut().zip(step).for_each(|(s, d)| *s += d),
+    }
+}
