@@ -46,7 +46,7 @@ impl Weighing {
 
 /// Scores of every segment, `(samples, m)`.
 pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
-    let (starts, m) = (2 * problem.sigma.len(), problem.unknowns());
+    let (starts, m) = (2 * problem.n(), problem.unknowns());
     let width = starts + m;
     // Response of the initial states to the unknowns, `(m, starts)`.
     let follow = problem.all(x, segments).into_iter().map(|linear| {

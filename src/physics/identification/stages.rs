@@ -5,6 +5,7 @@ use super::covariance::{Root, Weighing, agreement, continuation, long_run, score
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::innovations::Disturbances;
+use super::measured::{Measured, check_columns};
 use super::per_trajectory::per_trajectory;
 use super::pieces::{LEAST_SEGMENT, Pieces};
 use super::quality::{
@@ -13,6 +14,7 @@ use super::quality::{
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
+use super::unseen::{SEARCHED, Search};
 use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::system::Range;
@@ -66,7 +68,7 @@ impl Fitted {
     }
 
     /// `true` for a fit that reached the noise with every constant inside its range: no better fit is to be expected.
-    fn is_plain(&self) -> bool {
+    pub fn is_plain(&self) -> bool {
         let inside = !self.normal.held.contains(&true);
         self.normal.converged && inside && self.mean_square() < EXPLAINED * EXPLAINED
     }
@@ -116,10 +118,8 @@ pub fn identify(
     if let Some((instance, options)) = per_trajectory(instance, recording, options)? {
         return identify(&instance, recording, &options);
     }
-    let n = instance.coordinates;
-    if recording.n() != n {
-        return Err(IdentifyError::Coordinates { expected: n, found: recording.n() });
-    }
+    check_columns(instance, recording)?;
+    let n = recording.n();
     recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;
     check_errors(recording, &options.errors)?;
     let inputs = inputs(instance, recording, options)?;
@@ -129,12 +129,13 @@ pub fn identify(
     let filled = Filled::without(filled, recording, &options.missing);
     let recording = filled.as_ref().map_or(recording, |filled| &filled.recording);
     let chosen = chosen(instance, options)?;
-    let sensors = sensors(recording, options)?;
+    let sensors = sensors(instance, recording, options)?;
     let met = met(instance, recording, options)?;
     let stop = &options.cancellation;
     stop.stage("equations of motion");
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
+    let measured = Measured::record(instance, &chosen)?;
     stop.check()?;
     stop.stage("smoothed motion");
     let pieces = Pieces::new(recording, filled.as_ref(), options)?;
@@ -164,6 +165,7 @@ pub fn identify(
         ranges: instance.system.parameters.iter().map(|parameter| parameter.range).collect(),
         chosen,
         sensors,
+        measured: measured.as_ref(),
         sigma: noise.clone(),
         sigma_of: Vec::new(),
         errors: &options.errors,
@@ -176,7 +178,6 @@ pub fn identify(
         cancellation: options.cancellation.clone(),
     };
     stop.check()?;
-    let mut x = given.clone();
     let of_piece = |track: usize| inputs.get(pieces.origin(track, 0).0).copied();
     let of_pieces = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
     let course = Course { recording: &pieces.long, inputs: of_pieces, ..problem.course.clone() };
@@ -184,25 +185,29 @@ pub fn identify(
     if met == Met::Forces {
         stop.stage("forces");
         let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
-        let mut found = by_forces::identify(instance, &on_pieces, smoothing, (x, pieces.cut_long()))?;
+        let mut found = by_forces::identify(instance, &on_pieces, smoothing, (given, pieces.cut_long()))?;
         for outlier in &mut found.outliers {
             (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
         }
         found.obstacles = [pieces.still, repeated].concat();
         return Ok(found.named(recording, options.robust));
     }
-    let states = States::new(&on_pieces, &pieces.smoothed);
-    let cut = match equations.known {
-        _ if states.len(n) == 0 => Some(Vec::new()),
-        0 => states.fit(&on_pieces, &mut x, met).map(|_| Vec::new()),
-        _ => states.fit_in_time(&on_pieces, &mut x),
+    let states = match problem.measured {
+        None => Some(States::new(&on_pieces, &pieces.smoothed)),
+        Some(measured) => measured.coordinates(&pieces.smoothed).map(|own| States::new(&on_pieces, &own)),
     };
-    stop.check()?;
-    let cut = cut.ok_or(IdentifyError::Singular)?;
-    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
-    let samples = first_samples(&states, (n, pieces.step), options.segment)?;
-    stop.stage("short segments");
-    let mut fitted = first(&mut problem, [x, given.clone()], pieces.cut(samples))?;
+    let (mut fitted, cut) = match &states {
+        Some(states) => from_smoothed(&mut problem, (&on_pieces, states, &pieces), &given, options)?,
+        None => {
+            stop.stage("initial states");
+            let bounds = &instance.system.validation(instance.coordinates);
+            let [v, a] = pieces.rates();
+            let samples = first_samples((&v, &a), (n, pieces.step), options.segment)?;
+            let layout = pieces.cut(samples.max(problem.least_segment()));
+            let search = Search { problem: &mut problem, pieces: &pieces, bounds, layout }.first(&given);
+            (search?, Vec::new())
+        }
+    };
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
@@ -258,8 +263,37 @@ pub fn identify(
         format!("{symbol} was searched from {low} to {high}; begin nearer if it may lie outside")
     };
     found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect()].concat();
+    if states.is_none() && !found.explained {
+        found.obstacles.push(SEARCHED.to_string());
+    }
     rivals.widen(&mut found);
     Ok(found.named(recording, options.robust))
+}
+
+/// The fit of the first segments from constants that are fitted to smoothed accelerations; says which constants were searched in a part of
+/// their range.
+fn from_smoothed(
+    problem: &mut Problem<'_>,
+    (on_pieces, states, pieces): (&Problem<'_>, &States, &Pieces<'_>),
+    given: &[f64],
+    options: &IdentifyOptions,
+) -> Result<(Fitted, Vec<(usize, [f64; 2])>), IdentifyError> {
+    let (n, mut x) = (problem.n(), given.to_vec());
+    let cut = match problem.course.equations.known {
+        _ if states.len(n) == 0 => Some(Vec::new()),
+        0 => states.fit(on_pieces, &mut x, Met::Accelerations).map(|_| Vec::new()),
+        _ => states.fit_in_time(on_pieces, &mut x),
+    };
+    problem.cancellation.check()?;
+    let cut = cut.ok_or(IdentifyError::Singular)?;
+    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
+    let samples = first_samples((&states.v, &states.a), (n, pieces.step), options.segment)?;
+    problem.cancellation.stage("short segments");
+    let mut segments = pieces.cut(samples);
+    if let Some(measured) = problem.measured {
+        segments.iter_mut().for_each(|segment| segment.start = measured.state(&segment.start, &[]));
+    }
+    Ok((first(problem, [x, given.to_vec()], segments)?, cut))
 }
 
 /// Messages about readings that a sensor repeated.
@@ -281,9 +315,13 @@ pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
 }
 
 /// Samples of the first segments: a few time scales of the fastest coordinate, or the requested number if that is smaller.
-fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) -> Result<usize, IdentifyError> {
+fn first_samples(
+    (v, a): (&[f64], &[f64]),
+    (n, step): (usize, f64),
+    wanted: Option<f64>,
+) -> Result<usize, IdentifyError> {
     let size = |values: &[f64], i: usize| deviation(values.iter().skip(i).step_by(n));
-    let paces = (0..n).map(|i| size(&states.v, i) / size(&states.a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
+    let paces = (0..n).map(|i| size(v, i) / size(a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
     let pace = paces.fold(f64::INFINITY, f64::min);
     let samples = if pace.is_finite() { PACES * pace / step } else { 20.0 };
     let samples = samples.clamp(LEAST_SEGMENT as f64, 400.0) as usize;
@@ -398,12 +436,12 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     let stride = segments.len().div_ceil(32).max(1);
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
-    let n = problem.sigma.len();
-    let mut coarse = problem.ends(x, &probes);
+    let n = problem.width();
+    let mut coarse = problem.last_readings(x, &probes);
     while problem.course.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
         let mut finer = problem.clone();
         finer.course.substeps *= 2;
-        let fine = finer.ends(x, &probes);
+        let fine = finer.last_readings(x, &probes);
         let errors = coarse.iter().zip(&fine).flat_map(|(a, b)| {
             (0..n).map(|i| ((a[i] - b[i]) / problem.sigma[i]).abs()).filter(|e| e.is_finite()).collect::<Vec<_>>()
         });
@@ -487,7 +525,7 @@ pub(crate) fn joined(segments: &[Segment]) -> Vec<Segment> {
 
 /// Halves every segment that is long enough; both halves start on the fitted motion.
 fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
-    let long = |segment: &&Segment| segment.samples >= 2 * LEAST_SEGMENT;
+    let long = |segment: &&Segment| segment.samples >= 2 * problem.least_segment();
     let to_middle = |segment: &Segment| Segment { samples: segment.samples / 2 + 1, ..segment.clone() };
     let first: Vec<Segment> = fitted.segments.iter().filter(long).map(to_middle).collect();
     let mut middles = problem.ends(&fitted.x, &first.iter().collect::<Vec<_>>()).into_iter();

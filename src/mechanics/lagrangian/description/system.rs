@@ -103,6 +103,7 @@ impl Description {
         let dissipation = self.friction(&mut compiler, &scope)?;
         let forces = self.forces(&mut compiler, &scope, size)?;
         let events = self.compiled_events(&mut compiler, &scope)?.into();
+        let readings = self.compiled_readings(&mut compiler, &scope)?.into();
         let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
@@ -136,6 +137,7 @@ impl Description {
                 dissipation: dissipation.map(|value| ExpressionLagrangian::compiled(size, compiler.formula(value))),
                 forces,
                 events,
+                readings,
                 constraints,
                 independent: catalogued,
                 chain,
@@ -154,6 +156,7 @@ impl Description {
             return Err(DescriptionError::new("name", problem));
         }
         let inputs = self.inputs.iter().map(|(name, unit)| (format!("inputs.{name}"), unit));
+        let measured = self.measured.iter().map(|(name, own)| (format!("measured.{name}.unit"), &own.unit));
         let units = self.coordinates.iter().enumerate().map(|(i, c)| (format!("coordinates[{i}].unit"), &c.unit));
         let parameters = self.parameters.iter().map(|(name, p)| (format!("parameters.{name}.unit"), &p.unit));
         let texts = self.title.iter().map(|title| ("title".to_string(), title));
@@ -161,6 +164,7 @@ impl Description {
             .chain(self.time_unit.iter().map(|unit| ("time_unit".to_string(), unit)))
             .chain(units)
             .chain(inputs)
+            .chain(measured)
             .chain(parameters);
         for (key, text) in texts {
             if text.is_empty() || text.chars().count() > 100 || text.chars().any(char::is_control) {
@@ -183,6 +187,7 @@ impl Description {
             ("inputs", self.inputs.len()),
             ("constraints", self.constraints.len()),
             ("events", self.events.len()),
+            ("measured", self.measured.len()),
         ];
         for (key, count) in counts {
             if count > MAX_NAMES {
@@ -310,7 +315,7 @@ impl Description {
     }
 
     /// The names of forces: inputs beside all others.
-    fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
+    pub(super) fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
         let mut scope = scope.clone();
         for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| !self.marks.contains(*name)) {
             let key = || format!("inputs.{name}");
