@@ -215,3 +215,72 @@ impl Problem<'_> {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identification::Between;
+    use crate::lagrangian::{Description, Equations, configure_system};
+    use crate::recording::RecordedTrajectory;
+    use std::borrow::Cow;
+
+    const FORM: &str = r#"{"name": "watched",
+        "lagrangian": "m*a_dot^2/2 + k*cos(a - b)*a_dot*b_dot + b_dot^2*(1 + a^2) + g*cos(a) + m*sin(b)",
+        "coordinates": [{"name": "a", "periodic": true, "velocity_bounds": [-1, 1]},
+            {"name": "b", "periodic": true, "velocity_bounds": [-1, 1]}],
+        "parameters": {"m": 3, "k": 0.4, "g": 9.8, "s": 2},
+        "forces": {"b": "0.3*cos(t) - k*b_dot"},
+        "measured": {"b": "b", "pull": "m*a_ddot*cos(b) + s*sin(t) + b_ddot*a_dot", "far": {"formula": "sqrt((s - a)^2 + b^2*k)"}}}"#;
+
+    /// Readings at the last of a few samples, and their slopes by initial state and parameters 3, 0, 1.
+    fn seen(start: &[f64], change: (usize, f64)) -> (Vec<f64>, Vec<f64>) {
+        let description: Description = serde_json::from_str(FORM).unwrap();
+        let mut instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        instance.parameters[change.0] += change.1;
+        let chosen = [3, 0, 1];
+        let equations = Equations::record(&instance, &chosen).unwrap().unwrap();
+        let measured = Measured::record(&instance, &chosen).unwrap().unwrap();
+        assert!(measured.sources == [None, Some(0)] && measured.angles == [true, false, false]);
+        let times: Vec<f64> = (0..9).map(|k| 0.1 * f64::from(k)).collect();
+        let [v, a, force] = [(); 3].map(|()| Vec::new());
+        let track = RecordedTrajectory { name: "log".into(), q: vec![0.0; 3 * times.len()], times, v, a, force };
+        let coordinates = instance.measured().map(str::to_string).collect();
+        let recording = Recording { coordinates, periodic: vec![false; 3], tracks: vec![track] };
+        let course = Course {
+            recording: &recording,
+            equations: &equations,
+            chosen: chosen.len(),
+            between: Between::Linear,
+            inputs: Vec::new(),
+            step: 0.1,
+            substeps: 8,
+        };
+        let segment = Segment { track: 0, first: 0, samples: 9, start: start.to_vec() };
+        let mut sight = Sight::new(&measured);
+        Follower::new(&course).follow(&instance.parameters, &[&segment], true, |follower, sample, state| {
+            sight.look((follower, &course), &instance.parameters, (&[&segment], sample), state);
+        });
+        (sight.seen, sight.slopes)
+    }
+
+    #[test]
+    fn slopes_of_readings_are_those_of_differences() {
+        const H: f64 = 1e-5;
+        let start = [0.3, 1.1, 0.7, -0.4];
+        let (_, slopes) = seen(&start, (0, 0.0));
+        for column in 0..7 {
+            let at = |h: f64| {
+                let mut start = start;
+                if column < 4 {
+                    start[column] += h;
+                }
+                seen(&start, ([3, 0, 1][column.max(4) - 4], if column < 4 { 0.0 } else { h })).0
+            };
+            let (up, down) = (at(H), at(-H));
+            for i in 0..3 {
+                let (difference, slope) = ((up[i] - down[i]) / (2.0 * H), slopes[7 * i + column]);
+                assert!((difference - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{i} {column}: {difference} {slope}");
+            }
+        }
+    }
+}
