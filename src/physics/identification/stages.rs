@@ -63,12 +63,12 @@ pub(super) struct Fitted {
 
 impl Fitted {
     /// Mean square of the residuals.
-    fn mean_square(&self) -> f64 {
+    pub fn mean_square(&self) -> f64 {
         self.normal.square / self.normal.count.max(1.0)
     }
 
     /// `true` for a fit that reached the noise with every constant inside its range: no better fit is to be expected.
-    pub fn is_plain(&self) -> bool {
+    fn is_plain(&self) -> bool {
         let inside = !self.normal.held.contains(&true);
         self.normal.converged && inside && self.mean_square() < EXPLAINED * EXPLAINED
     }
