@@ -107,6 +107,9 @@ impl Fitted {
 
 /// Identifies the constants of a system from recorded motion; angles are unwrapped, numbers are in the units of the system.
 ///
+/// If the file of the system has a table `[measured]`, the recording holds these quantities in place of the coordinates, under their names and
+/// in their order, [`SystemInstance::measured`]; what is said of positions then holds for readings.
+///
 /// # Errors
 /// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and systems under constraints.
 /// Constants that the motion does not determine are not an error, nor is a model that does not fit: the result reports them.

@@ -54,6 +54,9 @@ impl Search<'_, '_> {
         self.problem.course.substeps = 1;
         let samples = |track: usize| self.problem.course.recording.tracks[track].len();
         let longest = self.layout.iter().map(|segment| segment.track).max_by_key(|track| samples(*track));
+        if self.layout.is_empty() {
+            return Err(IdentifyError::Lost);
+        }
         // The longest trajectory tells most about the constants.
         self.layout.sort_by_key(|segment| (Some(segment.track) != longest, segment.track, segment.first));
         let candidates = self.candidates(given, 0);
