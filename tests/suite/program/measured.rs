@@ -210,6 +210,29 @@ volts = "k*x"
 }
 
 #[test]
+fn a_sensor_may_have_an_offset_in_each_log() {
+    let folder = Folder::new();
+    let zero = "zero = { default = 0, per = \"trajectory\", learn = true }\n[measured]\nx = \"l*sin(theta) + zero\"\n";
+    let system =
+        folder.file("pendulum.toml", &format!("{PENDULUM}{zero}").replace("[parameters.k]\ndefault = 1\n", ""));
+    let plain = folder.file("plain.toml", &format!("{PENDULUM}[measured]\nx = \"l*sin(theta)\"\n"));
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut csv = "run,t,x".to_string();
+    for (run, offset, state) in [("a", 0.1, "1.2,0.4"), ("b", -0.2, "0.8,-1")] {
+        let options = format!("--param l=0.8 --param b=0.15 --state {state} --t-end 6 --dt 0.02");
+        let (names, rows) = motion(&folder, &plain, &options);
+        let place = names.iter().position(|name| name == "x").unwrap();
+        for row in rows {
+            let draw: f64 = StandardNormal.sample(&mut rng);
+            write!(csv, "\n{run},{},{}", row[0], row[place] + offset + 2e-3 * draw).unwrap();
+        }
+    }
+    let found = identified(&system, &folder.file("log.csv", &csv), &["--trajectory", "run"]);
+    let truth = [("l", 0.8), ("b", 0.15), ("zero_a", 0.1), ("zero_b", -0.2)];
+    assert!(found["explained"] == true && off(&found, &truth).iter().all(|off| off.abs() < 3.5), "{found}");
+}
+
+#[test]
 fn noise_explains_nothing() {
     let folder = Folder::new();
     let system = folder.file("one.toml", ONE_ANGLE);
