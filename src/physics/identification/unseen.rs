@@ -62,7 +62,7 @@ impl Search<'_, '_> {
         let candidates = self.candidates(given, 0);
         let (mut best, mut farthest): (Option<Fitted>, usize) = (None, 0);
         let ways = [BEFORE, 1].into_iter().flat_map(|units| candidates.iter().map(move |start| (start, units)));
-        for (start, units) in ways.take_while(|_| self.problem.cancellation.go_on()).collect::<Vec<_>>() {
+        for (start, units) in ways {
             self.problem.cancellation.check()?;
             let Some((tried, reach)) = self.beginning(given, start.clone(), units) else { continue };
             let (x, square) = (&tried.x, tried.mean_square());
