@@ -45,6 +45,7 @@ macro_rules! page {
             "[links]: crate::docs::system_files#a-chain-of-links\n",
             "[forces]: crate::docs::system_files#forces\n",
             "[inputs]: crate::docs::system_files#inputs\n",
+            "[measured]: crate::docs::system_files#measured-quantities\n",
             "[events]: crate::docs::system_files#events\n",
             "[time]: crate::docs::system_files#time\n",
             "[formulas]: crate::docs::system_files#formulas\n",
