@@ -48,6 +48,7 @@ macro_rules! page {
             "[forces]: crate::docs::system_files#forces\n",
             "[robots]: crate::docs::system_files#robots-from-files\n",
             "[inputs]: crate::docs::system_files#inputs\n",
+            "[measured]: crate::docs::system_files#measured-quantities\n",
             "[events]: crate::docs::system_files#events\n",
             "[time]: crate::docs::system_files#time\n",
             "[formulas]: crate::docs::system_files#formulas\n",

@@ -64,6 +64,11 @@ class Mechanics:
         return tuple(self._facts.get("inputs", ()))
 
     @property
+    def measured(self) -> tuple[str, ...]:
+        """Names of what the sensors of a system read in place of its coordinates: the table ``[measured]`` of its file."""
+        return tuple(own["name"] for own in self._facts.get("measured", ()))
+
+    @property
     def angles(self) -> tuple[str, ...]:
         """Names of the coordinates that are angles in rad."""
         return tuple(name for name, angle in zip(self.coordinates, self._facts["periodic"]) if angle)

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
-from ._recorded import errors_beside, inputs_beside, recorded
+from ._recorded import errors_beside, inputs_beside, measured_columns, recorded
 from ._mechanics import System
 from ._results import Bodies, Checked, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
 from ._results import Undetermined
@@ -190,7 +190,8 @@ def identify(
     data, dt, t, v, force, trajectory, columns, units
         The motion, as in `fit`.
     system : System or str
-        The form, or its name in the catalogue; the search starts at the values of its parameters.
+        The form, or its name in the catalogue; the search starts at the values of its parameters. If it has `measured` quantities, these are the
+        data: an array in their order, a mapping of arrays by their names with ``t`` beside them, or their columns.
     constants : sequence of str
         Symbols of the unknown constants; those that a file marks ``learn`` by default, all if it marks none.
     coordinates, angles : sequence of str, optional
@@ -225,6 +226,8 @@ def identify(
     0.7
     """
     system = System(system) if isinstance(system, str) else system
+    if system.measured and coordinates is None:
+        data, coordinates, angles, t, error = measured_columns(data, system._facts["measured"], t, error)
     coordinates = list(system.coordinates) if coordinates is None else list(coordinates)
     if angles is None:
         turning = [name in system.angles for name in system.coordinates]

@@ -112,6 +112,25 @@ def errors_beside(
     return {}, [np.ravel(_scaled(doubles("error", x), factors)).tolist() for x in given]
 
 
+def measured_columns(
+    data: Any, quantities: Sequence[Mapping[str, Any]], t: Any, error: Any
+) -> tuple[Any, list[str], list[str], Any, Any]:
+    """Measured quantities as columns: the data, the columns, those that are angles, times and columns of errors."""
+    columns = [own["column"] for own in quantities]
+    angles = [own["column"] for own in quantities if own["periodic"]]
+    of_files = _is_path(data) or (isinstance(data, (list, tuple)) and bool(data) and all(map(_is_path, data)))
+    if isinstance(data, Mapping):
+        by_name = {own["name"]: own["column"] for own in quantities}
+        missing = [name for name, column in by_name.items() if name not in data and column not in data]
+        if missing:
+            raise ValueError(f"data: expected the measured quantities {', '.join(by_name)}, found none called {missing[0]}")
+        t = data["t"] if t is None and "t" in data else t
+        data = np.column_stack([np.asarray(data[name if name in data else by_name[name]], float) for name in by_name])
+    elif error is None and quantities[0]["error"] and (of_files or hasattr(data, "loc")):
+        error = [own["error"] for own in quantities]
+    return data, columns, angles, t, error
+
+
 def inputs_beside(
     data: Any, inputs: Any, trajectory: str | None, names: Sequence[str]
 ) -> tuple[dict[str, Any], list[list[float]]]:

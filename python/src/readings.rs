@@ -94,6 +94,10 @@ pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str)
             options.inputs = std::mem::take(&mut loaded.inputs);
         }
         options.missing = std::mem::take(&mut loaded.missing);
+        let columns = instance.readings().iter().map(|reading| &reading.column);
+        if !instance.readings().is_empty() && columns.eq(&loaded.recording.coordinates) {
+            loaded.recording.coordinates = instance.measured().map(str::to_string).collect();
+        }
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?.with_rows_of(&loaded);
         shown(&found, &found.findings())
     })?

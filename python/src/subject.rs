@@ -260,6 +260,9 @@ impl Subject {
                     "name": system.name, "title": system.title, "time_unit": system.time_unit,
                     "parameters": values(configured), "description": system.description(),
                     "inputs": configured.inputs().collect::<Vec<_>>(),
+                    "measured": configured.readings().iter().map(|own| json!({
+                        "name": own.name, "column": own.column, "error": own.error, "periodic": own.periodic,
+                    })).collect::<Vec<_>>(),
                 })
             }
             Kind::Model(header, ..) => json!({ "name": header.system, "header": header }),

@@ -147,6 +147,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 
 /// The recording, its columns by the names of the system unless others are given.
 fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
+    if !instance.readings().is_empty() {
+        return read_measured(args, instance);
+    }
     let coordinates = instance.system.coordinates(instance.coordinates);
     let mut recording = args.recording.clone();
     if recording.coords.is_empty() {
@@ -169,13 +172,42 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
     read_files(&recording.data, &columns)
 }
 
+/// The recording of what the file of the system says was measured, its columns under the names of the quantities.
+fn read_measured(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
+    let mut recording = args.recording.clone();
+    let given = [
+        ("--coords", recording.coords.is_empty()),
+        ("--velocity", recording.velocity.is_empty()),
+        ("--acceleration", recording.acceleration.is_empty()),
+        ("--force", recording.force.is_empty()),
+        ("--error", args.error.is_empty()),
+        ("--periodic", recording.periodic.is_empty()),
+    ];
+    if let Some((option, _)) = given.iter().find(|(_, is_empty)| !is_empty) {
+        let problem = "the table [measured] of the system says what the columns are";
+        return Err(CliError::usage(format_args!("{option}: {problem}")));
+    }
+    let readings = instance.readings();
+    let columns =
+        |angles: bool| readings.iter().filter(move |own| own.periodic || !angles).map(|own| own.column.clone());
+    (recording.coords, recording.periodic) = (columns(false).collect(), columns(true).collect());
+    let error = readings.iter().filter_map(|own| own.error.clone()).collect();
+    let input = instance.inputs().map(str::to_string).collect();
+    let columns = Columns { error, input, whole: true, ..recording.meaning() };
+    let mut reading = read_files(&recording.data, &columns)?;
+    reading.recording.coordinates = instance.measured().map(str::to_string).collect();
+    Ok(reading)
+}
+
 /// What the user chose, or what the data are.
 fn refused(error: IdentifyError) -> CliError {
     match &error {
         IdentifyError::Constant { .. } | IdentifyError::Repeated { what: "constants", .. } => {
             CliError::usage(format_args!("--{error}"))
         }
-        IdentifyError::Sensor { what, .. } | IdentifyError::Repeated { what, .. } => {
+        IdentifyError::Sensor { what, .. }
+        | IdentifyError::SensorsBesideReadings { what }
+        | IdentifyError::Repeated { what, .. } => {
             // Options are in the singular.
             let text = error.to_string();
             CliError::usage(format_args!("--{}{}", what.trim_end_matches('s'), &text[what.len()..]))

@@ -16,6 +16,7 @@ use std::path::Path;
 
 pub mod events;
 pub mod pictures;
+pub mod readings;
 
 /// Points of a curve beyond which every second one is left out.
 const MOST_POINTS: usize = 4000;

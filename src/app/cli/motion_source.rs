@@ -23,6 +23,8 @@ pub struct MotionSource {
     pub events: Vec<Event<f64>>,
     /// Names of the external forces, one per coordinate, and then of inputs.
     pub forces: Vec<String>,
+    /// Values of inputs, if there are any.
+    inputs: Option<SampledForce<f64>>,
     /// A system that it is.
     pub instance: Option<SystemInstance<f64>>,
     /// The states a model was trained on.
@@ -59,8 +61,8 @@ impl MotionSource {
         let time_like = learned.header.architecture.time_like.is_some();
         let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        let instance = None;
-        Ok(Self { name, model, columns, units, events, forces, instance, domain, time_unit, time_like, file })
+        let (instance, inputs) = (None, None);
+        Ok(Self { name, model, columns, units, events, forces, inputs, instance, domain, time_unit, time_like, file })
     }
 
     /// A system by name or by file.
@@ -76,8 +78,8 @@ impl MotionSource {
         let file = system_arg::is_file(name).then(|| PathBuf::from(name));
         let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
         let (time_like, units) = (system.time_like.is_some(), system.units(columns.len() / 2));
-        let instance = Some(instance);
-        Ok(Self { name, model, columns, units, events, forces, instance, domain: None, time_unit, time_like, file })
+        let (instance, inputs, domain) = (Some(instance), None, None);
+        Ok(Self { name, model, columns, units, events, forces, inputs, instance, domain, time_unit, time_like, file })
     }
 
     /// Splits what `--force` gave: forces from outside stay, inputs become the model's.
@@ -88,6 +90,7 @@ impl MotionSource {
         let n = self.columns.len() / 2;
         let (Some(given), true) = (given.clone(), self.forces.len() > n) else { return Ok(given) };
         let inputs = given.components(n..self.forces.len());
+        self.inputs = Some(inputs.clone());
         if let Some(instance) = &self.instance {
             let count = instance.inputs().count();
             let values = move |t: f64, values: &mut [f64]| inputs.at(t, values);
@@ -95,6 +98,15 @@ impl MotionSource {
         }
         let forces = given.components(0..n);
         Ok((!forces.is_zero()).then_some(forces))
+    }
+
+    /// What is known at a time: the time, then inputs.
+    pub fn known(&self, t: f64) -> Vec<f64> {
+        let mut known = vec![t; 1 + self.forces.len() - self.columns.len() / 2];
+        if let Some(inputs) = &self.inputs {
+            inputs.at(t, &mut known[1..]);
+        }
+        known
     }
 
     /// Name of the parameter of the motion, `t`, or `tau` beside a coordinate `t`.

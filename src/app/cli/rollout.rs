@@ -5,6 +5,7 @@ use crate::cli::constraints::constrained;
 use crate::cli::files::{OutputFile, require_free};
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::pictures::{Texts, picture_file};
+use crate::cli::motion::readings::ReadingColumns;
 use crate::cli::motion::{Facts, Kept, Target, Watch, events, place};
 use crate::cli::motion_source::MotionSource;
 use crate::cli::number::{finite, positive, tolerance};
@@ -75,7 +76,7 @@ pub struct Args {
     /// Take the acceleration of least norm where the mass matrix is singular, and report the number of free directions.
     #[arg(long)]
     least_norm: bool,
-    /// CSV of the trajectory: t, the columns of a state, energy; - for standard output. A file with content is refused
+    /// CSV of the trajectory: t, the columns of a state, energy, measured quantities of the system; - for standard output. A file with content is refused
     /// unless --overwrite is given, the model always.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
@@ -209,7 +210,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     let header = header.csv_header(columns).map_err(CliError::data)?;
-    target.append(&tube.as_ref().map_or(header.clone(), |tube| tube.header(&header)))?;
+    let readings = ReadingColumns::of(&source, force.is_some())?;
+    let header = tube.as_ref().map_or(header.clone(), |tube| tube.header(&header));
+    target.append(&readings.as_ref().map_or(header.clone(), |readings| readings.header(&header)))?;
     let chosen = LeastNorm(source.model.as_ref());
     let network: &dyn EulerLagrange<f64> = if args.least_norm { &chosen } else { source.model.as_ref() };
     if args.least_norm {
@@ -227,7 +230,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             sampled.q.extend(&piece.q);
             sampled.v.extend(&piece.v);
         }
-        failed = target.append(&tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece))).err();
+        let lines = tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece));
+        let lines = match &readings {
+            Some(readings) => readings.rows(&lines, piece),
+            None => lines,
+        };
+        failed = target.append(&lines).err();
         let is_over = failed.is_some() || stop.load(Ordering::Relaxed);
         if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };

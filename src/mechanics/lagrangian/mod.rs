@@ -17,6 +17,7 @@ mod euler_lagrange;
 mod expression;
 mod formula_events;
 mod formula_forces;
+mod formula_readings;
 #[cfg(feature = "rollout")]
 mod groups;
 mod in_time;
@@ -82,6 +83,8 @@ pub(crate) use expression::quantity;
 pub use expression::{Expression, ExpressionError};
 #[doc(hidden)]
 pub use formula_events::GivenEvent;
+#[doc(hidden)]
+pub use formula_readings::FormulaReading;
 #[cfg(feature = "rollout")]
 pub(crate) use groups::{Regrouped, acting_groups};
 #[cfg(feature = "training")]

@@ -133,6 +133,7 @@ impl Motion<'_> {
             values,
             chosen,
             sensors: Vec::new(),
+            measured: None,
             sigma: data.sigma.clone(),
             sigma_of: data.sigma_of.clone(),
             errors: &[],

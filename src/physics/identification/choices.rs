@@ -123,7 +123,11 @@ pub(super) fn chosen(instance: &SystemInstance<f64>, options: &IdentifyOptions) 
 }
 
 /// Sensors with unknown constants.
-pub(super) fn sensors(recording: &Recording, options: &IdentifyOptions) -> Result<Vec<Sensor>, IdentifyError> {
+pub(super) fn sensors(
+    instance: &SystemInstance<f64>,
+    recording: &Recording,
+    options: &IdentifyOptions,
+) -> Result<Vec<Sensor>, IdentifyError> {
     let mut sensors = Vec::new();
     let all = [
         ("offsets", SensorKind::Offset, &options.offsets),
@@ -131,6 +135,9 @@ pub(super) fn sensors(recording: &Recording, options: &IdentifyOptions) -> Resul
         ("delays", SensorKind::Delay, &options.delays),
     ];
     for (what, kind, names) in all {
+        if !(names.is_empty() || instance.readings().is_empty()) {
+            return Err(IdentifyError::SensorsBesideReadings { what });
+        }
         for name in names {
             let missing = || IdentifyError::Sensor { what, name: name.clone(), known: recording.coordinates.clone() };
             let coordinate = recording.coordinates.iter().position(|known| known == name).ok_or_else(missing)?;

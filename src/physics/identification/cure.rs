@@ -23,11 +23,12 @@ const LEAST: f64 = 1e-6;
 const STILL: f64 = 1e-9;
 
 /// Kinds of numbers that are sampled.
-const POSITION: usize = 0;
-const VELOCITY: usize = 1;
+pub(super) const POSITION: usize = 0;
+pub(super) const VELOCITY: usize = 1;
 const DRIVE: usize = 2;
 
 const MORE: &str = "record more motion of this kind, or reduce the noise";
+const READ: &str = "measure another quantity, record motion that goes farther, or fix one of the constants";
 
 /// Searches for motion that would determine open directions.
 pub(super) struct Examiner<'a> {
@@ -63,7 +64,7 @@ pub(super) struct ByForces {
 
 /// Spreads coordinate `i` of states evenly over a range. Positions, velocities and drives, the `kind`s of numbers, are independent: they are
 /// multiples of different irrational numbers.
-fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize), [low, high]: [f64; 2]) {
+pub(super) fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize), [low, high]: [f64; 2]) {
     let turn = ((kind * n + i + 2) as f64).powf(0.7);
     for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
         *x = low + (high - low) * ((k + 1) as f64 * turn).fract();
@@ -200,6 +201,9 @@ impl Examiner<'_> {
 
     /// What would determine a group of open directions.
     pub fn cure(&self, x: &[f64], group: &Group<'_>) -> String {
+        if self.problem.measured.is_some() {
+            return READ.into();
+        }
         if group.inside.iter().any(|k| *k >= self.problem.chosen.len()) {
             return "calibrate the sensor: its constants and those of the system have the same effect on this motion"
                 .into();

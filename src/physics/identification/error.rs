@@ -59,6 +59,26 @@ pub enum IdentifyError {
         /// Those of the recording.
         found: usize,
     },
+    /// The readings of a recording are not those of the system's file.
+    #[error("expected the readings of [measured]: {}; found {}", expected.join(", "), found.join(", "))]
+    Readings {
+        /// Names in the file, in their order.
+        expected: Vec<String>,
+        /// Those of the recording.
+        found: Vec<String>,
+    },
+    /// Known forces beside readings.
+    #[error("known forces beside [measured]: write them as formulas of [inputs] in [forces]")]
+    ForcesBesideReadings,
+    /// Constraints beside readings.
+    #[error("constraints beside [measured]: measure the coordinates, or describe the system by as many coordinates as move freely")]
+    ConstrainedReadings,
+    /// Constants of sensors beside readings.
+    #[error("{what}: a system with [measured] has the constants of its sensors in the formulas there")]
+    SensorsBesideReadings {
+        /// Which constants.
+        what: &'static str,
+    },
     /// A symbol that the system does not have.
     #[error("constants: {}", unknown("constant", symbol, known.iter().map(String::as_str)))]
     Constant {

@@ -48,7 +48,7 @@ pub(crate) struct Inputs<'a> {
 
 impl Course<'_> {
     /// Writes what is known at a time of a track: the time, then inputs.
-    fn known(&self, track: usize, t: f64, into: &mut [f64]) {
+    pub(super) fn known(&self, track: usize, t: f64, into: &mut [f64]) {
         into[0] = t;
         let Some(Inputs { times, values }) = self.inputs.get(track) else { return };
         let values_at = &mut into[1..];

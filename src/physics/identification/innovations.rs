@@ -6,9 +6,10 @@
 //! row of `P`, and the filter passes residuals and all their slopes through the same linear map, which whitens them: least squares on
 //! what comes out are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 7.3).
 
+use super::covariance::Root;
 use super::follow::{LANES, Segment};
-use super::linear::inverses;
-use super::solve::Problem;
+use super::linear::{inverses, part};
+use super::solve::{Linear, Problem};
 use crate::linalg::dot;
 use crate::recording::smooth::noise;
 
@@ -26,6 +27,8 @@ pub(crate) struct Disturbances {
     /// Given if the filter does not know the initial states: innovations of a correct model are then independent, and those that depend on the
     /// initial state are `NaN`. Innovations beyond so many standard deviations are outliers, also `NaN`, and do not update the filter.
     pub unknown_start: Option<f64>,
+    /// Variances of unknown initial states by lane, `(2n, 2n)`; empty for those that positions give them.
+    pub vague: Vec<Vec<f64>>,
 }
 
 /// The filter of one segment.
@@ -141,7 +144,7 @@ impl Problem<'_> {
     /// Filters of so many segments with rows of `width` slopes; none where residuals are independent.
     pub(super) fn filters(&self, lanes: usize, width: usize) -> Vec<Filter> {
         let n = self.course.equations.n;
-        let Disturbances { force, unknown_start } = &self.disturbances;
+        let Disturbances { force, unknown_start, vague } = &self.disturbances;
         if force.is_empty() && unknown_start.is_none() {
             return Vec::new();
         }
@@ -150,19 +153,38 @@ impl Problem<'_> {
         let positions = closed.map_or(n, |rows| n - rows.holonomic());
         let most = self.sigma.iter().copied().fold(0.0, f64::max);
         let mut variance = vec![0.0; starts * starts];
-        for k in (0..starts).filter(|_| unknown_start.is_some()) {
+        for k in (0..starts).filter(|_| unknown_start.is_some() && vague.is_empty()) {
             let time = if k < positions { 1.0 } else { self.course.step };
             let sigma = if closed.is_some() { most } else { self.sigma[k % n] };
             variance[k * (starts + 1)] = (UNKNOWN * sigma / time).powi(2);
         }
         let expected = vec![vec![0.0; starts]; 1 + width];
-        let filter = || Filter {
+        let filter = |lane: usize| Filter {
             unknown_start: *unknown_start,
-            variance: variance.clone(),
+            variance: vague.get(lane).unwrap_or(&variance).clone(),
             expected: expected.clone(),
             log_variance: 0.0,
         };
-        (0..lanes).map(|_| filter()).collect()
+        (0..lanes).map(filter).collect()
+    }
+
+    /// Variances of unknown initial states of segments with other readings than positions: what the readings of a segment determine of it, as far
+    /// as they do, made as large as if a single one determined it.
+    pub(super) fn vague(&self, x: &[f64], segments: &[&Segment]) -> Vec<Vec<f64>> {
+        let (size, width) = (2 * self.n(), 2 * self.n() + self.unknowns());
+        let of = |(linear, segment): (Option<Linear>, &&Segment)| {
+            let mut variance = vec![0.0; size * size];
+            let Some(linear) = linear else { return variance };
+            let own: Vec<usize> = (0..size).collect();
+            let factor = UNKNOWN * UNKNOWN * self.readings(std::slice::from_ref(*segment)) / size as f64;
+            for row in Root::of(size, &part(width, &linear.matrix, &own)).back {
+                for (line, a) in variance.chunks_exact_mut(size).zip(&row) {
+                    line.iter_mut().zip(&row).for_each(|(sum, b)| *sum += factor * a * b);
+                }
+            }
+            variance
+        };
+        self.batch(x, segments).into_iter().zip(segments).map(of).collect()
     }
 
     /// Changes of the initial states by force errors over one interval, `(lanes, n, starts)`; `slopes` are the derivatives of states by initial

@@ -42,6 +42,7 @@ mod found;
 mod innovations;
 mod invariants;
 pub(crate) mod linear;
+mod measured;
 mod moves;
 mod per_trajectory;
 mod pieces;
@@ -55,6 +56,7 @@ mod stages;
 #[cfg(test)]
 mod tests;
 mod unknowns;
+mod unseen;
 mod verdict;
 mod ways;
 

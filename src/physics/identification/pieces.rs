@@ -160,6 +160,19 @@ impl<'a> Pieces<'a> {
         thinned(self.smoothed.iter().enumerate().filter_map(of).flatten().collect())
     }
 
+    /// First and second derivatives of smoothed motion at samples with full windows, `(samples, n)` each.
+    pub fn rates(&self) -> [Vec<f64>; 2] {
+        let n = self.recording.n();
+        let of = |rate: fn(&Smoothed) -> &[f64]| {
+            let full = |smoothed: &Smoothed| smoothed.interior().filter(|at| smoothed.is_full(*at)).collect::<Vec<_>>();
+            let row = |smoothed: &Smoothed, at: usize| rate(smoothed)[at * n..(at + 1) * n].to_vec();
+            let rows =
+                |smoothed: &Smoothed| full(smoothed).into_iter().flat_map(|at| row(smoothed, at)).collect::<Vec<_>>();
+            self.smoothed.iter().flatten().flat_map(rows).collect()
+        };
+        [of(|smoothed| &smoothed.v), of(|smoothed| &smoothed.a)]
+    }
+
     /// First samples after long gaps, by trajectory.
     pub fn gaps(&self) -> Vec<Vec<usize>> {
         let mut gaps = vec![Vec::new(); self.recording.tracks.len()];
@@ -192,7 +205,7 @@ impl<'a> Pieces<'a> {
     }
 
     /// Position and velocity at a sample, smoothed or by a polynomial through the samples near it.
-    fn start(&self, track: usize, sample: usize) -> Vec<f64> {
+    pub fn start(&self, track: usize, sample: usize) -> Vec<f64> {
         let n = self.recording.n();
         let behind = self.all.partition_point(|piece| (piece.track, piece.samples.start) <= (track, sample));
         let piece = behind.checked_sub(1).and_then(|at| self.all.get(at));

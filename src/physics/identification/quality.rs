@@ -80,7 +80,7 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
     }
 }
 
-/// Innovations of every coordinate along segments with unknown initial states: for a correct model they are independent, with variance 1.
+/// Innovations of every reading along segments with unknown initial states: for a correct model they are independent, with variance 1.
 pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<Vec<f64>>> {
     let n = problem.sigma.len();
     let mut open = problem.clone();
@@ -91,6 +91,9 @@ pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]
     order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
     for batch in order.chunks(LANES) {
         let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
+        if problem.measured.is_some() {
+            open.disturbances.vague = problem.vague(x, &lanes);
+        }
         open.residuals(x, &lanes, true, |lane, sample, i, r, _| found[i][batch[lane]][sample] = r);
     }
     found

@@ -87,6 +87,7 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
         chosen: vec![1, 2],
         ranges: form.system.parameters.iter().map(|parameter| parameter.range).collect(),
         sensors: Vec::new(),
+        measured: None,
         sigma: vec![1e-3],
         sigma_of: Vec::new(),
         errors: &[],

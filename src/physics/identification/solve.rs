@@ -6,6 +6,7 @@ use super::descent::{FAILED, RIDGE};
 use super::follow::{Course, Follower, LANES, Segment, State};
 use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
+use super::measured::{Measured, Sight};
 use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
@@ -51,6 +52,8 @@ pub(crate) struct Problem<'a> {
     pub chosen: Vec<usize>,
     pub ranges: Vec<Range>,
     pub sensors: Vec<Sensor>,
+    /// What was measured in place of the coordinates; nothing if these were. What follows here is by coordinate, or by reading.
+    pub measured: Option<&'a Measured>,
     /// Standard deviation of every coordinate's noise.
     pub sigma: Vec<f64>,
     /// The same by trajectory if trajectories differ; otherwise empty.
@@ -122,8 +125,14 @@ impl Normal {
 }
 
 impl Problem<'_> {
-    fn n(&self) -> usize {
+    /// Number of coordinates.
+    pub(super) fn n(&self) -> usize {
         self.course.equations.n
+    }
+
+    /// Number of readings of a sample: of positions, or of what was measured in their place.
+    pub(super) fn width(&self) -> usize {
+        self.sigma.len()
     }
 
     /// Number of unknowns other than initial states.
@@ -152,19 +161,19 @@ impl Problem<'_> {
     /// Standard deviation of the noise of a measured position.
     pub fn sigma_at(&self, track: usize, sample: usize, i: usize) -> f64 {
         match self.errors.get(track) {
-            Some(errors) => errors[sample * self.n() + i],
+            Some(errors) => errors[sample * self.width() + i],
             None => self.sigma_of.get(track).unwrap_or(&self.sigma)[i],
         }
     }
 
     /// `true` for a position that was not read.
     fn is_missing(&self, track: usize, sample: usize, i: usize) -> bool {
-        self.missing.get(track).and_then(|track| track.get(sample * self.n() + i)).is_some_and(|missing| *missing)
+        self.missing.get(track).and_then(|track| track.get(sample * self.width() + i)).is_some_and(|missing| *missing)
     }
 
     /// Number of positions of segments that were read.
     pub fn readings(&self, segments: &[Segment]) -> f64 {
-        let n = self.n();
+        let n = self.width();
         let of = |segment: &Segment| {
             let (first, end) = (segment.first * n, (segment.first + segment.samples) * n);
             let missing = self.missing.get(segment.track).and_then(|track| track.get(first..end));
@@ -179,7 +188,7 @@ impl Problem<'_> {
         self.gaps.get(segment.track).and_then(next).is_some_and(|gap| gap <= sample)
     }
 
-    /// Calls `visit(segment, sample, coordinate, residual, row)` along segments: residuals of positions in units of noise and, if requested,
+    /// Calls `visit(segment, sample, reading, residual, row)` along segments: residuals of positions in units of noise and, if requested,
     /// their derivatives by initial state, constants and sensors of one lane; innovations if there are disturbances. Returns the sum of the
     /// logarithms of the innovations' variances, in units of the noise.
     pub(super) fn residuals(
@@ -189,13 +198,13 @@ impl Problem<'_> {
         derivatives: bool,
         mut visit: impl FnMut(usize, usize, usize, f64, &[f64]),
     ) -> f64 {
-        let (n, m) = (self.n(), self.chosen.len());
+        let (n, m, width) = (self.n(), self.chosen.len(), self.width());
         let values = self.parameters(x);
         let starts = self.course.starts();
         let columns = starts + m;
         let mut filters = self.filters(segments.len(), columns + self.sensors.len());
         let derivatives = derivatives || !filters.is_empty();
-        let sensors: Vec<[f64; 3]> = (0..n).map(|i| self.sensor(x, i)).collect();
+        let sensors: Vec<[f64; 3]> = (0..width).map(|i| self.sensor(x, i)).collect();
         let mut row = vec![0.0; if derivatives { columns + self.sensors.len() } else { 0 }];
         let mut a = vec![0.0; segments.len() * n];
         let noisy = !self.disturbances.force.is_empty();
@@ -205,29 +214,37 @@ impl Problem<'_> {
                 delayed.push((*delay, State::default()));
             }
         }
+        let mut sight = self.measured.map(Sight::new);
+        let is_angle = |i: usize| self.measured.is_some_and(|measured| measured.angles[i]);
         let read = |follower: &mut Follower<'_>, sample: usize, state: &State| {
             for (delay, late) in &mut delayed {
                 follower.shifted(&values, (segments, sample), (state, -*delay), late);
             }
+            if let Some(sight) = &mut sight {
+                sight.look((follower, &self.course), &values, (segments, sample), state);
+            }
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
                 let place = segment.first + sample;
                 let turned = self.is_beyond_gap(segment, place);
-                let measured = &self.course.recording.tracks[segment.track].q[place * n..][..n];
-                for i in (0..n).filter(|i| !self.is_missing(segment.track, place, *i)) {
-                    let at = lane * n + i;
+                let measured = &self.course.recording.tracks[segment.track].q[place * width..][..width];
+                for i in (0..width).filter(|i| !self.is_missing(segment.track, place, *i)) {
+                    let at = lane * width + i;
                     let [offset, gain, delay] = sensors[i];
                     let late = delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
-                    let seen = late.q[at];
+                    let (seen, slopes) = match &sight {
+                        Some(sight) => (sight.seen[at], &sight.slopes),
+                        None => (late.q[at], &late.q_slopes),
+                    };
                     let sigma = self.sigma_at(segment.track, place, i);
                     let mut missed = measured[i] - gain * seen - offset;
-                    if turned && self.course.recording.periodic[i] {
+                    if is_angle(i) || turned && self.course.recording.periodic[i] {
                         missed -= TAU * (missed / TAU).round();
                     }
                     let residual = missed / sigma;
                     if derivatives {
-                        let slopes = at * columns..(at + 1) * columns;
+                        let slopes = &slopes[at * columns..(at + 1) * columns];
                         let factor = gain / sigma;
-                        row.iter_mut().zip(&late.q_slopes[slopes]).for_each(|(r, q)| *r = factor * q);
+                        row.iter_mut().zip(slopes).for_each(|(r, q)| *r = factor * q);
                         for (sensor, r) in self.sensors.iter().zip(&mut row[columns..]) {
                             *r = match (sensor.coordinate == i, sensor.kind) {
                                 (false, _) => 0.0,
@@ -256,7 +273,7 @@ impl Problem<'_> {
     }
 
     /// Normal equations of a batch of segments; `None` for those that cannot be followed.
-    fn batch(&self, x: &[f64], segments: &[&Segment]) -> Vec<Option<Linear>> {
+    pub(super) fn batch(&self, x: &[f64], segments: &[&Segment]) -> Vec<Option<Linear>> {
         let starts = self.course.starts();
         let width = starts + self.unknowns();
         let empty = |segment: &&Segment| Linear {
@@ -317,9 +334,9 @@ impl Problem<'_> {
         found
     }
 
-    /// Residuals in units of noise, `(samples, n)` of each segment, `NaN` for readings that are missing.
+    /// Residuals in units of noise, `(samples, readings)` of each segment, `NaN` for readings that are missing.
     pub fn all_residuals(&self, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
-        let n = self.n();
+        let n = self.width();
         let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![f64::NAN; segment.samples * n]).collect();
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
@@ -354,8 +371,8 @@ impl Problem<'_> {
         for (linear, segment) in found.iter().zip(segments) {
             let Some(linear) = linear else {
                 normal.failed += 1;
-                normal.square += FAILED * (segment.samples * n) as f64;
-                normal.count += (segment.samples * n) as f64;
+                normal.square += FAILED * (segment.samples * self.width()) as f64;
+                normal.count += (segment.samples * self.width()) as f64;
                 continue;
             };
             normal.square += linear.square;

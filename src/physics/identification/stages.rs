@@ -5,6 +5,7 @@ use super::covariance::{Root, Weighing, agreement, continuation, long_run, score
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::innovations::Disturbances;
+use super::measured::{Measured, check_columns};
 use super::per_trajectory::per_trajectory;
 use super::pieces::{LEAST_SEGMENT, Pieces};
 use super::quality::{
@@ -13,6 +14,7 @@ use super::quality::{
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
+use super::unseen::{SEARCHED, Search};
 use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::system::Range;
@@ -63,7 +65,7 @@ pub(super) struct Fitted {
 
 impl Fitted {
     /// Mean square of the residuals.
-    fn mean_square(&self) -> f64 {
+    pub fn mean_square(&self) -> f64 {
         self.normal.square / self.normal.count.max(1.0)
     }
 
@@ -107,6 +109,9 @@ impl Fitted {
 
 /// Identifies the constants of a system from recorded motion; angles are unwrapped, numbers are in the units of the system.
 ///
+/// If the file of the system has a table `[measured]`, the recording holds these quantities in place of the coordinates, under their names and
+/// in their order, [`SystemInstance::measured`]; what is said of positions then holds for readings.
+///
 /// # Errors
 /// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and positions that constraints do not allow.
 /// Constants that the motion does not determine are not an error, nor is a model that does not fit: the result reports them.
@@ -118,10 +123,8 @@ pub fn identify(
     if let Some((instance, options)) = per_trajectory(instance, recording, options)? {
         return identify(&instance, recording, &options);
     }
-    let n = instance.coordinates;
-    if recording.n() != n {
-        return Err(IdentifyError::Coordinates { expected: n, found: recording.n() });
-    }
+    check_columns(instance, recording)?;
+    let n = recording.n();
     recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;
     check_errors(recording, &options.errors)?;
     let inputs = inputs(instance, recording, options)?;
@@ -131,13 +134,14 @@ pub fn identify(
     let filled = Filled::without(filled, recording, &options.missing);
     let recording = filled.as_ref().map_or(recording, |filled| &filled.recording);
     let chosen = chosen(instance, options)?;
-    let sensors = sensors(recording, options)?;
+    let sensors = sensors(instance, recording, options)?;
     let met = met(instance, recording, options)?;
     let stop = &options.cancellation;
     stop.stage("equations of motion");
     let unknown = || IdentifyError::Unknown { system: instance.system.name.to_string() };
     let acting = instance.acting_constraints()?;
     let equations = Equations::record(instance, &chosen, &acting)?.ok_or_else(unknown)?;
+    let measured = Measured::record(instance, &chosen)?;
     stop.check()?;
     stop.stage("smoothed motion");
     let pieces = Pieces::new(recording, filled.as_ref(), options)?;
@@ -167,6 +171,7 @@ pub fn identify(
         ranges: instance.system.parameters.iter().map(|parameter| parameter.range).collect(),
         chosen,
         sensors,
+        measured: measured.as_ref(),
         sigma: noise.clone(),
         sigma_of: Vec::new(),
         errors: &options.errors,
@@ -179,7 +184,6 @@ pub fn identify(
         cancellation: options.cancellation.clone(),
     };
     stop.check()?;
-    let mut x = given.clone();
     let of_piece = |track: usize| inputs.get(pieces.origin(track, 0).0).copied();
     let of_pieces = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
     let course = Course { recording: &pieces.long, inputs: of_pieces, ..problem.course.clone() };
@@ -187,26 +191,32 @@ pub fn identify(
     if met == Met::Forces {
         stop.stage("forces");
         let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
-        let mut found = by_forces::identify(instance, &on_pieces, smoothing, (x, pieces.cut_long()))?;
+        let mut found = by_forces::identify(instance, &on_pieces, smoothing, (given, pieces.cut_long()))?;
         for outlier in &mut found.outliers {
             (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
         }
         found.obstacles = [pieces.still, repeated].concat();
         return Ok(found.named(recording, options.robust));
     }
-    let states = States::new(&on_pieces, &pieces.smoothed);
-    on_pieces.require_constraints(&x, (&states.q, &states.v))?;
-    let cut = match equations.known {
-        _ if states.len(n) == 0 => Some(Vec::new()),
-        0 => states.fit(&on_pieces, &mut x, met).map(|_| Vec::new()),
-        _ => states.fit_in_time(&on_pieces, &mut x),
+    let states = match problem.measured {
+        None => Some(States::new(&on_pieces, &pieces.smoothed)),
+        Some(measured) => measured.coordinates(&pieces.smoothed).map(|own| States::new(&on_pieces, &own)),
     };
-    stop.check()?;
-    let cut = cut.ok_or(IdentifyError::Singular)?;
-    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
-    let samples = first_samples(&states, (n, pieces.step), options.segment)?;
-    stop.stage("short segments");
-    let mut fitted = first(&mut problem, [x, given.clone()], pieces.cut(samples))?;
+    if let Some(states) = &states {
+        on_pieces.require_constraints(&given, (&states.q, &states.v))?;
+    }
+    let (mut fitted, cut) = match &states {
+        Some(states) => from_smoothed(&mut problem, (&on_pieces, states, &pieces), &given, options)?,
+        None => {
+            stop.stage("initial states");
+            let bounds = &instance.system.validation(instance.coordinates);
+            let [v, a] = pieces.rates();
+            let samples = first_samples((&v, &a), (n, pieces.step), options.segment)?;
+            let layout = pieces.cut(samples.max(problem.least_segment()));
+            let search = Search { problem: &mut problem, pieces: &pieces, bounds, layout }.first(&given);
+            (search?, Vec::new())
+        }
+    };
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
@@ -262,10 +272,40 @@ pub fn identify(
         let [low, high] = [low, high].map(|x| rounded(*x, 4));
         format!("{symbol} was searched from {low} to {high}; begin nearer if it may lie outside")
     };
-    let off = on_pieces.off_constraints(&fitted.x, (&states.q, &states.v));
-    found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect(), off].concat();
+    found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect()].concat();
+    match &states {
+        Some(states) => found.obstacles.extend(on_pieces.off_constraints(&fitted.x, (&states.q, &states.v))),
+        None if !found.explained => found.obstacles.push(SEARCHED.to_string()),
+        None => {}
+    }
     rivals.widen(&mut found);
     Ok(found.named(recording, options.robust))
+}
+
+/// The fit of the first segments from constants that are fitted to smoothed accelerations; says which constants were searched in a part of
+/// their range.
+fn from_smoothed(
+    problem: &mut Problem<'_>,
+    (on_pieces, states, pieces): (&Problem<'_>, &States, &Pieces<'_>),
+    given: &[f64],
+    options: &IdentifyOptions,
+) -> Result<(Fitted, Vec<(usize, [f64; 2])>), IdentifyError> {
+    let (n, mut x) = (problem.n(), given.to_vec());
+    let cut = match problem.course.equations.known {
+        _ if states.len(n) == 0 => Some(Vec::new()),
+        0 => states.fit(on_pieces, &mut x, Met::Accelerations).map(|_| Vec::new()),
+        _ => states.fit_in_time(on_pieces, &mut x),
+    };
+    problem.cancellation.check()?;
+    let cut = cut.ok_or(IdentifyError::Singular)?;
+    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
+    let samples = first_samples((&states.v, &states.a), (n, pieces.step), options.segment)?;
+    problem.cancellation.stage("short segments");
+    let mut segments = pieces.cut(samples);
+    if let Some(measured) = problem.measured {
+        segments.iter_mut().for_each(|segment| segment.start = measured.state(&segment.start, &[]));
+    }
+    Ok((first(problem, [x, given.to_vec()], segments)?, cut))
 }
 
 /// Messages about readings that a sensor repeated.
@@ -287,9 +327,13 @@ pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
 }
 
 /// Samples of the first segments: a few time scales of the fastest coordinate, or the requested number if that is smaller.
-fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) -> Result<usize, IdentifyError> {
+fn first_samples(
+    (v, a): (&[f64], &[f64]),
+    (n, step): (usize, f64),
+    wanted: Option<f64>,
+) -> Result<usize, IdentifyError> {
     let size = |values: &[f64], i: usize| deviation(values.iter().skip(i).step_by(n));
-    let paces = (0..n).map(|i| size(&states.v, i) / size(&states.a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
+    let paces = (0..n).map(|i| size(v, i) / size(a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
     let pace = paces.fold(f64::INFINITY, f64::min);
     let samples = if pace.is_finite() { PACES * pace / step } else { 20.0 };
     let samples = samples.clamp(LEAST_SEGMENT as f64, 400.0) as usize;
@@ -399,9 +443,13 @@ fn smooth(problem: &mut Problem<'_>, fitted: &mut Fitted) {
         if problem.cancellation.is_cancelled() {
             break;
         }
+        let before = fitted.normal.decrement;
         problem.course.substeps *= 2;
         refit(problem, fitted, ITERATIONS);
         log(fitted, "smaller steps");
+        if fitted.normal.decrement > before / 2.0 {
+            break;
+        }
     }
 }
 
@@ -418,12 +466,12 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     let stride = segments.len().div_ceil(32).max(1);
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
-    let n = problem.sigma.len();
-    let mut coarse = problem.ends(x, &probes);
+    let n = problem.width();
+    let mut coarse = problem.last_readings(x, &probes);
     while problem.course.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
         let mut finer = problem.clone();
         finer.course.substeps *= 2;
-        let fine = finer.ends(x, &probes);
+        let fine = finer.last_readings(x, &probes);
         let errors = coarse.iter().zip(&fine).flat_map(|(a, b)| {
             (0..n).map(|i| ((a[i] - b[i]) / problem.sigma[i]).abs()).filter(|e| e.is_finite()).collect::<Vec<_>>()
         });
@@ -507,7 +555,7 @@ pub(crate) fn joined(segments: &[Segment]) -> Vec<Segment> {
 
 /// Halves every segment that is long enough; both halves start on the fitted motion.
 fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
-    let long = |segment: &&Segment| segment.samples >= 2 * LEAST_SEGMENT;
+    let long = |segment: &&Segment| segment.samples >= 2 * problem.least_segment();
     let to_middle = |segment: &Segment| Segment { samples: segment.samples / 2 + 1, ..segment.clone() };
     let first: Vec<Segment> = fitted.segments.iter().filter(long).map(to_middle).collect();
     let mut middles = problem.ends(&fitted.x, &first.iter().collect::<Vec<_>>()).into_iter();

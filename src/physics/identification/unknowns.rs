@@ -33,7 +33,7 @@ pub(super) fn unknowns(
     (start, variance): (&[f64], f64),
     (met, normal_at): (Met, NormalAt<'_>),
 ) -> Identified {
-    let (n, m) = (problem.sigma.len(), fitted.x.len());
+    let m = fitted.x.len();
     let recording = problem.course.recording;
     let before: Vec<f64> = start.iter().copied().chain(problem.sensors.iter().map(|sensor| sensor.perfect())).collect();
     // The determined sums show what is not determined.
@@ -51,7 +51,7 @@ pub(super) fn unknowns(
         all: chosen.clone().map(|k| &*parameter(k).symbol).chain(sensors.iter().map(String::as_str)).collect(),
         units: chosen.map(|k| &*parameter(k).unit).chain(sensors.iter().map(|_| "")).collect(),
     };
-    let bounds = instance.system.validation(n);
+    let bounds = instance.system.validation(instance.coordinates);
     let examiner = Examiner { problem, segments: &fitted.segments, coordinates: &recording.coordinates, bounds };
     let mut x = fitted.x.clone();
     let (undetermined, combinations) = match is_linear {

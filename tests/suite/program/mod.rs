@@ -19,6 +19,7 @@ mod hostile;
 mod identify;
 mod inspect;
 mod limits;
+mod measured;
 mod motion;
 mod overwrite;
 mod page;

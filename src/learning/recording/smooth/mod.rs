@@ -144,6 +144,26 @@ pub struct Smoothed {
 }
 
 impl Smoothed {
+    /// The columns of some of `n` coordinates, in this order.
+    #[cfg(feature = "training")]
+    pub(crate) fn columns(&self, n: usize, columns: &[usize]) -> Self {
+        let of = |values: &Vec<f64>| -> Vec<f64> {
+            values.chunks_exact(n).flat_map(|row| columns.iter().map(|i| row[*i])).collect()
+        };
+        Self {
+            q: of(&self.q),
+            v: of(&self.v),
+            a: of(&self.a),
+            q_error: of(&self.q_error),
+            v_error: of(&self.v_error),
+            a_error: of(&self.a_error),
+            q_bias: of(&self.q_bias),
+            v_bias: of(&self.v_bias),
+            a_bias: of(&self.a_bias),
+            ..self.clone()
+        }
+    }
+
     /// Samples with full windows.
     #[doc(hidden)]
     pub fn interior(&self) -> std::ops::Range<usize> {

@@ -5,6 +5,7 @@
 
 mod chain;
 mod events;
+mod measured;
 #[cfg(feature = "serde")]
 pub(crate) mod pair;
 mod per_trajectory;
@@ -17,6 +18,7 @@ use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
 use super::formula_events::FormulaEvent;
 use super::formula_forces::FormulaForces;
+use super::formula_readings::FormulaReading;
 use super::recursion::Shape;
 use super::system::{Range, ShellAdvice};
 use super::{ExpressionLagrangian, Lagrangian};
@@ -30,6 +32,7 @@ use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{ShownLink, turned};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use events::EventDescription;
+use measured::MeasuredDescription;
 pub use per_trajectory::Per;
 pub(crate) use per_trajectory::PerTrajectory;
 use quantity::{Decimal, Quantity};
@@ -68,6 +71,9 @@ pub struct Description {
     /// Zeros of formulas that a roll-out finds, by name: of the same names and of the time `t`.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     events: BTreeMap<String, EventDescription>,
+    /// What sensors read, by name: formulas of the same names, of accelerations, of the time `t` and of inputs.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    measured: BTreeMap<String, MeasuredDescription>,
     /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
@@ -249,6 +255,7 @@ impl Description {
             inputs: BTreeMap::new(),
             marks: BTreeSet::new(),
             events: BTreeMap::new(),
+            measured: BTreeMap::new(),
             coordinates: coordinates.map(coordinate).collect(),
             chain: None,
             links: Vec::new(),
@@ -318,6 +325,8 @@ pub struct Described {
     pub(super) forces: Option<FormulaForces>,
     /// Its events; parameters as the Lagrangian's.
     pub(super) events: Arc<[FormulaEvent]>,
+    /// Its measured quantities; parameters as the Lagrangian's.
+    pub(super) readings: Arc<[FormulaReading]>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
     /// `true` if these are known to be independent: nothing has to be examined.

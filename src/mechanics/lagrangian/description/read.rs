@@ -1,6 +1,7 @@
 //! Numbers of a description as a file has them.
 
 use super::events::{Consequence, Word};
+use super::measured::MeasuredDescription;
 use super::quantity::{Decimal, Quantity};
 use super::{ParameterDescription, Per};
 use crate::lagrangian::expression::quantity;
@@ -114,6 +115,44 @@ fn alone(default: String) -> ParameterDescription {
 impl<'de> Deserialize<'de> for ParameterDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(NumberOrTable)
+    }
+}
+
+/// The table of a measured quantity.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeasuredTable {
+    formula: String,
+    #[serde(default = "super::one")]
+    unit: String,
+    column: Option<String>,
+    error: Option<String>,
+    #[serde(default)]
+    periodic: bool,
+}
+
+struct FormulaOrTable;
+
+impl<'de> Visitor<'de> for FormulaOrTable {
+    type Value = MeasuredDescription;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a formula as text, or a table { formula, unit, column, error, periodic }")
+    }
+    fn visit_str<E: Error>(self, value: &str) -> Result<MeasuredDescription, E> {
+        let (formula, unit) = (value.to_string(), super::one());
+        Ok(MeasuredDescription { formula, unit, column: None, error: None, periodic: false })
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<MeasuredDescription, A::Error> {
+        let MeasuredTable { formula, unit, column, error, periodic } =
+            MeasuredTable::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(MeasuredDescription { formula, unit, column, error, periodic })
+    }
+}
+
+impl<'de> Deserialize<'de> for MeasuredDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(FormulaOrTable)
     }
 }
 

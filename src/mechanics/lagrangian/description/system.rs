@@ -106,6 +106,7 @@ impl Description {
         let dissipation = self.friction(&mut compiler, &scope)?;
         let forces = self.forces(&mut compiler, &scope, size)?;
         let events = self.compiled_events(&mut compiler, &scope)?.into();
+        let readings = self.compiled_readings(&mut compiler, &scope)?.into();
         let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
@@ -139,6 +140,7 @@ impl Description {
                 dissipation: dissipation.map(|value| ExpressionLagrangian::compiled(size, compiler.formula(value))),
                 forces,
                 events,
+                readings,
                 constraints,
                 independent: catalogued,
                 chain,
@@ -157,6 +159,7 @@ impl Description {
             return Err(DescriptionError::new("name", problem));
         }
         let inputs = self.inputs.iter().map(|(name, unit)| (format!("inputs.{name}"), unit));
+        let measured = self.measured.iter().map(|(name, own)| (format!("measured.{name}.unit"), &own.unit));
         let units = self.coordinates.iter().enumerate().map(|(i, c)| (format!("coordinates[{i}].unit"), &c.unit));
         let parameters = self.parameters.iter().map(|(name, p)| (format!("parameters.{name}.unit"), &p.unit));
         let texts = self.title.iter().map(|title| ("title".to_string(), title));
@@ -164,6 +167,7 @@ impl Description {
             .chain(self.time_unit.iter().map(|unit| ("time_unit".to_string(), unit)))
             .chain(units)
             .chain(inputs)
+            .chain(measured)
             .chain(parameters);
         for (key, text) in texts {
             if text.is_empty() || text.chars().count() > 100 || text.chars().any(char::is_control) {
@@ -187,6 +191,7 @@ impl Description {
             ("inputs", self.inputs.len(), MAX_NAMES),
             ("constraints", self.constraints.len(), MAX_NAMES),
             ("events", self.events.len(), MAX_NAMES),
+            ("measured", self.measured.len(), MAX_NAMES),
         ];
         for (key, count, most) in counts {
             if count > most {
@@ -314,7 +319,7 @@ impl Description {
     }
 
     /// The names of forces: inputs beside all others.
-    fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
+    pub(super) fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
         let mut scope = scope.clone();
         for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| !self.marks.contains(*name)) {
             let key = || format!("inputs.{name}");

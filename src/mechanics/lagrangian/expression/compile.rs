@@ -213,9 +213,18 @@ impl Compiler {
 
     /// The velocities that a value depends on, by their coordinate.
     pub fn velocities(&self, value: Value) -> Vec<usize> {
-        let needed = self.needed(value);
-        let entries = self.entries.iter().zip(needed).filter(|(_, needed)| *needed);
-        entries.filter_map(|(entry, _)| if let Entry::Velocity(i) = entry { Some(*i as usize) } else { None }).collect()
+        self.given(value, |entry| if let Entry::Velocity(i) = entry { Some(*i as usize) } else { None })
+    }
+
+    /// The coordinates that a value depends on, by their place.
+    pub fn positions(&self, value: Value) -> Vec<usize> {
+        self.given(value, |entry| if let Entry::Position(i) = entry { Some(*i as usize) } else { None })
+    }
+
+    /// Those of the entries that a value is made of that are picked.
+    fn given(&self, value: Value, pick: impl Fn(&Entry) -> Option<usize>) -> Vec<usize> {
+        let entries = self.entries.iter().zip(self.needed(value)).filter(|(_, needed)| *needed);
+        entries.filter_map(|(entry, _)| pick(entry)).collect()
     }
 
     /// Which entries a value is made of.

@@ -1,0 +1,207 @@
+//! Where the search starts if coordinates were not measured themselves: initial states spread over the bounds of the system are fitted to the
+//! beginning of a trajectory with the constants as given. The best of them are followed, with the constants fitted too, over a part of the
+//! recording that doubles as long as the model follows it; the rest is cut into segments that continue this motion.
+
+use super::cure::{POSITION, VELOCITY, spread};
+use super::follow::{LANES, Segment};
+use super::pieces::Pieces;
+use super::solve::{Normal, Problem};
+use super::stages::{Fitted, ITERATIONS, choose_steps, refit};
+use super::{IdentifyError, measured::Measured};
+use crate::lagrangian::system::Bounds;
+
+/// Rounds in which the initial states are fitted to the beginning of a trajectory, and to twice as much of it.
+const SETTLING: usize = 15;
+/// Initial states that are fitted to twice as much, and those that are followed.
+const PROMISING: usize = 16;
+const FOLLOWED: usize = 5;
+/// Relative difference of the sums of squares up to which two initial states are one.
+const SAME: f64 = 1e-4;
+/// Largest mean square at which a motion is followed farther.
+const FOLLOWS: f64 = 4.0;
+/// Segments that are followed before constants are fitted too, and those after which other initial states are not tried.
+const BEFORE: usize = 4;
+const FAR: usize = 16;
+
+/// What is said where such a search does not lead to a model that fits.
+pub(super) const SEARCHED: &str = "coordinates that no sensor reads were searched from 64 initial states within their bounds: if the form is right, \
+     narrow bounds and velocity_bounds, or begin nearer to the constants";
+
+/// Searches initial states for the segments of a recording.
+pub(super) struct Search<'a, 'b> {
+    pub problem: &'a mut Problem<'b>,
+    pub pieces: &'a Pieces<'b>,
+    pub bounds: &'a Bounds,
+    /// Segments in order, without initial states.
+    pub layout: Vec<Segment>,
+}
+
+impl Measured {
+    /// The initial state that readings give with their rates, `(2, m)`, of the coordinates that they are; what no sensor reads is `otherwise`.
+    pub fn state(&self, readings: &[f64], otherwise: &[f64]) -> Vec<f64> {
+        let (n, m) = (self.sources.len(), self.count());
+        let number = |k: usize| match self.sources[k % n] {
+            Some(i) => readings[k / n * m + i],
+            None => otherwise[k],
+        };
+        (0..2 * n).map(number).collect()
+    }
+}
+
+impl Search<'_, '_> {
+    /// The best fit of all segments from given constants.
+    pub fn first(&mut self, given: &[f64]) -> Result<Fitted, IdentifyError> {
+        self.problem.course.substeps = 1;
+        let samples = |track: usize| self.problem.course.recording.tracks[track].len();
+        let longest = self.layout.iter().map(|segment| segment.track).max_by_key(|track| samples(*track));
+        if self.layout.is_empty() {
+            return Err(IdentifyError::Lost);
+        }
+        // The longest trajectory tells most about the constants.
+        self.layout.sort_by_key(|segment| (Some(segment.track) != longest, segment.track, segment.first));
+        let candidates = self.candidates(given, 0);
+        let (mut best, mut farthest): (Option<Fitted>, usize) = (None, 0);
+        let ways = [BEFORE, 1].into_iter().flat_map(|units| candidates.iter().map(move |start| (start, units)));
+        for (start, units) in ways {
+            self.problem.cancellation.check()?;
+            let Some((tried, reach)) = self.beginning(given, start.clone(), units) else { continue };
+            let (x, square) = (&tried.x, tried.mean_square());
+            tracing::debug!(?x, ?start, units, reach, square, "initial state");
+            let better = |best: &Fitted| reach > farthest || reach == farthest && square < best.mean_square();
+            if best.as_ref().is_none_or(better) {
+                (best, farthest) = (Some(tried), reach);
+            }
+            if farthest >= FAR.min(self.run(0)) {
+                break;
+            }
+        }
+        let best = best.ok_or(IdentifyError::Lost)?;
+        self.along(best, farthest.max(1)).ok_or(IdentifyError::Lost)
+    }
+
+    /// Number of segments that follow each other without a gap from one on.
+    fn run(&self, at: usize) -> usize {
+        let adjacent = |a: &Segment, b: &Segment| a.track == b.track && a.first + a.samples == b.first;
+        self.layout[at..].chunk_by(adjacent).next().map_or(0, <[Segment]>::len)
+    }
+
+    /// Samples of so many segments from one on, as far as they follow each other.
+    fn samples(&self, at: usize, units: usize) -> usize {
+        self.layout[at..at + units.min(self.run(at))].iter().map(|segment| segment.samples).sum()
+    }
+
+    /// Initial states of a segment that fit it best, the best first.
+    fn candidates(&mut self, x: &[f64], at: usize) -> Vec<Segment> {
+        let Some(measured) = self.problem.measured else { return Vec::new() };
+        let (n, segment) = (self.problem.n(), &self.layout[at]);
+        let [mut q, mut v] = [(); 2].map(|()| vec![0.0; LANES * n]);
+        for i in 0..n {
+            let [(q_low, q_high), (v_low, v_high)] = [self.bounds.positions[i], self.bounds.velocities[i]];
+            spread((&mut q, n), (i, POSITION), [q_low, q_high]);
+            spread((&mut v, n), (i, VELOCITY), [v_low, v_high]);
+        }
+        let readings = self.pieces.start(segment.track, segment.first);
+        let starts = q.chunks_exact(n).zip(v.chunks_exact(n)).map(|(q, v)| measured.state(&readings, &[q, v].concat()));
+        let mut tried: Vec<Segment> = starts.map(|start| Segment { start, ..segment.clone() }).collect();
+        for (units, most) in [(1, PROMISING), (2, FOLLOWED)] {
+            let samples = self.samples(at, units);
+            tried.iter_mut().for_each(|tried| tried.samples = samples);
+            self.problem.settle(x, &mut tried, SETTLING);
+            tried = self.ranked(x, tried, most);
+        }
+        choose_steps(self.problem, x, &tried);
+        tried
+    }
+
+    /// Those of the segments with different sums of squares that fit best, the best first.
+    fn ranked(&self, x: &[f64], segments: Vec<Segment>, most: usize) -> Vec<Segment> {
+        let squares = self.problem.all(x, &segments).into_iter().map(|linear| linear.map(|linear| linear.square));
+        let mut ranked: Vec<(f64, Segment)> = squares.zip(segments).filter_map(|(a, b)| Some((a?, b))).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ranked.dedup_by(|next, before| next.0 - before.0 <= SAME * before.0);
+        ranked.into_iter().take(most).map(|(_, segment)| segment).collect()
+    }
+
+    /// The fit of constants and an initial state to a beginning, at first of so many units, that doubles while the model follows it, and
+    /// the units that it follows.
+    fn beginning(&mut self, given: &[f64], start: Segment, units: usize) -> Option<(Fitted, usize)> {
+        let (mut fitted, mut reach) = (None, 0);
+        let (mut x, mut segments, mut units) = (given.to_vec(), vec![start], units);
+        loop {
+            units = units.min(self.run(0));
+            segments[0].samples = self.samples(0, units);
+            self.problem.settle(&x, &mut segments, SETTLING);
+            choose_steps(self.problem, &x, &segments);
+            let mut tried = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
+            refit(self.problem, &mut tried, ITERATIONS);
+            let follows = tried.normal.failed == 0 && tried.mean_square() < FOLLOWS;
+            let fails = tried.normal.failed > 0 || !tried.mean_square().is_finite();
+            (x, segments) = (tried.x.clone(), tried.segments.clone());
+            if follows || fitted.is_none() && !fails {
+                (fitted, reach) = (Some(tried), if follows { units } else { 0 });
+            }
+            if !follows || units == self.run(0) || self.problem.cancellation.is_cancelled() {
+                break;
+            }
+            units *= 2;
+        }
+        Some((fitted?, reach))
+    }
+
+    /// The fit of all segments, of up to so many units, by a motion that begins as that of the first one.
+    fn along(&mut self, mut fitted: Fitted, reach: usize) -> Option<Fitted> {
+        let first = fitted.segments.first()?.samples;
+        let mut at = (1..=self.layout.len()).find(|units| self.samples(0, *units) >= first).unwrap_or(1);
+        let mut due = 2;
+        while at < self.layout.len() && !self.problem.cancellation.is_cancelled() {
+            let (next, units) = self.next(&fitted, at, reach)?;
+            fitted.segments.push(next);
+            at += units;
+            if fitted.segments.len() >= due && at < self.layout.len() {
+                refit(self.problem, &mut fitted, ITERATIONS);
+                due *= 2;
+            }
+        }
+        choose_steps(self.problem, &fitted.x, &fitted.segments);
+        refit(self.problem, &mut fitted, ITERATIONS);
+        Some(fitted)
+    }
+
+    /// The segment from a place of the layout on, of as many units as it is followed, at most `reach`: its motion continues the one before
+    /// where it can.
+    fn next(&mut self, fitted: &Fitted, at: usize, reach: usize) -> Option<(Segment, usize)> {
+        let (last, own) = (fitted.segments.last()?, &self.layout[at]);
+        let mut next = None;
+        if last.track == own.track && last.first < own.first {
+            let longer = Segment { samples: own.first - last.first + 1, ..last.clone() };
+            let start = self.problem.ends(&fitted.x, &[&longer]).pop()?;
+            next = self.settled(&fitted.x, Segment { start, ..own.clone() });
+        }
+        let (mut segment, mut square) = match next {
+            Some(next) => next,
+            None => {
+                let best = self.candidates(&fitted.x, at).into_iter().next()?;
+                self.settled(&fitted.x, Segment { start: best.start, ..self.layout[at].clone() })?
+            }
+        };
+        let (mut units, most) = (1, reach.min(self.run(at)));
+        while units < most {
+            let samples = self.samples(at, (2 * units).min(most));
+            let Some(longer) = self.settled(&fitted.x, Segment { samples, ..segment.clone() }) else { break };
+            if longer.1 > FOLLOWS.max(square) {
+                break;
+            }
+            ((segment, square), units) = (longer, (2 * units).min(most));
+        }
+        Some((segment, units))
+    }
+
+    /// A segment with its initial state fitted, and the mean square; `None` if it cannot be followed.
+    fn settled(&self, x: &[f64], segment: Segment) -> Option<(Segment, f64)> {
+        let mut segments = [segment];
+        self.problem.settle(x, &mut segments, SETTLING);
+        let linear = self.problem.all(x, &segments).pop()??;
+        let [segment] = segments;
+        Some((segment, linear.square / linear.count.max(1.0)))
+    }
+}
