@@ -117,7 +117,7 @@ lagrangian = "m*l^2*theta_dot^2/2 + m*g*l*cos(theta)"
 dissipation = "b*theta_dot^2/2"
 coordinates = [{ name = "theta", unit = "rad", periodic = true, velocity_bounds = [-20, 20] }]
 inputs = { u = "V" }
-forces = { theta = "K*u - Fc*tanh(theta_dot/0.02)" }
+forces = { theta = "K*u - Fc*tanh(theta_dot/0.1)" }
 parameters = { m = 0.5, l = 0.2, g = 9.81, K = 0.15, b = 0.01, Fc = 0.03 }
 """
 
@@ -126,7 +126,7 @@ def motor(place, system):
     system.write_text(MOTOR)
     rng = random.Random(3)
     times = [0.01 * k for k in range(2000)]
-    levels = [round(rng.uniform(-4, 4), 1) for _ in range(len(times) // 30 + 1)]
+    levels = [round(rng.uniform(-3, 3), 1) for _ in range(len(times) // 30 + 1)]
     voltages = [levels[k // 30] for k in range(len(times))]
     given = system.with_name("voltage.csv")
     given.write_text("t,u\n" + "".join(f"{t!r},{u!r}\n" for t, u in zip(times, voltages)))

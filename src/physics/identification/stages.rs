@@ -604,6 +604,11 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         }
         let mut longer = Fitted { segments, ..fitted.clone() };
         choose_steps(problem, &longer.x, &longer.segments);
+        // No number of steps is known to follow longer segments well enough.
+        if wanted.is_none() && problem.course.substeps == MOST_SUBSTEPS && fitted.substeps < MOST_SUBSTEPS {
+            problem.course.substeps = fitted.substeps;
+            break;
+        }
         problem.settle(&longer.x, &mut longer.segments, 6);
         refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");

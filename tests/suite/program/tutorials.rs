@@ -288,7 +288,7 @@ fn voltages_and_angles_give_the_constants_of_a_motor() {
     // Without the mass only its ratios are known.
     let open = motor.step("--constants").json();
     states(&open, "l", 0.2);
-    states(&open, "K/m", 0.3);
+    states(&open, "Fc/m", 0.06);
     assert!(!determined(&open).contains_key("K") && !determined(&open).contains_key("m"));
     assert!(motor.quoted >= 6, "{} values quoted", motor.quoted);
     // Two volts hold the pendulum out: K u = m g l sin(theta).
