@@ -76,6 +76,11 @@ impl Measured {
         self.angles.len()
     }
 
+    /// `true` if a coordinate is not read itself, so that initial states are searched.
+    pub fn is_searched(&self) -> bool {
+        self.sources.contains(&None)
+    }
+
     /// Smoothed readings as smoothed coordinates, if every coordinate is read itself.
     pub fn coordinates(&self, smoothed: &[Option<Smoothed>]) -> Option<Vec<Option<Smoothed>>> {
         let sources: Vec<usize> = self.sources.iter().copied().collect::<Option<_>>()?;
