@@ -14,8 +14,8 @@ struct Mechanism {
     of_motion: &'static [&'static str],
     of_forces: &'static [&'static str],
     starts: &'static [&'static [f64]],
-    /// The coordinate on which a known force acts.
-    driven: usize,
+    /// The coordinate on which a known force acts, and the size of the force.
+    driven: (usize, f64),
     /// A part of the form and what takes its place in one that is wrong.
     wrong: [&'static str; 2],
 }
@@ -33,7 +33,7 @@ const SLIDER: Mechanism = Mechanism {
     of_motion: &["m2", "c", "k", "r", "l"],
     of_forces: &["m1", "m2", "c", "k"],
     starts: &[&[0.6, 0.8, 2.43, 0.0, 0.0, 0.0], &[0.8, -0.6, 2.7, 1.8, 2.4, 1.0], &[-0.9, 0.4, 1.0, 1.0, 2.0, 1.0]],
-    driven: 2,
+    driven: (2, 4.0),
     wrong: ["c*x2_dot^2/2", "c*x2_dot^4/4"],
 };
 
@@ -55,18 +55,18 @@ const FOUR_BAR: Mechanism = Mechanism {
         &[0.3, -0.95, 1.6, 1.5, 5.0, 1.6, 0.0, 0.0],
         &[-0.9, 0.4, 1.4, 1.3, 0.0, 0.0, 0.0, 0.0],
     ],
-    driven: 2,
+    driven: (2, 4.0),
     wrong: ["e*(x2_dot^2 + y2_dot^2)/2", "e*x1_dot^2/2"],
 };
 
 const FIVE_BAR: Mechanism = Mechanism {
     text: r#"{"name": "five-bar", "dissipation": "e*(t1_dot^2 + t2_dot^2)/2",
-        "lagrangian": "m*a^2*(t1_dot^2 + t2_dot^2)/2 - g*(m*a*(sin(t1) + sin(t2)) + M*(a*sin(t1) + b*sin(t3))) + M*(a^2*t1_dot^2 + b^2*t3_dot^2 + 2*a*b*t1_dot*t3_dot*cos(t1 - t3))/2",
+        "lagrangian": "m*a^2*(t1_dot^2 + t2_dot^2)/2 - g*(m*a*(sin(t1) + sin(t2)) + M*(a*sin(t1) + b*sin(t3))) - k*((t1 - 2)^2 + (t2 - 1)^2)/2 + M*(a^2*t1_dot^2 + b^2*t3_dot^2 + 2*a*b*t1_dot*t3_dot*cos(t1 - t3))/2",
         "coordinates": [{"name": "t1", "periodic": true, "bounds": [1, 3], "velocity_bounds": [-2, 2]},
             {"name": "t2", "periodic": true, "bounds": [0, 2], "velocity_bounds": [-2, 2]},
             {"name": "t3", "periodic": true, "bounds": [0, 1.5], "velocity_bounds": [-2, 2]},
             {"name": "t4", "periodic": true, "bounds": [1.5, 3], "velocity_bounds": [-2, 2]}],
-        "parameters": {"m": 1, "M": 0.5, "e": 0.1, "g": 2, "a": 1, "b": 1.4, "d": 1.1},
+        "parameters": {"m": 1, "M": 0.5, "e": 0.1, "g": 2, "k": 25, "a": 1, "b": 1.4, "d": 1.1},
         "constraints": {"across": "a*cos(t1) + b*cos(t3) - d - a*cos(t2) - b*cos(t4)",
             "up": "a*sin(t1) + b*sin(t3) - a*sin(t2) - b*sin(t4)"}}"#,
     truth: &[("M", 0.7), ("e", 0.2), ("b", 1.5), ("d", 1.0)],
@@ -77,7 +77,7 @@ const FIVE_BAR: Mechanism = Mechanism {
         &[1.8, 1.3, 0.9, 2.2, 0.8, -0.8, 0.0, 0.0],
         &[2.0, 0.6, 0.7, 2.3, 1.0, 0.6, 0.0, 0.0],
     ],
-    driven: 0,
+    driven: (0, 3.0),
     wrong: ["e*(t1_dot^2 + t2_dot^2)/2", "e*(t1_dot^4 + t2_dot^4)/4"],
 };
 
@@ -102,14 +102,15 @@ impl Mechanism {
     fn recorded(&self, forced: bool, seed: u64) -> Recording {
         let instance = self.form(self.truth);
         let (n, model) = (instance.coordinates, instance.build().unwrap());
-        let push = |t: f64| if forced { 4.0 * (2.3 * t).sin() + 3.0 * (3.7 * t).cos() } else { 0.0 };
-        let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[self.driven] = push(t);
+        let (driven, size) = self.driven;
+        let push = |t: f64| if forced { size * ((2.3 * t).sin() + 0.75 * (3.7 * t).cos()) } else { 0.0 };
+        let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[driven] = push(t);
         let track = |start: &&[f64]| {
             let (mut q, mut v) = (start[..n].to_vec(), start[n..].to_vec());
             project(model.manifold().unwrap(), &mut q, &mut v).unwrap();
             let motion = Driven::new(&*model, &force).rollout(&q, &v, &Options::new(3.0, 0.02)).complete().unwrap();
             let mut forces = vec![0.0; if forced { motion.q.len() } else { 0 }];
-            let own = forces.iter_mut().skip(self.driven).step_by(n).zip(&motion.t);
+            let own = forces.iter_mut().skip(driven).step_by(n).zip(&motion.t);
             own.for_each(|(force, t)| *force = push(*t));
             let (v, a) = (Vec::new(), Vec::new());
             RecordedTrajectory { name: "run".into(), times: motion.t, q: motion.q, v, a, force: forces }
@@ -126,7 +127,7 @@ impl Mechanism {
         for (track, own) in of_force.tracks.iter_mut().zip(&recording.tracks) {
             track.q.clone_from(&own.force);
         }
-        let sigma: Vec<f64> = (0..n).map(|i| if i == self.driven { NOISE_OF_FORCE } else { 0.0 }).collect();
+        let sigma: Vec<f64> = (0..n).map(|i| if i == driven { NOISE_OF_FORCE } else { 0.0 }).collect();
         noise(&mut of_force, &sigma, seed + 1000);
         recording.tracks.iter_mut().zip(of_force.tracks).for_each(|(track, noisy)| track.force = noisy.q);
         recording

@@ -44,7 +44,7 @@ pub enum IdentifyError {
     },
     /// Constants that move constraints, of which forces tell nothing.
     #[error(
-        "constants: {} move the constraints, of which forces tell nothing: expected constants of the Lagrangian, the dissipation or the forces, or --targets motion",
+        "constants: the constraints depend on {}, of which forces tell nothing: expected other constants, or --targets motion",
         symbols.join(", ")
     )]
     MovesConstraints {

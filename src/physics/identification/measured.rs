@@ -76,6 +76,11 @@ impl Measured {
         self.angles.len()
     }
 
+    /// `true` if a coordinate is not read itself, so that initial states are searched.
+    pub fn is_searched(&self) -> bool {
+        self.sources.contains(&None)
+    }
+
     /// Smoothed readings as smoothed coordinates, if every coordinate is read itself.
     pub fn coordinates(&self, smoothed: &[Option<Smoothed>]) -> Option<Vec<Option<Smoothed>>> {
         let sources: Vec<usize> = self.sources.iter().copied().collect::<Option<_>>()?;
@@ -240,7 +245,7 @@ mod tests {
         let mut instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         instance.parameters[change.0] += change.1;
         let chosen = [3, 0, 1];
-        let equations = Equations::record(&instance, &chosen).unwrap().unwrap();
+        let equations = Equations::record(&instance, &chosen, &[]).unwrap().unwrap();
         let measured = Measured::record(&instance, &chosen).unwrap().unwrap();
         assert!(measured.sources == [None, Some(0)] && measured.angles == [true, false, false]);
         let times: Vec<f64> = (0..9).map(|k| 0.1 * f64::from(k)).collect();

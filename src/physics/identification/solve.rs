@@ -364,7 +364,7 @@ impl Problem<'_> {
 
     /// The normal equations after eliminating the initial states.
     pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment]) -> Normal {
-        let (n, m) = (self.n(), self.unknowns());
+        let m = self.unknowns();
         let starts = self.course.starts();
         let width = starts + m;
         let mut normal = Normal::empty(m);

@@ -1,5 +1,6 @@
 //! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
 
+use super::begun::begun;
 use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::follow::{Course, Segment};
@@ -14,7 +15,7 @@ use super::quality::{
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
-use super::unseen::{SEARCHED, Search};
+use super::unseen::SEARCHED;
 use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::system::Range;
@@ -198,25 +199,7 @@ pub fn identify(
         found.obstacles = [pieces.still, repeated].concat();
         return Ok(found.named(recording, options.robust));
     }
-    let states = match problem.measured {
-        None => Some(States::new(&on_pieces, &pieces.smoothed)),
-        Some(measured) => measured.coordinates(&pieces.smoothed).map(|own| States::new(&on_pieces, &own)),
-    };
-    if let Some(states) = &states {
-        on_pieces.require_constraints(&given, (&states.q, &states.v))?;
-    }
-    let (mut fitted, cut) = match &states {
-        Some(states) => from_smoothed(&mut problem, (&on_pieces, states, &pieces), &given, options)?,
-        None => {
-            stop.stage("initial states");
-            let bounds = &instance.system.validation(instance.coordinates);
-            let [v, a] = pieces.rates();
-            let samples = first_samples((&v, &a), (n, pieces.step), options.segment)?;
-            let layout = pieces.cut(samples.max(problem.least_segment()));
-            let search = Search { problem: &mut problem, pieces: &pieces, bounds, layout }.first(&given);
-            (search?, Vec::new())
-        }
-    };
+    let (mut fitted, cut) = begun(&mut problem, (&on_pieces, &pieces), (instance, &given), options)?;
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
@@ -273,39 +256,15 @@ pub fn identify(
         format!("{symbol} was searched from {low} to {high}; begin nearer if it may lie outside")
     };
     found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect()].concat();
-    match &states {
-        Some(states) => found.obstacles.extend(on_pieces.off_constraints(&fitted.x, (&states.q, &states.v))),
-        None if !found.explained => found.obstacles.push(SEARCHED.to_string()),
-        None => {}
+    if equations.rows.is_some() {
+        let states = States::new(&on_pieces, &pieces.smoothed);
+        found.obstacles.extend(on_pieces.off_constraints(&fitted.x, (&states.q, &states.v)));
+    }
+    if problem.measured.is_some_and(Measured::is_searched) && !found.explained {
+        found.obstacles.push(SEARCHED.to_string());
     }
     rivals.widen(&mut found);
     Ok(found.named(recording, options.robust))
-}
-
-/// The fit of the first segments from constants that are fitted to smoothed accelerations; says which constants were searched in a part of
-/// their range.
-fn from_smoothed(
-    problem: &mut Problem<'_>,
-    (on_pieces, states, pieces): (&Problem<'_>, &States, &Pieces<'_>),
-    given: &[f64],
-    options: &IdentifyOptions,
-) -> Result<(Fitted, Vec<(usize, [f64; 2])>), IdentifyError> {
-    let (n, mut x) = (problem.n(), given.to_vec());
-    let cut = match problem.course.equations.known {
-        _ if states.len(n) == 0 => Some(Vec::new()),
-        0 => states.fit(on_pieces, &mut x, Met::Accelerations).map(|_| Vec::new()),
-        _ => states.fit_in_time(on_pieces, &mut x),
-    };
-    problem.cancellation.check()?;
-    let cut = cut.ok_or(IdentifyError::Singular)?;
-    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
-    let samples = first_samples((&states.v, &states.a), (n, pieces.step), options.segment)?;
-    problem.cancellation.stage("short segments");
-    let mut segments = pieces.cut(samples);
-    if let Some(measured) = problem.measured {
-        segments.iter_mut().for_each(|segment| segment.start = measured.state(&segment.start, &[]));
-    }
-    Ok((first(problem, [x, given.to_vec()], segments)?, cut))
 }
 
 /// Messages about readings that a sensor repeated.
@@ -327,7 +286,7 @@ pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
 }
 
 /// Samples of the first segments: a few time scales of the fastest coordinate, or the requested number if that is smaller.
-fn first_samples(
+pub(super) fn first_samples(
     (v, a): (&[f64], &[f64]),
     (n, step): (usize, f64),
     wanted: Option<f64>,
@@ -361,7 +320,11 @@ pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
 
 /// The better fit of the first segments from either of two starts; segments that cannot be followed are left out. The second start is tried if
 /// the first one does not reach the noise.
-fn first(problem: &mut Problem<'_>, starts: [Vec<f64>; 2], segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
+pub(super) fn first(
+    problem: &mut Problem<'_>,
+    starts: [Vec<f64>; 2],
+    segments: Vec<Segment>,
+) -> Result<Fitted, IdentifyError> {
     let mut best: Option<Fitted> = None;
     for x in starts {
         if best.as_ref().is_some_and(Fitted::is_plain) {

@@ -163,7 +163,7 @@ fn constants_of_a_slider_crank_follow_from_its_forces() {
         if seed == 0 {
             let wrong = lnn(&[&shared[..], &lengths, &["m1,m2", "--param", "c=0"]].concat());
             assert_eq!((wrong.code, &parsed(&wrong.stdout)["explained"]), (Some(0), &Value::Bool(false)));
-            lnn(&[&shared[..], &lengths, &["m1,l"]].concat()).refused(2, &["l move", "--targets motion"]);
+            lnn(&[&shared[..], &lengths, &["m1,l"]].concat()).refused(2, &["depend on l", "--targets motion"]);
         }
     }
     judge(&all, explained);

@@ -1,0 +1,60 @@
+//! The fit of the first segments: from smoothed accelerations, or by a search of initial states if coordinates were not measured themselves.
+
+use super::pieces::Pieces;
+use super::smoothed::{Met, States};
+use super::solve::Problem;
+use super::stages::{Fitted, first, first_samples};
+use super::unseen::Search;
+use super::{IdentifyError, IdentifyOptions};
+use crate::lagrangian::SystemInstance;
+
+/// A fit of the first segments, and constants by their places that were searched in a part of their range.
+type Begun = (Fitted, Vec<(usize, [f64; 2])>);
+
+/// The fit of the first segments from given constants; `on_pieces` is the problem of the pieces alone.
+pub(super) fn begun<'b>(
+    problem: &mut Problem<'b>,
+    (on_pieces, pieces): (&Problem<'_>, &Pieces<'b>),
+    (instance, given): (&SystemInstance<f64>, &[f64]),
+    options: &IdentifyOptions,
+) -> Result<Begun, IdentifyError> {
+    let states = match problem.measured {
+        None => Some(States::new(on_pieces, &pieces.smoothed)),
+        Some(measured) => measured.coordinates(&pieces.smoothed).map(|own| States::new(on_pieces, &own)),
+    };
+    if let Some(states) = states {
+        on_pieces.require_constraints(given, (&states.q, &states.v))?;
+        return from_smoothed(problem, (on_pieces, &states, pieces), given, options);
+    }
+    problem.cancellation.stage("initial states");
+    let bounds = &instance.system.validation(instance.coordinates);
+    let [v, a] = pieces.rates();
+    let samples = first_samples((&v, &a), (problem.width(), pieces.step), options.segment)?;
+    let layout = pieces.cut(samples.max(problem.least_segment()));
+    Ok((Search { problem, pieces, bounds, layout }.first(given)?, Vec::new()))
+}
+
+/// The fit of the first segments from constants that are fitted to smoothed accelerations.
+fn from_smoothed(
+    problem: &mut Problem<'_>,
+    (on_pieces, states, pieces): (&Problem<'_>, &States, &Pieces<'_>),
+    given: &[f64],
+    options: &IdentifyOptions,
+) -> Result<Begun, IdentifyError> {
+    let (n, mut x) = (problem.n(), given.to_vec());
+    let cut = match problem.course.equations.known {
+        _ if states.len(n) == 0 => Some(Vec::new()),
+        0 => states.fit(on_pieces, &mut x, Met::Accelerations).map(|_| Vec::new()),
+        _ => states.fit_in_time(on_pieces, &mut x),
+    };
+    problem.cancellation.check()?;
+    let cut = cut.ok_or(IdentifyError::Singular)?;
+    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
+    let samples = first_samples((&states.v, &states.a), (n, pieces.step), options.segment)?;
+    problem.cancellation.stage("short segments");
+    let mut segments = pieces.cut(samples);
+    if let Some(measured) = problem.measured {
+        segments.iter_mut().for_each(|segment| segment.start = measured.state(&segment.start, &[]));
+    }
+    Ok((first(problem, [x, given.to_vec()], segments)?, cut))
+}
