@@ -3,7 +3,7 @@
 Writes three films of a mass on a spring (film1.txt to film3.txt, 60 pictures per second, positions with a noise of 0.5 mm, as Tracker exports them
 without the line of the track's name), the log of an arm of three joints (robot.csv, 125 Hz, encoders with a noise of 0.2 mrad, torques with one of
 2 %), the log of a pendulum on a motor (motor.csv, 100 Hz, angles with a noise of 1 mrad, voltages without), and the log of an arm of six joints
-(six_joints.csv, 100 Hz, 0.1 mrad, 1 %), by default to examples/data. LNN computes the motion and the torques; the noise has a fixed seed.
+(six_joints.csv, 100 Hz, 0.1 mrad, 1 %), and 80 observations of a binary star (star.csv, 0.01 AU and 0.05 AU/yr), by default to examples/data. LNN computes the motion and the torques; the noise has a fixed seed.
 """
 
 import math
@@ -125,13 +125,13 @@ parameters = { m = 0.5, l = 0.2, g = 9.81, K = 0.15, b = 0.01, Fc = 0.03 }
 def motor(place, system):
     system.write_text(MOTOR)
     rng = random.Random(3)
-    times = [0.01 * k for k in range(2000)]
+    times = [0.01 * k for k in range(1000)]
     levels = [round(rng.uniform(-3, 3), 1) for _ in range(len(times) // 30 + 1)]
     voltages = [levels[k // 30] for k in range(len(times))]
     given = system.with_name("voltage.csv")
     given.write_text("t,u\n" + "".join(f"{t!r},{u!r}\n" for t, u in zip(times, voltages)))
     drive = ["--force", str(given), "--between", "held", "--rtol", "1e-9", "--atol", "1e-11"]
-    motion = program("rollout", "--system", str(system), "--state=0.3,0", *drive, "--t-end", "19.99", "--dt", "0.01", "--out", "-")
+    motion = program("rollout", "--system", str(system), "--state=0.3,0", *drive, "--t-end", "9.99", "--dt", "0.01", "--out", "-")
     rows = [f"{t:.2f},{row[1] + rng.gauss(0, 1e-3):.4f},{u}\n" for t, row, u in zip(times, motion, voltages)]
     (place / "motor.csv").write_text("t,theta,u\n" + "".join(rows))
 
@@ -171,9 +171,26 @@ def six_joints(place, system):
     log(place / "six_joints.csv", system, SIX, motion, [0.01 * k for k in range(2000)], rng, (1e-4, 0.01), (5, 3))
 
 
+STAR = {"GM": 43.4, "i": 0.7, "node": 0.5, "v0": 0.4}
+
+
+def star(place):
+    system = Path(__file__).parents[2] / "examples/systems/star_in_projection.toml"
+    values = sum((["--param", f"{name}={value}"] for name, value in STAR.items()), [])
+    span = ["--t-end", "4", "--dt", "0.002", "--rtol", "1e-10", "--atol", "1e-12", "--out", "-"]
+    rows = program("rollout", "--system", str(system), *values, "--state=0.8,0.3,0,9", *span)
+    rng = random.Random(5)
+    text = "t,north,east,rv\n"
+    for k in sorted(rng.sample(range(len(rows)), 80)):
+        north, east, rv = rows[k][-3:]
+        text += f"{rows[k][0]:.3f},{north + rng.gauss(0, 0.01):.3f},{east + rng.gauss(0, 0.01):.3f},{rv + rng.gauss(0, 0.05):.2f}\n"
+    (place / "star.csv").write_text(text)
+
+
 folder = Path(sys.argv[2] if len(sys.argv) > 2 else "examples/data")
 with tempfile.TemporaryDirectory() as scratch:
     films(folder, Path(scratch) / "spring.toml")
     robot(folder, Path(scratch) / "arm.toml")
     motor(folder, Path(scratch) / "motor.toml")
     six_joints(folder, Path(scratch) / "six.toml")
+    star(folder)
