@@ -264,3 +264,26 @@ def test_mistakes_of_an_identification_are_values(swung):
         lnn.identify(swung, "double-pendulum", dt=0.02)
     with pytest.raises(ValueError):
         lnn.identify([swung[0][:5]], form, constants=["l"], dt=0.02)
+
+
+def test_measured_quantities_take_the_place_of_coordinates():
+    text = """
+name = "watched"
+lagrangian = "theta_dot^2/2 + w*cos(theta)"
+parameters = { w = { default = 8, learn = true }, far = { default = 2.2, learn = true } }
+measured = { range = "sqrt(far^2 + 1 - 2*far*cos(theta))" }
+coordinates = [{ name = "theta", periodic = true, velocity_bounds = [-4, 4] }]
+"""
+    form = lnn.System.from_toml(text)
+    assert tuple(form.measured) == ("range",)
+    motion = form.with_parameters(w=9.81, far=2).rollout([1.0], [0.3], 8.0, 0.02)
+    noise = 1e-3 * np.random.default_rng(0).normal(size=len(motion.t))
+    reading = np.sqrt(5 - 4 * np.cos(motion.q[:, 0])) + noise
+    for data in [reading[:, None], {"range": reading, "t": motion.t}]:
+        found = lnn.identify(data, form, **({} if isinstance(data, dict) else {"dt": 0.02}))
+        assert found.explained
+        for name, truth in [("w", 9.81), ("far", 2.0)]:
+            constant = found.constants[name]
+            assert abs(constant.value - truth) < 4 * constant.standard_error < 0.04
+    with pytest.raises(ValueError, match="range"):
+        lnn.identify({"distance": reading, "t": motion.t}, form)

@@ -203,7 +203,7 @@ impl States {
     /// Normal equations, with the right-hand sides of batches of states; `None` where no residual is finite.
     pub fn normal(&self, problem: &Problem<'_>, x: &[f64], met: Met) -> Option<Normal> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
-        let mut normal = Normal::empty(m);
+        let (mut normal, mut held) = (Normal::empty(m), Vec::with_capacity(m));
         self.residuals(problem, x, met, |first, residuals, slopes| {
             let mut part = vec![0.0; m];
             for (k, (residual, row)) in residuals.iter().zip(slopes.chunks_exact(2 * n + m)).enumerate() {
@@ -218,10 +218,17 @@ impl States {
                 let cut = if size > HUBER { HUBER / size } else { 1.0 };
                 normal.square += if size > HUBER { HUBER * (2.0 * size - HUBER) } else { residual * residual };
                 let scale = cut * weight * weight;
-                for (i, x) in row.iter().enumerate() {
+                // A torque depends on the links that its joint carries, few of many in a tree.
+                held.clear();
+                held.extend((0..m).filter(|&i| row[i] != 0.0));
+                for &i in &held {
+                    let x = row[i];
                     part[i] += cut * weight * x * residual;
                     let line = &mut normal.matrix[i * m..(i + 1) * m];
-                    line.iter_mut().zip(row).for_each(|(sum, y)| *sum += scale * x * y);
+                    match 2 * held.len() > m {
+                        true => line.iter_mut().zip(row).for_each(|(sum, y)| *sum += scale * x * y),
+                        false => held.iter().for_each(|&j| line[j] += scale * x * row[j]),
+                    }
                 }
             }
             normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
