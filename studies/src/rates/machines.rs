@@ -35,6 +35,8 @@ struct Machine {
     start: (&'static [f64], &'static [f64]),
     /// Inputs at a time and a state, held between the samples; a draw of eight numbers from 0 to 1 makes each recording another one.
     inputs: fn(f64, &[f64], &[f64], &[f64; 8]) -> Vec<f64>,
+    /// What is measured at a state; empty for the positions.
+    reads: fn(&[f64], &[f64]) -> Vec<f64>,
     step: f64,
     samples: usize,
     /// Height of a floor that the last coordinate bounces off, keeping this share of its speed. Recordings are cut there.
@@ -42,6 +44,10 @@ struct Machine {
 }
 
 fn none(_: f64, _: &[f64], _: &[f64], _: &[f64; 8]) -> Vec<f64> {
+    Vec::new()
+}
+
+fn positions(_: &[f64], _: &[f64]) -> Vec<f64> {
     Vec::new()
 }
 
@@ -72,6 +78,7 @@ om = { default = 1.4, learn = true, range = "positive" }
     acceleration: |t, q, v, _| vec![0.6 * (1.4 * t).cos() - 0.1 * v[0] - q[0] - 0.5 * q[0].powi(3)],
     start: (&[1.0], &[0.2]),
     inputs: none,
+    reads: positions,
     step: 0.05,
     samples: 1000,
     floor: None,
@@ -103,6 +110,7 @@ offset = { default = -3.1648, unit = "N", learn = true }
     start: (&[0.0], &[0.0]),
     // A controller that follows a sum of tones.
     inputs: |t, q, v, draw| vec![(0.03 * tones(t, 2.5, draw) - q[0]) * 160.0 - 12.0 * v[0]],
+    reads: positions,
     step: 0.005,
     samples: 2000,
     floor: None,
@@ -146,6 +154,7 @@ K = { default = 0.3, learn = true }
         let back = |x: f64| -0.3 * x;
         vec![tones(t, 12.0, draw) + back(q[0]), (0.4 + draw[0]) * (7.0 * t + 5.0 * draw[1]).sin() + back(q[1])]
     },
+    reads: positions,
     step: 0.01,
     samples: 1500,
     floor: None,
@@ -181,6 +190,7 @@ b = { default = 0.1, learn = true }
     },
     start: (&[0.0, 4.0], &[3.0, 2.0]),
     inputs: none,
+    reads: positions,
     step: 0.01,
     samples: 400,
     floor: Some(0.85),
@@ -213,6 +223,7 @@ om = { default = 5.488e-5, unit = "rad/s", learn = true }
     },
     start: (&[3.0, 0.1], &[0.0, 0.1]),
     inputs: none,
+    reads: positions,
     step: 1.0,
     samples: 3600,
     floor: None,
@@ -239,6 +250,7 @@ c = { default = 0.02, learn = true }
     },
     start: (&[0.8], &[0.0]),
     inputs: none,
+    reads: positions,
     step: 0.02,
     samples: 750,
     floor: None,
@@ -269,6 +281,7 @@ k = { default = 2, learn = true, range = "positive" }
     },
     start: (&[0.1, 0.0], &[0.0, 1.0]),
     inputs: none,
+    reads: positions,
     step: 0.05,
     samples: 500,
     floor: None,
@@ -315,12 +328,32 @@ tilt = { default = 2e-4, unit = "m/s^2", learn = true }
             |rate: f64, at: usize| (1.4 * (rate * (0.6 + 0.8 * draw[at]) * t + 6.3 * draw[at + 1]).sin()).round();
         vec![pulse(0.011, 0), pulse(0.007, 2)]
     },
+    reads: positions,
     step: 10.0,
     samples: 600,
     floor: None,
 };
 
-const MACHINES: [Machine; 8] = [DUFFING, STAGE, DRIVES, BALL, FOUCAULT, SHAKEN, WIGGLER, SPACECRAFT];
+const STAR: Machine = Machine {
+    name: "binary star, place on the sky and radial velocity",
+    without: "binary star by another power of the distance",
+    system: include_str!("../../../examples/systems/star_in_projection.toml"),
+    wrong: (" + GM/r\"", " + GM/r^1.2\""),
+    acceleration: |_, q, v, _| vec![q[0] * v[1] * v[1] - 35.0 / (q[0] * q[0]), -2.0 * v[0] * v[1] / q[0]],
+    start: (&[1.0, 0.4], &[0.5, 5.0]),
+    inputs: none,
+    reads: |q, v| {
+        let ((x, y), (sin_i, cos_i), (sin_node, cos_node)) =
+            ((q[0] * q[1].cos(), q[0] * q[1].sin()), 0.9f64.sin_cos(), 0.3f64.sin_cos());
+        let towards = v[0] * q[1].sin() + q[0] * v[1] * q[1].cos();
+        vec![x * cos_node - y * sin_node * cos_i, x * sin_node + y * cos_node * cos_i, towards * sin_i]
+    },
+    step: 0.02,
+    samples: 200,
+    floor: None,
+};
+
+const MACHINES: [Machine; 9] = [DUFFING, STAGE, DRIVES, BALL, FOUCAULT, SHAKEN, WIGGLER, SPACECRAFT, STAR];
 
 /// A motion and the inputs at its samples.
 struct Recorded {
@@ -360,7 +393,8 @@ impl Machine {
             let given = (self.inputs)(t, &state[..n], &state[n..], &draw);
             let (own, inputs_of) = (tracks.last_mut().ok_or("none")?, inputs.last_mut().ok_or("none")?);
             own.times.push(t);
-            own.q.extend(&state[..n]);
+            let readings = (self.reads)(&state[..n], &state[n..]);
+            own.q.extend(if readings.is_empty() { &state[..n] } else { &readings });
             inputs_of.extend(&given);
             let h = self.step / STEPS as f64;
             for k in 0..STEPS {
@@ -372,22 +406,26 @@ impl Machine {
                 inputs.push(Vec::new());
             }
         }
-        let sizes: Vec<f64> = (0..n)
+        let system = self.system(true, &[])?;
+        let measured: Vec<String> = system.measured().map(str::to_string).collect();
+        let named = if measured.is_empty() { coordinates } else { measured };
+        let sizes: Vec<f64> = (0..named.len())
             .map(|i| {
-                let own = || tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n));
+                let own = || tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(named.len()));
                 let mean = own().sum::<f64>() / self.samples as f64;
                 NOISE * (own().map(|q| (q - mean) * (q - mean)).sum::<f64>() / self.samples as f64).sqrt()
             })
             .collect();
         for (k, q) in tracks.iter_mut().flat_map(|track| track.q.iter_mut().enumerate()) {
             let noise: f64 = StandardNormal.sample(rng);
-            *q += sizes[k % n] * noise;
+            *q += sizes[k % sizes.len()] * noise;
         }
         if (self.inputs)(0.0, &state[..n], &state[n..], &draw).is_empty() {
             inputs.clear();
         }
-        let periodic = names.iter().map(|own| own.get("periodic").is_some()).collect();
-        Ok(Recorded { recording: Recording { coordinates, periodic, tracks }, inputs })
+        let angles = names.iter().map(|own| own.get("periodic").is_some());
+        let periodic = if named.len() == n { angles.collect() } else { vec![false; named.len()] };
+        Ok(Recorded { recording: Recording { coordinates: named, periodic, tracks }, inputs })
     }
 
     /// The state a step later.
