@@ -124,7 +124,19 @@ fn constants_of_a_slider_crank_follow_from_its_motion() {
         explained += usize::from(found["explained"] == true);
         if seed == 0 {
             // What was found moves; without friction nothing fits.
-            let moved = lnn(&["rollout", "--system", &out, "--state", "1,2.3547,0,0", "--t-end", "1", "--dt", "0.1"]);
+            let moved = lnn(&[
+                "rollout",
+                "--system",
+                &out,
+                "--state",
+                "1,2.3547,0,0",
+                "--t-end",
+                "1",
+                "--dt",
+                "0.1",
+                "--out",
+                "-",
+            ]);
             assert_eq!(moved.code, Some(0), "{}", moved.stderr);
             let shared = ["identify", &text(&path), "--system", SYSTEM, "--trajectory", "run", "--json"];
             let wrong = lnn(&[&shared[..], &["--constants", "m2,r,l", "--param", "c=0"]].concat());
