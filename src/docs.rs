@@ -6,6 +6,7 @@
 //! | [`tutorial_robot`] | the same from a robot's log of angles and torques to its constants and to inverse dynamics |
 //! | [`tutorial_urdf`] | the same from the URDF of an arm and a log to the URDF of the arm that was built |
 //! | [`tutorial_motor`] | the same from a log of voltages and angles to the constants of a motor and its pendulum |
+//! | [`tutorial_star`] | the same from observations of a binary star to its orbit |
 //! | [`tutorial_metric`] | the same from a metric to its curvature, its geodesics, and a picture of its sky |
 //! | [`commands`] | every command and option of the program, exit codes, files |
 //! | [`many_machines`] | running an experiment on a cluster or in many processes |
@@ -107,6 +108,7 @@ macro_rules! page {
             "[tutorial-robot]: crate::docs::tutorial_robot\n",
             "[tutorial-urdf]: crate::docs::tutorial_urdf\n",
             "[tutorial-motor]: crate::docs::tutorial_motor\n",
+            "[tutorial-star]: crate::docs::tutorial_star\n",
             "[tutorial-metric]: crate::docs::tutorial_metric\n",
             "[fitted-to-forces]: crate::docs::identify#constants-fitted-to-forces\n",
             "[functions]: crate::docs::symmetries#functions\n",
@@ -131,6 +133,7 @@ pages! {
     tutorial_robot "tutorial-robot.md";
     tutorial_urdf "tutorial-urdf.md";
     tutorial_motor "tutorial-motor.md";
+    tutorial_star "tutorial-star.md";
     tutorial_metric "tutorial-metric.md";
     commands "commands.md";
     many_machines "many-machines.md";

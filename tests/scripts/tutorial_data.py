@@ -182,8 +182,8 @@ def star(place):
     rng = random.Random(5)
     text = "t,north,east,rv\n"
     for k in sorted(rng.sample(range(len(rows)), 80)):
-        north, east, rv = rows[k][-3:]
-        text += f"{rows[k][0]:.3f},{north + rng.gauss(0, 0.01):.3f},{east + rng.gauss(0, 0.01):.3f},{rv + rng.gauss(0, 0.05):.2f}\n"
+        east, north, rv = rows[k][-3:]
+        text += f"{rows[k][0]:.3f},{north + rng.gauss(0, 0.01):.4f},{east + rng.gauss(0, 0.01):.4f},{rv + rng.gauss(0, 0.05):.3f}\n"
     (place / "star.csv").write_text(text)
 
 

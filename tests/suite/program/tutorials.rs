@@ -297,6 +297,21 @@ fn voltages_and_angles_give_the_constants_of_a_motor() {
 }
 
 #[test]
+fn observations_of_a_star_give_its_orbit() {
+    let star = follow("tutorial-star.md", |_| ());
+    let found = star.step("--html star.html").json();
+    assert_eq!(found["explained"], true);
+    for (name, truth) in [("GM", 43.4), ("i", 0.7), ("node", 0.5), ("v0", 0.4)] {
+        states(&found, name, truth);
+    }
+    for (name, truth) in [("GM", 43.4), ("i", 0.7), ("node", 0.5)] {
+        states(&star.step("sky.toml").json(), name, truth);
+    }
+    assert_eq!(star.step("other.toml").json()["explained"], false);
+    assert!(star.quoted >= 7, "{} values quoted", star.quoted);
+}
+
+#[test]
 fn a_metric_has_a_curvature_a_fall_and_a_sky() {
     // Few pixels, few places of the edge.
     let metric = follow("tutorial-metric.md", |words| {
