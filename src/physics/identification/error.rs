@@ -71,7 +71,9 @@ pub enum IdentifyError {
     #[error("known forces beside [measured]: write them as formulas of [inputs] in [forces]")]
     ForcesBesideReadings,
     /// Constraints beside readings.
-    #[error("constraints beside [measured]: measure the coordinates, or describe the system by as many coordinates as move freely")]
+    #[error(
+        "constraints beside [measured]: measure the coordinates, or describe the system by as many coordinates as move freely"
+    )]
     ConstrainedReadings,
     /// Constants of sensors beside readings.
     #[error("{what}: a system with [measured] has the constants of its sensors in the formulas there")]

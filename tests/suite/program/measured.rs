@@ -141,7 +141,7 @@ fn a_loss_that_the_form_lacks_is_noticed() {
 #[test]
 fn a_star_is_weighed_by_its_place_on_the_sky_and_its_radial_velocity() {
     let folder = Folder::new();
-    let system = folder.file("star.toml", &std::fs::read_to_string(star()).unwrap());
+    let system = folder.file("star.toml", std::fs::read_to_string(star()).unwrap());
     let options =
         "--param GM=39.5 --param i=1 --param node=0.4 --param v0=0.7 --state 0.8,0.5,0.3,8 --t-end 2 --dt 0.02";
     let motion = motion(&folder, &system, options);
@@ -159,7 +159,7 @@ fn a_pendulum_is_known_by_a_distance_or_an_accelerometer() {
         ("along = { formula = \"l*theta_ddot + g*sin(theta)\", unit = \"m/s^2\" }", "along", 0.01),
     ];
     for (entry, name, noise) in cases {
-        let system = folder.file("pendulum.toml", &format!("{PENDULUM}[measured]\n{entry}\n"));
+        let system = folder.file("pendulum.toml", format!("{PENDULUM}[measured]\n{entry}\n"));
         let motion = motion(&folder, &system, "--param l=0.8 --param b=0.15 --state 1.2,0.4 --t-end 8 --dt 0.02");
         honest(&truth, |seed| identified(&system, &log(&folder, &motion, &[(name, name, noise)], seed), &[]));
     }
@@ -172,7 +172,7 @@ const VOLTS: &str = "offset = { default = 0, learn = true }\n[measured]\nvolts =
 fn gain_and_offset_of_a_sensor_are_found_beside_the_constants() {
     let folder = Folder::new();
     let pendulum = PENDULUM.replace("[parameters.k]\ndefault = 1\n", "k = { default = 2, learn = true }\n");
-    let system = folder.file("pendulum.toml", &format!("{pendulum}{VOLTS}"));
+    let system = folder.file("pendulum.toml", format!("{pendulum}{VOLTS}"));
     let options = "--param l=0.8 --param b=0.15 --param k=2.5 --param offset=0.3 --state 1.5,0.4 --t-end 8 --dt 0.02";
     let motion = motion(&folder, &system, options);
     let truth = [("l", 0.8), ("b", 0.15), ("k", 2.5), ("offset", 0.3)];
@@ -213,9 +213,8 @@ volts = "k*x"
 fn a_sensor_may_have_an_offset_in_each_log() {
     let folder = Folder::new();
     let zero = "zero = { default = 0, per = \"trajectory\", learn = true }\n[measured]\nx = \"l*sin(theta) + zero\"\n";
-    let system =
-        folder.file("pendulum.toml", &format!("{PENDULUM}{zero}").replace("[parameters.k]\ndefault = 1\n", ""));
-    let plain = folder.file("plain.toml", &format!("{PENDULUM}[measured]\nx = \"l*sin(theta)\"\n"));
+    let system = folder.file("pendulum.toml", format!("{PENDULUM}{zero}").replace("[parameters.k]\ndefault = 1\n", ""));
+    let plain = folder.file("plain.toml", format!("{PENDULUM}[measured]\nx = \"l*sin(theta)\"\n"));
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut csv = "run,t,x".to_string();
     for (run, offset, state) in [("a", 0.1, "1.2,0.4"), ("b", -0.2, "0.8,-1")] {
@@ -253,7 +252,7 @@ fn gaps_and_errors_are_those_of_single_readings() {
             &format!("\n{name} = {{ error = \"{name}_err\", column = \"{name}_read\", "),
         )
     };
-    let system = folder.file("star.toml", &["north", "east", "rv"].into_iter().fold(file, named));
+    let system = folder.file("star.toml", ["north", "east", "rv"].into_iter().fold(file, named));
     let options =
         "--param GM=39.5 --param i=1 --param node=0.4 --param v0=0.7 --state 0.8,0.5,0.3,8 --t-end 2 --dt 0.01";
     let (names, rows) = motion(&folder, &system, options);
@@ -284,7 +283,7 @@ fn mistakes_are_named_on_one_line() {
     let folder = Folder::new();
     let log = folder.file("log.csv", "t,volts\n0,1\n0.1,2\n");
     let refused = |entry: &str, more: &[&str], code: i32, words: &[&str]| {
-        let system = folder.file("pendulum.toml", &format!("{PENDULUM}[measured]\n{entry}\n"));
+        let system = folder.file("pendulum.toml", format!("{PENDULUM}[measured]\n{entry}\n"));
         let run: Run = lnn(&[&["identify", &log, "--system", &system], more].concat());
         assert_eq!(run.stderr.trim_end().lines().count(), 1, "{}", run.stderr);
         run.refused(code, words);
