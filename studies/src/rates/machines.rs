@@ -21,6 +21,9 @@ const AWAY: f64 = 0.2;
 /// What a machine does at a time and a state, under inputs.
 type Equations = fn(f64, &[f64], &[f64], &[f64]) -> Vec<f64>;
 
+/// Inputs at a time and a state, of a draw of eight numbers.
+type Inputs = fn(f64, &[f64], &[f64], &[f64; 8]) -> Vec<f64>;
+
 /// A machine with the source of its equations.
 struct Machine {
     name: &'static str,
@@ -34,7 +37,7 @@ struct Machine {
     /// Initial positions and velocities, changed by up to a tenth from recording to recording.
     start: (&'static [f64], &'static [f64]),
     /// Inputs at a time and a state, held between the samples; a draw of eight numbers from 0 to 1 makes each recording another one.
-    inputs: fn(f64, &[f64], &[f64], &[f64; 8]) -> Vec<f64>,
+    inputs: Inputs,
     /// What is measured at a state; empty for the positions.
     reads: fn(&[f64], &[f64]) -> Vec<f64>,
     step: f64,
