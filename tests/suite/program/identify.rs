@@ -179,7 +179,7 @@ fn a_listed_system_serves_and_what_is_wrong_is_named() {
         (&[SYSTEM, "--error", "s1,s2"], 1, "s1"),
         (&[SYSTEM, "--param", "m9=1"], 2, "--param"),
         (&[SYSTEM, "--segment", "0"], 2, "--segment"),
-        (&["particle-on-ellipse", "--coords", "theta1,theta2"], 2, "--system"),
+        (&["particle-on-ellipse", "--coords", "theta1,theta2", "--constants", "g"], 1, "wire"),
         (&[SYSTEM, "--coords", "theta1,theta9"], 1, "theta9"),
         (&[SYSTEM, "--force", "tau1"], 2, "--force"),
     ] {
