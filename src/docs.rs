@@ -43,6 +43,7 @@ macro_rules! page {
             "[commands]: crate::docs::commands\n",
             "[many-machines]: crate::docs::many_machines\n",
             "[rollout]: crate::docs::commands#lnn-rollout\n",
+            "[inverse]: crate::docs::commands#forces-from-accelerations\n",
             "[configuration]: crate::docs::configuration\n",
             "[system-files]: crate::docs::system_files\n",
             "[links]: crate::docs::system_files#a-chain-of-links\n",
