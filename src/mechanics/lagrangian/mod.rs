@@ -67,7 +67,7 @@ pub(crate) use description::PerTrajectory;
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 pub(crate) use description::{inertia_symbols, loss_symbols};
-#[cfg(feature = "cli")]
+#[cfg(feature = "pipeline")]
 pub(crate) use description::{is_free_name, turned};
 #[cfg(feature = "training")]
 pub(crate) use equations::{EquationPart, Equations};
@@ -97,7 +97,7 @@ pub use mechanics::Mechanics;
 pub use pattern::{Element, Pattern};
 #[doc(hidden)]
 pub use recursion::Chain;
-#[cfg(feature = "cli")]
+#[cfg(feature = "pipeline")]
 pub(crate) use recursion::{Matrix, Vector, applied, product, transposed};
 pub use right_hand_side::RightHandSide;
 pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System};

@@ -29,7 +29,9 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use chain::{ChainDescription, LinkDescription};
 #[cfg(feature = "cli")]
-pub(crate) use chain::{ShownLink, turned};
+pub(crate) use chain::ShownLink;
+#[cfg(feature = "pipeline")]
+pub(crate) use chain::turned;
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use events::EventDescription;
 use measured::MeasuredDescription;
@@ -38,7 +40,7 @@ pub(crate) use per_trajectory::PerTrajectory;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
-#[cfg(feature = "cli")]
+#[cfg(feature = "pipeline")]
 pub(crate) use system::is_free_name;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.

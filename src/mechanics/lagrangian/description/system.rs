@@ -586,7 +586,7 @@ impl Description {
 }
 
 /// `true` if a coordinate may have a name that nothing else in the file has.
-#[cfg(feature = "cli")]
+#[cfg(feature = "pipeline")]
 pub(crate) fn is_free_name(name: &str) -> bool {
     is_name(name) && !is_reserved(name)
 }

@@ -24,7 +24,7 @@ use alloc::vec::Vec;
 use core::f64::consts::PI;
 use formulas::{Base, Term, formula};
 use joints::triple;
-#[cfg(feature = "cli")]
+#[cfg(feature = "pipeline")]
 pub(crate) use joints::turned;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
