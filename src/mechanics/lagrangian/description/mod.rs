@@ -27,11 +27,11 @@ use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use chain::{ChainDescription, LinkDescription};
 #[cfg(feature = "cli")]
 pub(crate) use chain::ShownLink;
 #[cfg(feature = "pipeline")]
 pub(crate) use chain::turned;
+use chain::{ChainDescription, LinkDescription};
 pub(crate) use chain::{inertia_symbols, loss_symbols};
 use events::EventDescription;
 use measured::MeasuredDescription;
