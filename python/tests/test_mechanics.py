@@ -480,7 +480,7 @@ def test_robots_are_read_and_written_back(tmp_path):
         robot = lnn.System.from_robot(path)
     assert robot.coordinates == ("turn", "lift", "grip")
     with pytest.warns(UserWarning):
-        light = lnn.System.from_robot(path.read_text(), m2=0.5)
+        light = lnn.System.from_robot(path.read_text(), mx2=0.2)
     states = [[0.1, 0.5, 0.01], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     torque = robot.inverse_dynamics(*states).external
     assert torque[1] != light.inverse_dynamics(*states).external[1] and torque[0] == pytest.approx(0, abs=1e-12)
@@ -498,7 +498,9 @@ def test_robots_are_read_and_written_back(tmp_path):
     noisy = [x + scale * rng.normal(size=x.shape) for x, scale in [(q, 1e-5), (force, 1e-3)]]
     found = lnn.identify(noisy[0], robot, force=noisy[1], dt=0.01)
     written = found.urdf(path)
-    assert written != path.read_text() and len(written.splitlines()) == len(path.read_text().splitlines())
+    numbers = ("<inertia ", "<mass ", "<dynamics", "<origin ")
+    kept, before = ([line for line in text.splitlines() if not any(tag in line for tag in numbers)] for text in (written, path.read_text()))
+    assert written != path.read_text() and kept == before
     with pytest.warns(UserWarning):
         again = lnn.System.from_robot(written)
     left = again.inverse_dynamics(q, v, a).external - force
