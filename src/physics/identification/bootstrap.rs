@@ -138,23 +138,19 @@ fn integrate(motion: &mut Smoothed, n: usize) {
     }
 }
 
-/// The forces that a motion needs, `(samples, n)`. Under constraints the recorded forces are changed by the part that these cannot balance, so that
-/// they carry as much as in the recording: the noise of positions turns what they carry.
+/// The forces that a motion needs, `(samples, n)`: under constraints their part that these cannot balance.
 fn asked(problem: &Problem<'_>, (states, x): (&States, &[f64]), (track, motion): (usize, &Smoothed)) -> Vec<f64> {
     let (n, values) = (problem.course.equations.n, problem.parameters(x));
     let mut follower = Follower::new(&problem.course);
     let mut force = vec![0.0; motion.q.len()];
     let mut scratch = vec![0.0; LANES * n];
-    let recorded = &problem.course.recording.tracks[track].force;
-    let is_known = problem.course.equations.rows.is_some() && recorded.len() == force.len();
-    let known = if is_known { &recorded[..] } else { &[] };
     for first in (0..force.len()).step_by(LANES * n) {
         let range = first..(first + LANES * n).min(force.len());
         follower.at(motion.times[first / n..range.end / n].iter().map(|t| (track, *t)));
         follower.accelerate(
             &values,
             (&motion.q[range.clone()], &motion.v[range.clone()]),
-            known.get(range.clone()).unwrap_or(&[]),
+            &[],
             &mut scratch[..range.len()],
         );
         let found = &mut force[range.clone()];
@@ -163,7 +159,6 @@ fn asked(problem: &Problem<'_>, (states, x): (&States, &[f64]), (track, motion):
     }
     // Without known forces, the force that the motion needs is missing, with opposite sign.
     force.iter_mut().for_each(|f| *f = -*f);
-    force.iter_mut().zip(known).for_each(|(f, known)| *f += known);
     force
 }
 
