@@ -131,7 +131,7 @@ pub use output::{Directory, InMemory, Output};
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
 #[doc(hidden)]
 pub use prepared_fit::PreparedFit;
-pub use robot::{is_robot, parse_robot, rewrite_robot};
+pub use robot::{parse_robot, rewrite_robot};
 pub(crate) use start::StartModel;
 pub use sweep::{Sweep, Swept, sweep};
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
@@ -140,4 +140,5 @@ pub use watch::{Event, Watch};
 pub(crate) use fit::usual_force;
 pub(crate) use model::all_parameters;
 pub(crate) use prepared_fit::shorten;
+pub(crate) use robot::is_robot;
 pub(crate) use tables::from_table;

@@ -17,6 +17,8 @@ use crate::linalg::{Workspace, dot, eigh};
 
 /// Newton decrement over the variance of the noise at which the search has converged: constants within a thousandth of their standard errors.
 const ARRIVED: f64 = 1e-6;
+/// The same up to which every constant is within a standard error of the minimum: farther away, errors and what is determined are not known.
+pub(super) const NEAR: f64 = 1.0;
 /// The same if no step, however short, gains anything: the effect of rounding and of the integrator's steps.
 const STUCK: f64 = 1e-3;
 /// The same for noisy forces: the derivatives neglect how the filter depends on the unknowns, which shifts the minimum by a tenth of a standard

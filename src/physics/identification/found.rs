@@ -1,5 +1,6 @@
 //! What was identified.
 
+use super::descent::NEAR;
 use super::follow::Segment;
 use super::{Between, Verdict};
 use crate::recording::{LoadedRecording, Recording};
@@ -12,7 +13,8 @@ pub struct Constant {
     pub symbol: String,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the motion does not determine it, and its value is then the starting value.
+    /// Its standard error; none where the motion does not determine it, and its value is then the starting value, and none where the search
+    /// stopped farther from the best constants than their errors.
     pub standard_error: Option<f64>,
     /// Its unit.
     pub unit: String,
@@ -244,9 +246,17 @@ pub struct Identified {
 }
 
 impl Identified {
-    /// The same with the names of trajectories; rows are samples, counted from 1.
+    /// The same with the names of trajectories; rows are samples, counted from 1. Where the search stopped far from the best constants, it says
+    /// nothing of errors and of what is determined.
     pub(super) fn named(mut self, recording: &Recording, robust: bool) -> Self {
         self.robust = robust;
+        if !self.converged && (self.decrement.is_nan() || self.decrement >= NEAR) {
+            self.constants.iter_mut().for_each(|constant| constant.standard_error = None);
+            self.sensors.iter_mut().for_each(|sensor| sensor.standard_error = None);
+            self.correlations.matrix.iter_mut().flatten().for_each(|correlation| *correlation = 0.0);
+            self.undetermined.clear();
+            self.combinations.clear();
+        }
         for outlier in &mut self.outliers {
             outlier.trajectory.clone_from(&recording.tracks[outlier.track].name);
             outlier.row = outlier.sample as u64 + 1;
@@ -261,5 +271,24 @@ impl Identified {
             outlier.row = loaded.rows[outlier.track].row(outlier.sample);
         }
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_search_that_stopped_far_away_has_no_errors() {
+        let stopped = |converged: bool, decrement: f64| {
+            let (symbol, unit) = ("k".to_string(), "1".to_string());
+            let constant =
+                Constant { symbol, value: 2.0, standard_error: Some(0.1), unit, start: 1.0, at_bound: false };
+            let found = Identified { constants: vec![constant], converged, decrement, ..Identified::default() };
+            let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: Vec::new() };
+            found.named(&recording, false).constants[0].standard_error
+        };
+        assert_eq!([stopped(true, 1e-9), stopped(false, 0.01)], [Some(0.1); 2]);
+        assert_eq!([stopped(false, 46.0), stopped(false, f64::NAN)], [None; 2]);
     }
 }

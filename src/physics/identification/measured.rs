@@ -108,7 +108,7 @@ pub(super) fn check_columns(instance: &SystemInstance<f64>, recording: &Recordin
 }
 
 /// Readings of the states of lanes, and buffers for them.
-pub(super) struct Sight<'a> {
+pub(super) struct ReadingSlopes<'a> {
     measured: &'a Measured,
     replay: Replay<f64>,
     a: Vec<f64>,
@@ -121,7 +121,7 @@ pub(super) struct Sight<'a> {
     pub slopes: Vec<f64>,
 }
 
-impl<'a> Sight<'a> {
+impl<'a> ReadingSlopes<'a> {
     pub fn new(measured: &'a Measured) -> Self {
         let replay = Replay::new(Arc::clone(&measured.program));
         let [a, known, seen, by_state, slopes] = [(); 5].map(|()| Vec::new());
@@ -129,7 +129,7 @@ impl<'a> Sight<'a> {
     }
 
     /// Evaluates the readings of all lanes at a sample of their segments, with derivatives if the states have some.
-    pub fn look(
+    pub fn evaluate(
         &mut self,
         (follower, course): (&mut Follower<'_>, &Course<'_>),
         values: &[f64],
@@ -208,12 +208,12 @@ impl Problem<'_> {
         let Some(measured) = self.measured else { return self.ends(x, segments) };
         let (m, values) = (measured.count(), self.parameters(x));
         let mut found = vec![vec![f64::NAN; m]; segments.len()];
-        let mut sight = Sight::new(measured);
+        let mut reader = ReadingSlopes::new(measured);
         Follower::new(&self.course).follow(&values, segments, false, |follower, sample, state| {
             let is_last = |segment: &Segment| sample + 1 == segment.samples;
             if segments.iter().any(|segment| is_last(segment)) {
-                sight.look((follower, &self.course), &values, (segments, sample), state);
-                let lanes = segments.iter().zip(&mut found).zip(sight.seen.chunks_exact(m));
+                reader.evaluate((follower, &self.course), &values, (segments, sample), state);
+                let lanes = segments.iter().zip(&mut found).zip(reader.seen.chunks_exact(m));
                 lanes
                     .filter(|((segment, _), _)| is_last(segment))
                     .for_each(|((_, into), seen)| into.copy_from_slice(seen));
@@ -263,11 +263,11 @@ mod tests {
             substeps: 8,
         };
         let segment = Segment { track: 0, first: 0, samples: 9, start: start.to_vec() };
-        let mut sight = Sight::new(&measured);
+        let mut reader = ReadingSlopes::new(&measured);
         Follower::new(&course).follow(&instance.parameters, &[&segment], true, |follower, sample, state| {
-            sight.look((follower, &course), &instance.parameters, (&[&segment], sample), state);
+            reader.evaluate((follower, &course), &instance.parameters, (&[&segment], sample), state);
         });
-        (sight.seen, sight.slopes)
+        (reader.seen, reader.slopes)
     }
 
     #[test]

@@ -25,7 +25,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod begun;
 mod bodies;
 mod bootstrap;
 mod by_forces;
@@ -38,8 +37,10 @@ mod cure;
 mod descent;
 mod determined;
 mod error;
+mod first_fit;
 mod follow;
 mod found;
+mod initial_states;
 mod innovations;
 mod invariants;
 pub(crate) mod linear;
@@ -57,7 +58,6 @@ mod stages;
 #[cfg(test)]
 mod tests;
 mod unknowns;
-mod unseen;
 mod verdict;
 mod ways;
 

@@ -6,7 +6,7 @@ use super::descent::{FAILED, RIDGE};
 use super::follow::{Course, Follower, LANES, Segment, State};
 use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
-use super::measured::{Measured, Sight};
+use super::measured::{Measured, ReadingSlopes};
 use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
@@ -214,14 +214,14 @@ impl Problem<'_> {
                 delayed.push((*delay, State::default()));
             }
         }
-        let mut sight = self.measured.map(Sight::new);
+        let mut reader = self.measured.map(ReadingSlopes::new);
         let is_angle = |i: usize| self.measured.is_some_and(|measured| measured.angles[i]);
         let read = |follower: &mut Follower<'_>, sample: usize, state: &State| {
             for (delay, late) in &mut delayed {
                 follower.shifted(&values, (segments, sample), (state, -*delay), late);
             }
-            if let Some(sight) = &mut sight {
-                sight.look((follower, &self.course), &values, (segments, sample), state);
+            if let Some(reader) = &mut reader {
+                reader.evaluate((follower, &self.course), &values, (segments, sample), state);
             }
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
                 let place = segment.first + sample;
@@ -231,8 +231,8 @@ impl Problem<'_> {
                     let at = lane * width + i;
                     let [offset, gain, delay] = sensors[i];
                     let late = delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
-                    let (seen, slopes) = match &sight {
-                        Some(sight) => (sight.seen[at], &sight.slopes),
+                    let (seen, slopes) = match &reader {
+                        Some(reader) => (reader.seen[at], &reader.slopes),
                         None => (late.q[at], &late.q_slopes),
                     };
                     let sigma = self.sigma_at(segment.track, place, i);

@@ -1,10 +1,12 @@
 //! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
 
-use super::begun::begun;
 use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
+use super::descent::NEAR;
+use super::first_fit::first_fit;
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
+use super::initial_states::SEARCHED;
 use super::innovations::Disturbances;
 use super::measured::{Measured, check_columns};
 use super::per_trajectory::per_trajectory;
@@ -15,7 +17,6 @@ use super::quality::{
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::unknowns::unknowns;
-use super::unseen::SEARCHED;
 use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::system::Range;
@@ -41,8 +42,6 @@ const MOST_SUBSTEPS: usize = 64;
 const WORSE: f64 = 1.5;
 /// Smallest decrease of the mean log standard error that longer segments must bring.
 const GAIN: f64 = 0.01;
-/// Newton decrement over the variance of the noise up to which longer segments count as fitted: constants within a standard error.
-const FOLLOWED: f64 = 1.0;
 /// Smallest number of segments whose scatter is used to widen errors.
 const MANY: usize = 8;
 /// Residual over the spread of a coordinate up to which it is due to the integration, a few times [`LEAST_NOISE`].
@@ -199,7 +198,7 @@ pub fn identify(
         found.obstacles = [pieces.still, repeated].concat();
         return Ok(found.named(recording, options.robust));
     }
-    let (mut fitted, cut) = begun(&mut problem, (&on_pieces, &pieces), (instance, &given), options)?;
+    let (mut fitted, cut) = first_fit(&mut problem, (&on_pieces, &pieces), (instance, &given), options)?;
     if options.segment.is_none() {
         fitted = shortened(&problem, fitted);
     }
@@ -576,7 +575,7 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");
         // Along chaotic motion the search gets stuck on the roughness of the sum of squares.
-        let is_followed = longer.normal.decrement < FOLLOWED || !fitted.normal.converged;
+        let is_followed = longer.normal.decrement < NEAR || !fitted.normal.converged;
         let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square() && is_followed;
         if wanted.is_none() && !(met && longer.spread() < fitted.spread() - GAIN) {
             problem.course.substeps = fitted.substeps;

@@ -11,6 +11,9 @@ use std::ops::Range;
 /// Largest difference, over the size of a link's constants, between what is written and what is read again.
 const ROUNDING: f64 = 1e-9;
 
+/// The same up to which a number counts as the one that is written already.
+const REPRINTED: f64 = 1e-14;
+
 /// Parts of a text with what takes their places.
 struct Edits(Vec<(Range<usize>, String)>);
 
@@ -111,7 +114,7 @@ impl Edits {
         for (key, new) in attributes {
             match node.attribute_node(*key) {
                 // Numbers that stay are left as they are written.
-                Some(attribute) if numbers(attribute.value()) == numbers(new) => {}
+                Some(attribute) if is_same(attribute.value(), new) => {}
                 Some(attribute) => self.0.push((attribute.range_value(), new.clone())),
                 None => {
                     let at = node.range().start + 1 + node.tag_name().name().len();
@@ -191,9 +194,12 @@ impl Edits {
     }
 }
 
-/// The numbers of an attribute; `None` for those that are none.
-fn numbers(text: &str) -> Vec<Option<f64>> {
-    text.split_whitespace().map(|word| word.parse().ok()).collect()
+/// `true` if two attributes have the same numbers up to rounding, over the largest of them.
+fn is_same(before: &str, after: &str) -> bool {
+    let numbers = |text: &str| text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
+    let (Some(before), Some(after)) = (numbers(before), numbers(after)) else { return false };
+    let size = before.iter().fold(0f64, |most, x| most.max(x.abs()));
+    before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() <= REPRINTED * size)
 }
 
 /// An element without content.

@@ -1,23 +1,23 @@
 //! The fit of the first segments: from smoothed accelerations, or by a search of initial states if coordinates were not measured themselves.
 
+use super::initial_states::Search;
 use super::pieces::Pieces;
 use super::smoothed::{Met, States};
 use super::solve::Problem;
 use super::stages::{Fitted, first, first_samples};
-use super::unseen::Search;
 use super::{IdentifyError, IdentifyOptions};
 use crate::lagrangian::SystemInstance;
 
 /// A fit of the first segments, and constants by their places that were searched in a part of their range.
-type Begun = (Fitted, Vec<(usize, [f64; 2])>);
+type FirstFit = (Fitted, Vec<(usize, [f64; 2])>);
 
 /// The fit of the first segments from given constants; `on_pieces` is the problem of the pieces alone.
-pub(super) fn begun<'b>(
+pub(super) fn first_fit<'b>(
     problem: &mut Problem<'b>,
     (on_pieces, pieces): (&Problem<'_>, &Pieces<'b>),
     (instance, given): (&SystemInstance<f64>, &[f64]),
     options: &IdentifyOptions,
-) -> Result<Begun, IdentifyError> {
+) -> Result<FirstFit, IdentifyError> {
     let states = match problem.measured {
         None => Some(States::new(on_pieces, &pieces.smoothed)),
         Some(measured) => measured.coordinates(&pieces.smoothed).map(|own| States::new(on_pieces, &own)),
@@ -40,7 +40,7 @@ fn from_smoothed(
     (on_pieces, states, pieces): (&Problem<'_>, &States, &Pieces<'_>),
     given: &[f64],
     options: &IdentifyOptions,
-) -> Result<Begun, IdentifyError> {
+) -> Result<FirstFit, IdentifyError> {
     let (n, mut x) = (problem.n(), given.to_vec());
     let cut = match problem.course.equations.known {
         _ if states.len(n) == 0 => Some(Vec::new()),
