@@ -16,6 +16,8 @@ __all__ = [
     "inverse_dynamics",
     "learn",
     "read_constraints",
+    "read_robot",
+    "rewritten_robot",
     "shadow",
     "surfaces",
     "sweep",

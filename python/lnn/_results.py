@@ -723,7 +723,7 @@ class Identified(_Shown):
         from . import _lnn
         from .reader import files
 
-        values = [(symbol, constant.value) for symbol, constant in self.constants.items()]
+        values = list(self.system().parameters.items())
         return _lnn.rewritten_robot(files.text(text, ".urdf"), values)
 
     def to_pandas(self) -> pd.DataFrame:

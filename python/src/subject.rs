@@ -69,8 +69,9 @@ pub fn systems() -> PyResult<String> {
 #[pyfunction]
 pub fn read_robot(text: &str) -> PyResult<(String, Vec<String>)> {
     let (system, notes) = parse_robot(text).map_err(at_line)?;
-    let description = system.description().ok_or_else(|| runtime("no description"))?;
-    Ok((serde_json::to_string(description).map_err(runtime)?, notes))
+    // As it was given: with its links.
+    let description = system.with_defaults(&[]).ok_or_else(|| runtime("no description"))?;
+    Ok((serde_json::to_string(&description).map_err(runtime)?, notes))
 }
 
 /// A URDF with values of constants by symbol.

@@ -497,6 +497,7 @@ def test_robots_are_read_and_written_back(tmp_path):
     force = light.inverse_dynamics(q, v, a).external
     noisy = [x + scale * rng.normal(size=x.shape) for x, scale in [(q, 1e-5), (force, 1e-3)]]
     found = lnn.identify(noisy[0], robot, force=noisy[1], dt=0.01)
+    assert found.bodies.exist and found.explained
     written = found.urdf(path)
     numbers = ("<inertia ", "<mass ", "<dynamics", "<origin ")
     kept, before = ([line for line in text.splitlines() if not any(tag in line for tag in numbers)] for text in (written, path.read_text()))

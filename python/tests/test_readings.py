@@ -258,7 +258,7 @@ def test_mistakes_of_an_identification_are_values(swung):
     ]:
         with pytest.raises(ValueError):
             lnn.identify(swung, form, **{"constants": ["l"], "dt": 0.02, **wrong})
-    with pytest.raises(ValueError, match="constraints"):
+    with pytest.raises(ValueError, match="recorded state"):
         lnn.identify(np.zeros((100, 2)), "cartesian-chain-1", dt=0.02)
     with pytest.raises(ValueError):
         lnn.identify(swung, "double-pendulum", dt=0.02)
