@@ -11,8 +11,8 @@ from . import _lnn
 from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
 from ._recorded import errors_beside, inputs_beside, measured_columns, recorded
 from ._mechanics import System
-from ._results import Bodies, Checked, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
-from ._results import Undetermined
+from ._results import Alone, Bodies, Checked, Combination, Constraint, Constraints, Each, Formula, Identified, IdentifiedConstant, Outlier, Residual
+from ._results import Scatter, SensorConstant, Undetermined
 
 if TYPE_CHECKING:
     from ._arrays import Beside, Meaning, Recorded, Units
@@ -181,6 +181,7 @@ def identify(
     between: str | None = None,
     segment: float | None = None,
     robust: bool = False,
+    each: bool = False,
     threads: int | None = None,
 ) -> Identified:
     """Finds the constants of a system whose form is known, from recorded motion, without a network.
@@ -214,6 +215,8 @@ def identify(
         Length of the segments that are followed in s; what makes the constants best known by default.
     robust : bool
         Whether residuals beyond three standard deviations count linearly, so that outliers move little.
+    each : bool
+        Whether every trajectory is identified alone, too, and the constants are compared; 64 trajectories at most.
     threads : int, optional
         Threads; the result does not depend on them.
 
@@ -244,7 +247,7 @@ def identify(
     choices: dict[str, object] = {key: names(key, given) for key, given in named.items()}
     choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
     choices["segment"] = None if segment is None else real("segment", segment, positive=True)
-    choices |= {"targets": targets, "between": between, "robust": bool(robust), "threads": thread_count(threads), "errors": errors, "inputs": measured}
+    choices |= {"targets": targets, "between": between, "robust": bool(robust), "each": bool(each), "threads": thread_count(threads), "errors": errors, "inputs": measured}
     found = read_result(_lnn.identify(motion, system._subject, as_json(choices)))
     found["constants"] = {symbol: IdentifiedConstant(**constant) for symbol, constant in found["constants"].items()}
     found["obstacles"] = tuple(found["obstacles"])
@@ -255,6 +258,9 @@ def identify(
     found["combinations"] = tuple(Combination(**known) for known in found["combinations"])
     found["bodies"] = Bodies(**{**found["bodies"], "moved": tuple(found["bodies"]["moved"])}) if found["bodies"] else None
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
+    if found["each"]:
+        alone = [{**one, "constants": {c["symbol"]: IdentifiedConstant(**c) for c in one["constants"]}} for one in found["each"]["trajectories"]]
+        found["each"] = Each(tuple(Alone(**one) for one in alone), tuple(Scatter(**one) for one in found["each"]["scatter"]))
     found["force_noise"] = tuple(found["force_noise"])
     found["outliers"] = tuple(Outlier(**outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)

@@ -595,6 +595,67 @@ class Bodies:
 
 
 @dataclass(frozen=True)
+class Alone:
+    """What one trajectory alone says of the constants.
+
+    Attributes
+    ----------
+    trajectory : str
+    constants : dict of str to IdentifiedConstant
+        Empty if they cannot be identified from it.
+    says : str
+        The verdict, or why there are no constants.
+    explained : bool
+    """
+
+    trajectory: str
+    constants: dict[str, IdentifiedConstant]
+    says: str
+    explained: bool
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """The scatter of a constant over the trajectories that determine it.
+
+    Attributes
+    ----------
+    symbol : str
+    mean : float
+        Each value weighted by its variance.
+    count : int
+        Number of the values.
+    ratio : float
+        Standard deviation from the mean in standard errors; 1 if the errors are right.
+    probability : float
+        That values of one and the same constant scatter as much.
+    differs : bool
+        Whether that is less than 1 % over the number of constants.
+    """
+
+    symbol: str
+    mean: float
+    count: int
+    ratio: float
+    probability: float
+    differs: bool
+
+
+@dataclass(frozen=True)
+class Each:
+    """The constants by every trajectory alone, and their scatter.
+
+    Attributes
+    ----------
+    trajectories : tuple of Alone
+    scatter : tuple of Scatter
+    """
+
+    trajectories: tuple[Alone, ...]
+    scatter: tuple[Scatter, ...]
+
+
+@dataclass(frozen=True)
 class Residual:
     """What the identified system leaves of the motion of one coordinate, or of the averaged equations of its force.
 
@@ -685,6 +746,8 @@ class Identified(_Shown):
         How known forces were taken between the samples.
     robust : bool
         Whether residuals beyond three standard deviations counted linearly.
+    each : Each or None
+        The constants by every trajectory alone, if that was asked for.
     """
 
     constants: dict[str, IdentifiedConstant]
@@ -710,6 +773,7 @@ class Identified(_Shown):
     substeps: int
     between: str | None
     robust: bool
+    each: Each | None
     _form: System = field(repr=False)
     _text: str = field(repr=False)
     _html: str = field(repr=False)

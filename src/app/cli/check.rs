@@ -21,7 +21,7 @@ pub struct Args {
 /// # Errors
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let (reading, Guess { columns, table }) = args.recording.load()?;
+    let (reading, Guess { columns, table }) = args.recording.load(true)?;
     let look = first_look(&reading, table)?;
     if args.json {
         return output::print(&output::json(&look)?);

@@ -57,6 +57,9 @@ pub struct Args {
     /// Let residuals beyond three standard deviations count linearly, which limits the influence of outliers.
     #[arg(long)]
     robust: bool,
+    /// Identify every trajectory alone, too, and compare the constants.
+    #[arg(long)]
+    each: bool,
     /// Threads; the result does not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
@@ -131,6 +134,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         between: args.between,
         segment: args.segment,
         robust: args.robust,
+        each: args.each,
         threads: threads(args.threads),
         cancellation: search()?,
     };

@@ -86,21 +86,26 @@ impl RecordingArgs {
     /// # Errors
     /// As of [`read`].
     pub fn read(&self) -> Result<(LoadedRecording, Columns), CliError> {
-        let (reading, Guess { columns, table }) = self.load()?;
+        let (reading, Guess { columns, table }) = self.load(false)?;
         note(&columns, &table);
         Ok((reading, columns))
     }
 
-    /// Reads the files, and says what the columns were taken as.
+    /// Reads the files, and says what the columns were taken as; `beside` with the numbers in other columns.
     ///
     /// # Errors
     /// As of [`read`].
-    pub fn load(&self) -> Result<(LoadedRecording, Guess), CliError> {
+    pub fn load(&self, beside: bool) -> Result<(LoadedRecording, Guess), CliError> {
         let mut guessed = Guess { columns: self.meaning(), table: Vec::new() };
         let read = read_spooled(&self.data, |files| {
             if self.coords.is_empty() {
                 guessed = guess(files, &guessed.columns)?;
             }
+            // Another file may lack what nobody asked for.
+            if beside && let Ok(reading) = read_recording(files, &guessed.columns) {
+                return Ok(reading);
+            }
+            guessed.columns.input.clear();
             read_recording(files, &guessed.columns)
         });
         match read {

@@ -1,6 +1,7 @@
 //! What was identified.
 
 use super::descent::NEAR;
+use super::each::Each;
 use super::follow::Segment;
 use super::{Between, Verdict};
 use crate::recording::{LoadedRecording, Recording};
@@ -240,6 +241,8 @@ pub struct Identified {
     pub substeps: usize,
     /// Interpolation of known forces between the samples; none without forces.
     pub between: Option<Between>,
+    /// The constants by every trajectory alone, if that was asked for.
+    pub each: Option<Each>,
     /// What was fitted, stretch by stretch, for pictures.
     #[serde(skip)]
     pub paths: Vec<ResidualPath>,

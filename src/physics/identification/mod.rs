@@ -25,6 +25,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod averages;
 mod bodies;
 mod bootstrap;
 mod by_forces;
@@ -36,6 +37,7 @@ mod covariance;
 mod cure;
 mod descent;
 mod determined;
+mod each;
 mod error;
 mod first_fit;
 mod follow;
@@ -61,6 +63,7 @@ mod unknowns;
 mod verdict;
 mod ways;
 
+pub use each::{Alone, Each, Scatter};
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
 pub use found::{
@@ -112,6 +115,9 @@ pub struct IdentifyOptions {
     pub segment: Option<f64>,
     /// Residuals beyond three standard deviations count linearly, which limits the influence of outliers.
     pub robust: bool,
+    /// Every trajectory is identified alone, too, and the constants are compared; 64 trajectories at most.
+    #[serde(default)]
+    pub each: bool,
     /// Threads; 0 for one. The result does not depend on their number.
     pub threads: usize,
     /// Cancels the search, and receives reports of its progress.

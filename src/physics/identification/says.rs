@@ -33,6 +33,9 @@ impl Identified {
         }
         findings.line(self.extent());
         self.say_outliers(&mut findings);
+        if let Some(each) = &self.each {
+            each.say(&mut findings);
+        }
         findings
     }
 
@@ -98,7 +101,7 @@ impl Identified {
 }
 
 /// A value with the digits that its standard error justifies, and the error.
-fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
+pub(super) fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
     let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
         return [rounded(value, 4), "-".to_string()];
     };

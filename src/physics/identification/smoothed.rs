@@ -1,10 +1,13 @@
 //! Least-squares fits to smoothed motion: to its accelerations, where the fit to the motion begins, or to known forces.
 
+use super::averages::Averages;
 use super::closed::FreePart;
 use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
 use super::solve::{Normal, Problem};
+use crate::linalg::gemm;
 use crate::recording::smooth::Smoothed;
+use crate::scalar::{MatMut, MatRef};
 use std::ops::Range;
 
 /// Largest number of states.
@@ -120,39 +123,38 @@ impl States {
         }
     }
 
-    /// Residuals with their slopes by the constants, in batches of states: `visit(first number, residuals, slopes)`.
+    /// Residuals with their slopes by the constants, `(numbers, m)`, in batches of states: `visit(first number, residuals, slopes)`.
     fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
         let (n, values) = (problem.course.equations.n, problem.parameters(x));
         let width = 2 * n + problem.course.chosen;
-        let (mut residual, mut rows) = (Vec::new(), Vec::new());
+        let (mut residual, mut rows, mut kept) = (Vec::new(), Vec::new(), Kept::default());
+        // A residual and its slopes.
+        let one = width - 2 * n + 1;
+        let mut averages = Averages::new(self, (n, one));
         self.batches(problem, x, |follower, range, a| {
             let (first, measured) = (range.start, &self.a[range.clone()]);
             let (q, v) = (&self.q[range.clone()], &self.v[range]);
-            match met {
-                Met::Accelerations => {
-                    residual.clear();
-                    residual.extend(measured.iter().zip(a).map(|(measured, a)| measured - a));
-                    visit(first, &residual, follower.slopes(&values, (q, v, a)));
+            rows.clear();
+            residual.resize(a.len(), 0.0);
+            if met == Met::Accelerations {
+                residual.iter_mut().zip(measured.iter().zip(a)).for_each(|(r, (measured, a))| *r = measured - *a);
+                for slopes in follower.slopes(&values, (q, v, a)).chunks_exact(width) {
+                    rows.extend_from_slice(&slopes[2 * n..]);
                 }
-                Met::Forces => {
-                    residual.resize(a.len(), 0.0);
-                    follower.lacking_forces(measured, &mut residual);
-                    let (slopes, added) = (follower.force_slopes(&values, (q, v, measured)), rows.len());
-                    residual.iter().zip(slopes.chunks_exact(width)).for_each(|(r, slopes)| {
-                        rows.push(*r);
-                        rows.extend_from_slice(slopes);
-                    });
-                    self.free_part(follower, |free| free.take_all(&mut rows[added..], width + 1));
-                }
+                return visit(first, &residual, &rows);
+            }
+            follower.lacking_forces(measured, &mut residual);
+            let slopes = follower.force_slopes(&values, (q, v, measured)).chunks_exact(width);
+            for (r, slopes) in residual.iter().zip(slopes) {
+                rows.push(*r);
+                rows.extend_from_slice(&slopes[2 * n..]);
+            }
+            self.free_part(follower, |free| free.take_all(&mut rows, one));
+            for row in rows.chunks_exact(n * one) {
+                averages.take(row, |mean| kept.take(mean, one, LANES * n, &mut visit));
             }
         });
-        self.average(n, &mut rows);
-        for (part, rows) in rows.chunks(LANES * n * (width + 1)).enumerate() {
-            let [residual, slopes] = [0..1, 1..width + 1].map(|range| {
-                rows.chunks_exact(width + 1).flat_map(|row| &row[range.clone()]).copied().collect::<Vec<_>>()
-            });
-            visit(part * LANES * n, &residual, &slopes);
-        }
+        kept.finish(&mut visit);
     }
 
     /// Calls `act` with what tells the part of forces on the states evaluated last that constraints cannot balance; not without constraints.
@@ -163,52 +165,15 @@ impl States {
         }
     }
 
-    /// Means over neighbouring states of every trajectory; each force equation has several numbers, `(states, n, numbers)`.
-    ///
-    /// Averages of equations, forces included, hold as well as the equations themselves: the noise of accelerations is averaged out of the
-    /// regressors before these are squared, so that least squares are hardly biased by it, and the polynomials may have a degree that misses
-    /// nothing. Robots are identified this way ("parallel filtering", Gautier, IEEE ICRA 1997).
-    fn average(&self, n: usize, values: &mut [f64]) {
-        let (states, half) = (self.places.len(), self.averaged);
-        if half == 0 || values.is_empty() {
-            return;
-        }
-        let (size, width) = (values.len() / states, values.len() / (states * n));
-        let mut weights = if self.share.is_empty() { vec![1.0; states * n] } else { self.share.clone() };
-        let mut failed = Vec::new();
-        for (at, (row, weight)) in values.chunks_exact_mut(width).zip(&mut weights).enumerate() {
-            if row.iter().all(|x| x.is_finite()) {
-                row.iter_mut().for_each(|x| *x *= *weight);
-            } else {
-                failed.push(at);
-                (*weight, _) = (0.0, row.fill(0.0));
-            }
-        }
-        let mut first = 0;
-        let next = |a: &(usize, usize), b: &(usize, usize)| a.0 == b.0 && b.1 <= a.1 + self.stride;
-        for run in self.places.chunk_by(next) {
-            let end = first + run.len();
-            for _ in 0..2 {
-                sums(&mut values[first * size..end * size], size, half);
-                sums(&mut weights[first * n..end * n], n, half);
-            }
-            first = end;
-        }
-        for (row, weight) in values.chunks_exact_mut(width).zip(&weights) {
-            row.iter_mut().for_each(|x| *x = if *weight > 0.0 { *x / weight } else { 0.0 });
-        }
-        failed.into_iter().for_each(|at| values[at * width..(at + 1) * width].fill(f64::NAN));
-    }
-
     /// Normal equations, with the right-hand sides of batches of states; `None` where no residual is finite.
     pub fn normal(&self, problem: &Problem<'_>, x: &[f64], met: Met) -> Option<Normal> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
-        let (mut normal, mut held) = (Normal::empty(m), Vec::with_capacity(m));
+        let (mut normal, mut products) = (Normal::empty(m), Products::new(n, m));
         self.residuals(problem, x, met, |first, residuals, slopes| {
             let mut part = vec![0.0; m];
-            for (k, (residual, row)) in residuals.iter().zip(slopes.chunks_exact(2 * n + m)).enumerate() {
-                let weight = self.weight[first + k];
-                let (residual, row) = (residual * weight, &row[2 * n..]);
+            for (k, residual) in residuals.iter().enumerate() {
+                let (weight, row) = (self.weight[first + k], &slopes[k * m..(k + 1) * m]);
+                let residual = residual * weight;
                 if !(residual.is_finite() && row.iter().all(|x| x.is_finite())) {
                     normal.square += 1e6;
                     continue;
@@ -217,23 +182,13 @@ impl States {
                 let size = residual.abs();
                 let cut = if size > HUBER { HUBER / size } else { 1.0 };
                 normal.square += if size > HUBER { HUBER * (2.0 * size - HUBER) } else { residual * residual };
-                let scale = cut * weight * weight;
-                // A torque depends on the links that its joint carries, few of many in a tree.
-                held.clear();
-                held.extend((0..m).filter(|&i| row[i] != 0.0));
-                for &i in &held {
-                    let x = row[i];
-                    part[i] += cut * weight * x * residual;
-                    let line = &mut normal.matrix[i * m..(i + 1) * m];
-                    match 2 * held.len() > m {
-                        true => line.iter_mut().zip(row).for_each(|(sum, y)| *sum += scale * x * y),
-                        false => held.iter().for_each(|&j| line[j] += scale * x * row[j]),
-                    }
-                }
+                part.iter_mut().zip(row).for_each(|(sum, x)| *sum += cut * weight * x * residual);
+                products.add((first + k) % n, row, cut.sqrt() * weight, &mut normal.matrix);
             }
             normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
             normal.parts.push(part);
         });
+        products.finish(&mut normal.matrix);
         normal.diagonal = (0..m).map(|k| normal.matrix[k * m + k]).collect();
         (normal.count > 0.0).then_some(normal)
     }
@@ -246,9 +201,10 @@ impl States {
             follower.lacking_forces(&self.a[range], found);
             self.free_part(follower, |free| free.take_all(found, 1));
         });
-        let mut averages = all.clone();
-        self.average(problem.course.equations.n, &mut averages);
-        [all, averages]
+        let (n, mut means) = (problem.course.equations.n, Vec::with_capacity(all.len()));
+        let mut averages = Averages::new(self, (n, 1));
+        all.chunks_exact(n).for_each(|row| averages.take(row, |mean| means.extend_from_slice(mean)));
+        [all, means]
     }
 
     /// Fits constants to the smoothed motion; returns the normal equations there, `None` if no residual is finite.
@@ -408,59 +364,82 @@ impl States {
     }
 }
 
-/// Moving sums over `half` rows on either side.
-fn sums(rows: &mut [f64], size: usize, half: usize) {
-    let given = rows.to_vec();
-    let row = |at: usize| given.get(at * size..(at + 1) * size);
-    let count = rows.len() / size;
-    let mut sum = vec![0.0; size];
-    for at in 0..count + half {
-        if let Some(row) = row(at) {
-            sum.iter_mut().zip(row).for_each(|(s, x)| *s += x);
+/// Residuals and slopes of states, until they are a batch.
+#[derive(Default)]
+struct Kept {
+    residuals: Vec<f64>,
+    slopes: Vec<f64>,
+    first: usize,
+}
+
+impl Kept {
+    /// Takes rows of a residual and its slopes, `one` numbers each; hands on `batch` of them.
+    fn take(&mut self, rows: &[f64], one: usize, batch: usize, visit: &mut impl FnMut(usize, &[f64], &[f64])) {
+        for row in rows.chunks_exact(one) {
+            self.residuals.push(row[0]);
+            self.slopes.extend_from_slice(&row[1..]);
         }
-        if let Some(row) = at.checked_sub(2 * half + 1).and_then(row) {
-            sum.iter_mut().zip(row).for_each(|(s, x)| *s -= x);
+        if self.residuals.len() >= batch {
+            self.finish(visit);
         }
-        if let Some(middle) = at.checked_sub(half) {
-            rows[middle * size..(middle + 1) * size].copy_from_slice(&sum);
+    }
+
+    fn finish(&mut self, visit: &mut impl FnMut(usize, &[f64], &[f64])) {
+        if !self.residuals.is_empty() {
+            visit(self.first, &self.residuals, &self.slopes);
+            self.first += self.residuals.len();
+            (self.residuals.clear(), self.slopes.clear());
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate: a torque depends on the links that its joint carries, few of many in a
+/// tree, so that a block has few columns.
+struct Products {
+    m: usize,
+    /// Rows of each coordinate, `(rows, m)`.
+    rows: Vec<Vec<f64>>,
+    packed: Vec<f64>,
+    product: Vec<f64>,
+}
 
-    #[test]
-    fn equations_are_averaged_along_their_trajectory_by_their_weights() {
-        // Two trajectories, the second with a sample missing between its parts; one equation takes no part, one has failed.
-        let places: Vec<(usize, usize)> =
-            (0..9).map(|k| (0, k)).chain((0..4).map(|k| (1, k))).chain((5..9).map(|k| (1, k))).collect();
-        let mut states = States { places, stride: 1, averaged: 1, share: vec![1.0; 17], ..States::default() };
-        states.share[2] = 0.0;
-        let given: Vec<f64> = (0..34).map(|k| f64::from(k * k % 11)).collect();
-        let mut found = given.clone();
-        found[2 * 15] = f64::NAN;
-        states.average(1, &mut found);
-        let runs = [0..9, 9..13, 13..17];
-        for (at, row) in found.chunks_exact(2).enumerate() {
-            let run = runs.iter().find(|run| run.contains(&at)).unwrap();
-            let near = |k: &usize| run.contains(k) && *k != 2 && *k != 15;
-            let weight = |k: usize| [3.0, 2.0, 1.0, 0.0][k.abs_diff(at).min(3)];
-            // At the ends a first average of two counts once more.
-            let twice = |k: usize| {
-                let inner = at.saturating_sub(1).max(run.start)..(at + 2).min(run.end);
-                inner.filter(|middle| middle.abs_diff(k) <= 1).count() as f64
-            };
-            let all = || (0..17).filter(near);
-            let mean = all().map(|k| twice(k) * given[2 * k + 1]).sum::<f64>() / all().map(twice).sum::<f64>();
-            match at {
-                15 => assert!(row[0].is_nan() && row[1].is_nan()),
-                _ => assert!((row[1] - mean).abs() < 1e-12, "{at}: {row:?} {mean}"),
-            }
-            if at == 6 {
-                assert!((4..9).all(|k| twice(k) == weight(k)));
-            }
+impl Products {
+    /// Rows of a block.
+    const BLOCK: usize = 64;
+
+    fn new(n: usize, m: usize) -> Self {
+        Self { m, rows: vec![Vec::new(); n], packed: Vec::new(), product: Vec::new() }
+    }
+
+    /// Adds a row of a coordinate, times a factor.
+    fn add(&mut self, coordinate: usize, row: &[f64], factor: f64, sum: &mut [f64]) {
+        let rows = &mut self.rows[coordinate];
+        rows.extend(row.iter().map(|x| factor * x));
+        if rows.len() >= Self::BLOCK * self.m {
+            self.multiply(coordinate, sum);
         }
+    }
+
+    fn finish(&mut self, sum: &mut [f64]) {
+        (0..self.rows.len()).for_each(|coordinate| self.multiply(coordinate, sum));
+    }
+
+    /// Adds the products of the rows of a coordinate to the sum, `(m, m)`.
+    fn multiply(&mut self, coordinate: usize, sum: &mut [f64]) {
+        let m = self.m;
+        let rows = std::mem::take(&mut self.rows[coordinate]);
+        let count = rows.len() / m.max(1);
+        let held: Vec<usize> = (0..m).filter(|k| rows.iter().skip(*k).step_by(m).any(|x| *x != 0.0)).collect();
+        self.packed.clear();
+        self.packed.extend(rows.chunks_exact(m.max(1)).flat_map(|row| held.iter().map(|&k| row[k])));
+        self.product.resize(held.len() * held.len(), 0.0);
+        let packed = MatRef::new(&self.packed, count, held.len());
+        gemm(MatMut::new(&mut self.product, held.len(), held.len()), false, 1.0, packed.t(), packed);
+        for (&i, products) in held.iter().zip(self.product.chunks_exact(held.len().max(1))) {
+            let line = &mut sum[i * m..(i + 1) * m];
+            held.iter().zip(products).for_each(|(&j, product)| line[j] += product);
+        }
+        self.rows[coordinate] = rows;
+        self.rows[coordinate].clear();
     }
 }

@@ -3,6 +3,7 @@
 use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::descent::NEAR;
+use super::each::each;
 use super::first_fit::first_fit;
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
@@ -120,9 +121,22 @@ pub fn identify(
     recording: &Recording,
     options: &IdentifyOptions,
 ) -> Result<Identified, IdentifyError> {
-    if let Some((instance, options)) = per_trajectory(instance, recording, options)? {
-        return identify(&instance, recording, &options);
+    let mut found = match per_trajectory(instance, recording, options)? {
+        Some((instance, options)) => together(&instance, recording, &options)?,
+        None => together(instance, recording, options)?,
+    };
+    if options.each {
+        found.each = Some(each(instance, recording, options, &found)?);
     }
+    Ok(found)
+}
+
+/// The constants of all trajectories together.
+fn together(
+    instance: &SystemInstance<f64>,
+    recording: &Recording,
+    options: &IdentifyOptions,
+) -> Result<Identified, IdentifyError> {
     check_columns(instance, recording)?;
     let n = recording.n();
     recording.tracks.iter().try_for_each(|track| track.validate_repeated(n))?;

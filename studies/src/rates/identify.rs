@@ -342,6 +342,26 @@ fn arms(seeds: u64, reading: (f64, f64), right: bool) -> Outcome<Tally> {
     Ok(tally)
 }
 
+/// How often a constant is said to differ between five trajectories, the last of which has another value of the first constant.
+fn differ(seeds: u64, (memory, factor): (f64, f64)) -> Outcome<usize> {
+    let mut said = 0;
+    for seed in 0..seeds {
+        let (form, mut rng) = (&FORMS[seed as usize % FORMS.len()], RngStream::Test.generator(4000 + seed));
+        let truth = form.drawn(&mut rng);
+        let mut other = truth.clone();
+        other[0].1 *= factor;
+        let mut recording = form.free(&truth, 1, &mut rng)?;
+        for values in [&truth, &truth, &truth, &other] {
+            recording.tracks.extend(form.free(values, 1, &mut rng)?.tracks);
+        }
+        add(&mut recording, (SIZE, memory), &mut rng);
+        let options = IdentifyOptions { each: true, ..IdentifyOptions::default() };
+        let each = identify(&form.system(true, &[])?, &recording, &options)?.each.ok_or("no scatter")?;
+        said += usize::from(each.scatter.iter().any(|scatter| scatter.differs));
+    }
+    Ok(said)
+}
+
 /// Rates of `seeds` systems a case.
 pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
     const RIGHT: RangeInclusive<f64> = 0.94..=1.0;
@@ -405,5 +425,12 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
     let repeated = arms(seeds, (2e-4, 0.125), true)?;
     rates.push(repeated.explained("by forces, one reading in eight repeated", RIGHT));
     rates.push(repeated.held("by forces, one reading in eight repeated", RANGES));
+    for (case, how, limits) in [
+        ("five trajectories alike", (0.0, 1.0), 0.0..=0.05),
+        ("five trajectories alike, noise of memory 0.9", (0.9, 1.0), 0.0..=0.1),
+        ("the first constant of the fifth 3 % larger", (0.0, 1.03), 0.8..=1.0),
+    ] {
+        rates.push(Rate { verdict: "a constant differs", case, said: differ(seeds, how)?, of: seeds as usize, limits });
+    }
     Ok(rates)
 }

@@ -465,9 +465,23 @@ fn track() -> RecordedTrajectory {
     RecordedTrajectory { name: "run".into(), times: vec![], q: vec![], v: vec![], a: vec![], force: vec![] }
 }
 
+/// Cascaded tanks (Schoukens and Noel, 2017), as one might write them: motion of first order, without a kinetic energy.
+const TANKS: &str = r#"
+name = "tanks"
+lagrangian = "0"
+dissipation = "h1_dot^2/2 + h2_dot^2/2"
+coordinates = [{ name = "h1", bounds = [0, 10] }, { name = "h2", bounds = [0, 10] }]
+parameters = { k1 = 0.05, k2 = 0.05, k3 = 0.05, k4 = 0.2 }
+inputs = { u = "V" }
+forces = { h1 = "-k1*sqrt(h1) + k4*u", h2 = "k2*sqrt(h1) - k3*sqrt(h2)" }
+"#;
+
 /// Rates of `seeds` recordings of every machine.
 pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
-    let mut rates = Vec::new();
+    let tanks: Description = toml::from_str(TANKS)?;
+    let refused = tanks.system().is_err_and(|error| error.to_string().contains("kinetic energy"));
+    let (verdict, case) = ("refused for want of a kinetic energy", "cascaded tanks (Schoukens and Noel, 2017)");
+    let mut rates = vec![Rate { verdict, case, said: refused.into(), of: 1, limits: 1.0..=1.0 }];
     for machine in &MACHINES {
         let right = machine.judged(seeds, true)?;
         rates.extend([right.explained(machine.name, 0.94..=1.0), right.held(machine.name, 0.85..=0.95)]);

@@ -188,7 +188,8 @@ fn a_mistake_is_placed_by_line_key_and_column() {
         PENDULUM,
         formula,
         "m*g*l*cos(theta)",
-        "5: lagrangian: expected theta_dot in it: without it theta has no equation of motion",
+        "5: lagrangian: expected theta_dot in it: without a kinetic energy theta has no acceleration; motion of first order, as of tanks and circuits, has no \
+         Lagrangian here",
     );
     refused(PENDULUM, formula, "", "5: lagrangian: column 1: expected a formula, found nothing");
     placed(PENDULUM, "lagrangian =", "lagrangain =", "5: lagrangain: ", "lagrangian");

@@ -275,3 +275,29 @@ fn a_filmed_pendulum_is_known_to_a_pixel() {
         assert!((0.02..1.2).contains(&noise), "noise of {noise} pixels");
     }
 }
+
+#[test]
+fn motion_of_first_order_is_recognised_by_what_drives_it() {
+    let folder = Folder::new();
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut noise = || 5e-3 * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+    let pump = |t: f64| 2.0 + 0.5 * (0.31 * t).sin() + 0.4 * (0.17 * t).cos() + 0.3 * (0.73 * t).sin();
+    let (mut level, mut text) = ([3.0f64, 2.0], "t,h1,h2,u\n".to_string());
+    for k in 0..1200 {
+        let t = 0.2 * f64::from(k);
+        writeln!(text, "{t:.1},{:.4},{:.4},{:.4}", level[0] + noise(), level[1] + noise(), pump(t)).unwrap();
+        for j in 0..100 {
+            let root = level.map(f64::sqrt);
+            level[0] += 0.0004 * (pump(t + 0.002 * f64::from(j)) - root[0]);
+            level[1] += 0.0004 * (root[0] - root[1]);
+        }
+    }
+    let file = folder.file("tanks.csv", &text);
+    let found = survey(&[&file], &[]);
+    assert_eq!(found["first_order"]["from"], serde_json::json!(["u"]), "{found}");
+    assert_eq!(found["warnings"].as_array().unwrap().len(), 1);
+    // Another file without that column is read all the same.
+    let other = folder
+        .file("other.csv", text.lines().map(|line| line.rsplit_once(',').unwrap().0).collect::<Vec<_>>().join("\n"));
+    assert_eq!(survey(&[&file, &other], &[])["first_order"], Value::Null);
+}

@@ -388,3 +388,59 @@ fn a_payload_differs_between_logs() {
         lnn(&["identify", &data, "--system", &file, "--trajectory", "log"]).refused(2, &[says]);
     }
 }
+
+/// A joint whose gear loses a share of the torque `u` of its motor, beside dry and viscous friction.
+const GEAR: &str = r#"
+name = "gear"
+lagrangian = "J*theta_dot^2/2"
+[[coordinates]]
+name = "theta"
+unit = "rad"
+periodic = true
+velocity_bounds = [-20, 20]
+[parameters]
+J = { default = 0.06, learn = true }
+b = { default = 0.08, learn = true }
+c = { default = 0.1, learn = true }
+mu = { default = 0.05, learn = true }
+[inputs]
+u = "N*m"
+[forces]
+theta = "u - (c + mu*abs(u))*tanh(theta_dot/0.05) - b*theta_dot"
+"#;
+
+#[test]
+fn friction_that_grows_with_the_load_is_identified() {
+    let folder = Folder::new();
+    let (system, out) = (folder.file("gear.toml", GEAR), text(&folder.path("motion.csv")));
+    let drive = |t: f64| 0.9 * (2.5 * t).sin() + 0.5 * (6.9 * t + 1.0).sin() + 0.4 * (1.1 * t + 2.0).sin();
+    let mut torque = "t,u\n".to_string();
+    (0..=500).for_each(|k| writeln!(torque, "{},{}", 0.01 * f64::from(k), drive(0.01 * f64::from(k))).unwrap());
+    let torque = folder.file("torque.csv", torque);
+    let truth = [("J", 0.05), ("b", 0.1), ("c", 0.15), ("mu", 0.12)];
+    let given: String = truth.iter().map(|(name, value)| format!(" --param {name}={value}")).collect();
+    let options = format!("--state 0,0 --t-end 5 --dt 0.01 --rtol 1e-11 --atol 1e-12 --force {torque}{given}");
+    let (_, motion) = motion((&system, &out), &options);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut csv = "t,theta,u\n".to_string();
+    for (t, theta) in motion[0].iter().zip(&motion[1]) {
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        writeln!(csv, "{t},{},{}", theta + 1e-4 * noise, drive(*t)).unwrap();
+    }
+    let data = folder.file("data.csv", csv);
+    let identified = |system: &str| -> serde_json::Value {
+        let run = lnn(&["identify", &data, "--system", system, "--json"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        serde_json::from_str(&run.stdout).unwrap()
+    };
+    let found = identified(&system);
+    assert_eq!(found["explained"], true, "{found}");
+    for (name, truth) in truth {
+        let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.01 * truth, "{name} {value} {error}");
+    }
+    // Without the load the same motion is not explained.
+    let unloaded = GEAR.replace(" + mu*abs(u)", "").replace("mu = { default = 0.05, learn = true }", "");
+    let found = identified(&folder.file("unloaded.toml", unloaded));
+    assert_eq!(found["explained"], false, "{found}");
+}

@@ -26,7 +26,7 @@ pub struct ColumnGuess {
 /// What the columns of a file are taken as.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Guess {
-    /// The meaning of the columns, as it is read.
+    /// The meaning of the columns, as it is read; numbers that are left out are inputs.
     #[serde(skip)]
     pub columns: Columns,
     /// One entry for every column, in the order of the file.

@@ -377,12 +377,16 @@ impl Roles<'_> {
         }
         guessed.retain(|(name, _)| !known(name));
         let given = self.given.clone();
+        let varies =
+            |k: &usize| self.table.numbers[*k].as_ref().is_ok_and(|values| values.iter().any(|x| *x != values[0]));
+        let unused = names(self.of(&Role::Unused).into_iter().filter(varies).collect());
         let some = |given: Vec<String>, found: Vec<String>| if given.is_empty() { found } else { given };
         let columns = Columns {
             coords: names(coordinates.clone()),
             velocity: some(given.velocity, derivative(1)),
             acceleration: some(given.acceleration, derivative(2)),
             force: some(given.force, names(self.of(&Role::Force))),
+            input: some(given.input, unused),
             time: self.time.as_ref().map(|time| self.table.names[time.column].clone()),
             trajectory: names(self.of(&Role::Trajectory)).pop(),
             periodic: some(given.periodic, names(angles.iter().map(|(k, _)| *k).collect())),

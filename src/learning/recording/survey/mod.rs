@@ -1,6 +1,7 @@
 //! Survey of recorded motion, before anything is learned from it.
 
 mod coordinate;
+mod first_order;
 mod motionless;
 mod says;
 mod suspicious;
@@ -14,6 +15,7 @@ use crate::recording::clock::Clock;
 use crate::recording::read::FileFacts;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use crate::recording::{Bridged, Cut, Dropped, HeldOut, LoadedRecording, Recording, Targets};
+pub use first_order::FirstOrder;
 use serde::Serialize;
 use warnings::compare;
 
@@ -105,6 +107,8 @@ pub struct Survey {
     pub motionless: Vec<String>,
     /// Names of coordinates that follow from those before them: nothing can be learned of both.
     pub copies: Vec<String>,
+    /// Whether the motion is of first order, if other columns were read.
+    pub first_order: Option<FirstOrder>,
     /// Facts to know before learning.
     pub warnings: Vec<String>,
 }
@@ -180,6 +184,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         accelerates: (0..n).any(|i| !is_uniform(recording, i, &alone)),
         motionless: Vec::new(),
         copies: Vec::new(),
+        first_order: FirstOrder::of(reading)?,
         warnings: Vec::new(),
     };
     let still = stillness(recording, &alone);

@@ -1,7 +1,7 @@
 //! Warnings that a reader should know before learning from the data.
 
 use super::suspicious::Kind;
-use super::{FEW_SAMPLES, Stillness, Survey};
+use super::{FEW_SAMPLES, FirstOrder, Stillness, Survey};
 use crate::names::{number, percent, pluralize};
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
@@ -13,7 +13,7 @@ const MANY: f64 = 0.01;
 
 /// One sentence each.
 pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
-    let mut all = Vec::new();
+    let mut all: Vec<String> = survey.first_order.iter().map(FirstOrder::text).collect();
     for (i, c) in survey.coordinates.iter().enumerate() {
         let name = &c.name;
         if let Some((_, how)) = still.iter().find(|(still, _)| *still == i) {

@@ -278,7 +278,10 @@ impl Description {
         for (i, coordinate) in self.coordinates.iter().enumerate().filter(|_| self.constraints.is_empty()) {
             if !velocities.contains(&i) {
                 let name = &coordinate.name;
-                let problem = format!("expected {name}_dot in it: without it {name} has no equation of motion");
+                let problem = format!(
+                    "expected {name}_dot in it: without a kinetic energy {name} has no acceleration; motion of first \
+                     order, as of tanks and circuits, has no Lagrangian here"
+                );
                 return Err(DescriptionError::new("lagrangian", problem));
             }
         }

@@ -1,0 +1,152 @@
+//! Means of force equations over neighbouring states, taken as the states come, so that only a window of them is held.
+
+use super::smoothed::States;
+use std::collections::VecDeque;
+
+/// Moving sums over `half` rows on either side.
+struct Sums {
+    half: usize,
+    /// The rows of the window, and their sum.
+    rows: VecDeque<Vec<f64>>,
+    sum: Vec<f64>,
+    steps: usize,
+}
+
+impl Sums {
+    fn new(half: usize, size: usize) -> Self {
+        Self { half, rows: VecDeque::new(), sum: vec![0.0; size], steps: 0 }
+    }
+
+    /// Adds a row, or none behind the last one, and hands on the sum about the row `half` before it.
+    fn step(&mut self, row: Option<&[f64]>, mut then: impl FnMut(&[f64])) {
+        let mut place = Vec::new();
+        if let Some(row) = row {
+            self.sum.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        }
+        if self.steps > 2 * self.half {
+            place = self.rows.pop_front().unwrap_or_default();
+            self.sum.iter_mut().zip(&place).for_each(|(sum, x)| *sum -= x);
+        }
+        if let Some(row) = row {
+            place.clear();
+            place.extend_from_slice(row);
+            self.rows.push_back(place);
+        }
+        if self.steps >= self.half {
+            then(&self.sum);
+        }
+        self.steps += 1;
+    }
+
+    /// Hands on the sums about the last rows, and begins anew.
+    fn finish(&mut self, mut then: impl FnMut(&[f64])) {
+        (0..self.half).for_each(|_| self.step(None, &mut then));
+        self.rows.clear();
+        self.sum.fill(0.0);
+        self.steps = 0;
+    }
+}
+
+/// Weighted means over neighbouring states of every trajectory, of equations of some numbers each.
+///
+/// Averages of equations, forces included, hold as well as the equations themselves: the noise of accelerations is averaged out of the regressors
+/// before these are squared, so that least squares are hardly biased by it, and the polynomials may have a degree that misses nothing. Robots are
+/// identified this way ("parallel filtering", Gautier, IEEE ICRA 1997). Sums are taken twice: the weights form a triangle.
+pub(super) struct Averages<'a> {
+    states: &'a States,
+    /// Equations of a state.
+    n: usize,
+    sums: [Sums; 2],
+    /// The numbers of a state, then the weights of its equations.
+    row: Vec<f64>,
+    mean: Vec<f64>,
+    /// Equations of states that came and are not finite, from the state on that is handed on next.
+    failed: VecDeque<bool>,
+    come: usize,
+}
+
+impl<'a> Averages<'a> {
+    /// Of states with `n` equations of `width` numbers.
+    pub fn new(states: &'a States, (n, width): (usize, usize)) -> Self {
+        let size = n * (width + 1);
+        let sums = [(); 2].map(|()| Sums::new(states.averaged, size));
+        Self { states, n, sums, row: vec![0.0; size], mean: vec![0.0; n * width], failed: VecDeque::new(), come: 0 }
+    }
+
+    /// Takes the numbers of the next state, `(n, width)`, and hands on the means of those whose windows are complete, in order.
+    pub fn take(&mut self, values: &[f64], mut then: impl FnMut(&[f64])) {
+        if self.states.averaged == 0 {
+            return then(values);
+        }
+        let (n, width, states) = (self.n, values.len() / self.n, self.states);
+        let (numbers, weights) = self.row.split_at_mut(values.len());
+        for (i, (own, given)) in numbers.chunks_exact_mut(width).zip(values.chunks_exact(width)).enumerate() {
+            let finite = given.iter().all(|x| x.is_finite());
+            weights[i] = if finite { states.share.get(self.come * n + i).copied().unwrap_or(1.0) } else { 0.0 };
+            own.iter_mut().zip(given).for_each(|(own, x)| *own = if finite { x * weights[i] } else { 0.0 });
+            self.failed.push_back(!finite);
+        }
+        let [first, second] = &mut self.sums;
+        let (failed, mean) = (&mut self.failed, &mut self.mean);
+        let mut divide = |sum: &[f64]| {
+            let (numbers, weights) = sum.split_at(n * width);
+            for (i, weight) in weights.iter().enumerate() {
+                let range = i * width..(i + 1) * width;
+                let (own, sums) = (&mut mean[range.clone()], &numbers[range]);
+                match failed.pop_front() {
+                    Some(true) => own.fill(f64::NAN),
+                    _ if *weight > 0.0 => own.iter_mut().zip(sums).for_each(|(own, x)| *own = x / weight),
+                    _ => own.fill(0.0),
+                }
+            }
+            then(mean);
+        };
+        first.step(Some(&self.row), |sum| second.step(Some(sum), &mut divide));
+        let (here, next) = (states.places[self.come], states.places.get(self.come + 1));
+        if next.is_none_or(|next| next.0 != here.0 || next.1 > here.1 + states.stride) {
+            first.finish(|sum| second.step(Some(sum), &mut divide));
+            second.finish(&mut divide);
+        }
+        self.come += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equations_are_averaged_along_their_trajectory_by_their_weights() {
+        // Two trajectories, the second with a sample missing between its parts; one equation takes no part, one has failed.
+        let places: Vec<(usize, usize)> =
+            (0..9).map(|k| (0, k)).chain((0..4).map(|k| (1, k))).chain((5..9).map(|k| (1, k))).collect();
+        let mut states = States { places, stride: 1, averaged: 1, share: vec![1.0; 17], ..States::default() };
+        states.share[2] = 0.0;
+        let given: Vec<f64> = (0..34).map(|k| f64::from(k * k % 11)).collect();
+        let mut rows = given.clone();
+        rows[2 * 15] = f64::NAN;
+        let (mut averages, mut found) = (Averages::new(&states, (1, 2)), Vec::new());
+        rows.chunks_exact(2).for_each(|row| averages.take(row, |mean| found.extend_from_slice(mean)));
+        assert_eq!(found.len(), given.len());
+        let runs = [0..9, 9..13, 13..17];
+        for (at, row) in found.chunks_exact(2).enumerate() {
+            let run = runs.iter().find(|run| run.contains(&at)).unwrap();
+            let near = |k: &usize| run.contains(k) && *k != 2 && *k != 15;
+            let weight = |k: usize| [3.0, 2.0, 1.0, 0.0][k.abs_diff(at).min(3)];
+            // At the ends a first average of two counts once more.
+            let twice = |k: usize| {
+                let inner = at.saturating_sub(1).max(run.start)..(at + 2).min(run.end);
+                inner.filter(|middle| middle.abs_diff(k) <= 1).count() as f64
+            };
+            let all = || (0..17).filter(near);
+            let mean = all().map(|k| twice(k) * given[2 * k + 1]).sum::<f64>() / all().map(twice).sum::<f64>();
+            match at {
+                15 => assert!(row[0].is_nan() && row[1].is_nan()),
+                _ => assert!((row[1] - mean).abs() < 1e-12, "{at}: {row:?} {mean}"),
+            }
+            if at == 6 {
+                assert!((4..9).all(|k| twice(k) == weight(k)));
+            }
+        }
+    }
+}

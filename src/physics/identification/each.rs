@@ -1,0 +1,178 @@
+//! The constants of every trajectory alone, and whether they differ by more than their errors: a model that lacks something, or errors that are
+//! too small, show here first.
+
+use super::found::{Constant, Identified};
+use super::quality::{CHANCE, tail};
+use super::says::with_error;
+use super::{IdentifyError, IdentifyOptions, identify};
+use crate::cancellation::Cancelled;
+use crate::findings::Findings;
+use crate::lagrangian::SystemInstance;
+use crate::names::rounded;
+use crate::recording::Recording;
+use serde::Serialize;
+
+/// Most trajectories that are identified alone.
+const MOST: usize = 64;
+
+/// What one trajectory alone says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Alone {
+    /// Its name.
+    pub trajectory: String,
+    /// The constants; none of a trajectory from which they cannot be identified.
+    pub constants: Vec<Constant>,
+    /// The verdict in words, or why there are no constants.
+    pub says: String,
+    /// `true` if the model fits it.
+    pub explained: bool,
+}
+
+/// The scatter of a constant over the trajectories that determine it, at least two.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scatter {
+    /// Its symbol.
+    pub symbol: String,
+    /// Mean of its values, each weighted by its variance.
+    pub mean: f64,
+    /// Number of these values.
+    pub count: usize,
+    /// Standard deviation of the values from the mean, in standard errors: 1 if the errors are right.
+    pub ratio: f64,
+    /// Probability that values of one and the same constant scatter as much.
+    pub probability: f64,
+    /// `true` if that is less than 1 % over the number of constants: one recording of a right model in a hundred has such a constant.
+    pub differs: bool,
+}
+
+/// The constants by trajectory.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Each {
+    /// Every trajectory.
+    pub trajectories: Vec<Alone>,
+    /// The scatter of every constant.
+    pub scatter: Vec<Scatter>,
+}
+
+/// Identifies every trajectory alone, from the constants of all together.
+///
+/// # Errors
+/// More than 64 trajectories, a search that is cancelled.
+pub(super) fn each(
+    instance: &SystemInstance<f64>,
+    recording: &Recording,
+    options: &IdentifyOptions,
+    found: &Identified,
+) -> Result<Each, IdentifyError> {
+    let count = recording.tracks.len();
+    if count > MOST {
+        let expected = format!("at most {MOST} trajectories");
+        return Err(IdentifyError::Option { what: "each", expected, found: count.to_string() });
+    }
+    let mut instance = instance.clone();
+    for (parameter, value) in instance.system.parameters.iter().zip(&mut instance.parameters) {
+        let own = found.constants.iter().find(|constant| constant.symbol == parameter.symbol);
+        *value = own.map_or(*value, |constant| constant.value);
+    }
+    let mut trajectories = Vec::new();
+    for at in 0..count {
+        let one = Recording { tracks: vec![recording.tracks[at].clone()], ..recording.clone() };
+        let options = IdentifyOptions {
+            errors: of(&options.errors, at),
+            missing: of(&options.missing, at),
+            inputs: of(&options.inputs, at),
+            each: false,
+            ..options.clone()
+        };
+        let trajectory = recording.tracks[at].name.clone();
+        trajectories.push(match identify(&instance, &one, &options) {
+            Ok(Identified { constants, explained, verdict, .. }) => {
+                Alone { trajectory, constants, says: verdict.to_string(), explained }
+            }
+            Err(IdentifyError::Cancelled(Cancelled)) => return Err(IdentifyError::Cancelled(Cancelled)),
+            Err(error) => Alone { trajectory, constants: Vec::new(), says: error.to_string(), explained: false },
+        });
+    }
+    let symbols: Vec<&String> = found.constants.iter().map(|constant| &constant.symbol).collect();
+    let scatter = symbols.iter().filter_map(|symbol| scatter(symbol, &trajectories, (symbols.len(), found.samples)));
+    Ok(Each { scatter: scatter.collect(), trajectories })
+}
+
+/// What belongs to one trajectory, of a list that is empty or has an entry for each.
+fn of<T: Clone>(all: &[T], at: usize) -> Vec<T> {
+    all.get(at).cloned().into_iter().collect()
+}
+
+/// The scatter of one of so many constants; `None` if fewer than two trajectories determine it.
+fn scatter(symbol: &str, trajectories: &[Alone], (constants, samples): (usize, usize)) -> Option<Scatter> {
+    let own = trajectories.iter().flat_map(|alone| &alone.constants).filter(|constant| constant.symbol == symbol);
+    let known: Vec<(f64, f64)> = own
+        .filter_map(|constant| Some((constant.value, constant.standard_error.filter(|error| *error > 0.0)?)))
+        .collect();
+    if known.len() < 2 {
+        return None;
+    }
+    let weights: f64 = known.iter().map(|(_, error)| error.powi(-2)).sum();
+    let mean = known.iter().map(|(value, error)| value * error.powi(-2)).sum::<f64>() / weights;
+    let freedom = (known.len() - 1) as f64;
+    let square = known.iter().map(|(value, error)| ((value - mean) / error).powi(2)).sum::<f64>() / freedom;
+    let probability = tail(square, freedom, samples as f64);
+    let differs = probability < CHANCE / constants as f64;
+    Some(Scatter { symbol: symbol.to_string(), mean, count: known.len(), ratio: square.sqrt(), probability, differs })
+}
+
+impl Each {
+    /// The table log by log, and the constants that differ.
+    pub(super) fn say(&self, findings: &mut Findings) {
+        let symbols: Vec<&str> = self.scatter.iter().map(|scatter| scatter.symbol.as_str()).collect();
+        let cell = |alone: &Alone, symbol: &str| {
+            let own = alone.constants.iter().find(|constant| constant.symbol == symbol);
+            let [value, error] = own.map_or(["-".into(), "-".into()], |own| with_error(own.value, own.standard_error));
+            format!("{value} ({error})")
+        };
+        let row = |alone: &Alone| {
+            let cells = symbols.iter().map(|symbol| cell(alone, symbol));
+            std::iter::once(alone.trajectory.clone()).chain(cells).chain([alone.says.clone()]).collect::<Vec<_>>()
+        };
+        let headers: Vec<&str> = [&["trajectory alone"], symbols.as_slice(), &[""]].concat();
+        findings.gap().table(&headers, self.trajectories.iter().map(row));
+        let numbers = |scatter: &Scatter| {
+            let Scatter { symbol, mean, ratio, probability, .. } = scatter;
+            let differs = if scatter.differs { "differs" } else { "" };
+            [symbol.clone(), rounded(*mean, 5), rounded(*ratio, 3), rounded(*probability, 2), differs.to_string()]
+        };
+        let headers = ["constant", "mean", "scatter / error", "p-value", ""];
+        findings.gap().table(&headers, self.scatter.iter().map(numbers));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identification::tests::{described, recorded};
+
+    /// An oscillator with a rate.
+    fn oscillator(k: f64) -> SystemInstance<f64> {
+        let text = r#"{"name": "spring", "lagrangian": "x_dot^2/2 - k*x^2/2", "parameters": {"k": 1},
+            "coordinates": [{"name": "x", "bounds": [-3, 3], "velocity_bounds": [-6, 6]}]}"#;
+        described(text, &[("k", k)])
+    }
+
+    #[test]
+    fn constants_that_differ_between_trajectories_are_found() {
+        let each = |last: f64| {
+            let mut recording =
+                recorded(&oscillator(4.0), &[&[1.0, 0.3], &[0.2, 1.9], &[-0.8, 1.0]], (8.0, 0.02), &[2e-3], 1);
+            recording.tracks.extend(recorded(&oscillator(last), &[&[0.9, -0.7]], (8.0, 0.02), &[2e-3], 2).tracks);
+            let options = IdentifyOptions { each: true, ..IdentifyOptions::default() };
+            identify(&oscillator(3.5), &recording, &options).unwrap().each.unwrap()
+        };
+        let (alike, unlike) = (each(4.0), each(4.04));
+        assert!(!alike.scatter[0].differs && alike.scatter[0].ratio < 2.0, "{alike:?}");
+        assert!(unlike.scatter[0].differs && unlike.scatter[0].ratio > 3.0, "{unlike:?}");
+        let constants = unlike.trajectories.iter().map(|alone| &alone.constants[0]);
+        for (constant, k) in constants.zip([4.0, 4.0, 4.0, 4.04]) {
+            assert!((constant.value - k).abs() < 4.0 * constant.standard_error.unwrap(), "{unlike:?}");
+        }
+    }
+}
