@@ -246,7 +246,7 @@ a = { default = 0.04, learn = true }
 om = { default = 9, learn = true, range = "positive" }
 c = { default = 0.02, learn = true }
 "#,
-    wrong: ("c*th_dot^2/2", "c*0"),
+    wrong: ("c*th_dot^2/2", "0*c*th_dot^2"),
     acceleration: |t, q, v, _| {
         let (l, a, om, c) = (0.5, 0.04, 9.0f64, 0.02);
         vec![-(9.81 - a * om * om * (om * t).cos()) / l * q[0].sin() - c / (l * l) * v[0]]
