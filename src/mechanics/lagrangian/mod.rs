@@ -45,15 +45,15 @@ pub(crate) use constraints::RowEquations;
 #[cfg(feature = "training")]
 pub(crate) use constraints::Tangent;
 pub(crate) use constraints::dot;
+pub(crate) use constraints::project_acceleration;
 #[cfg(feature = "data")]
 pub(crate) use constraints::take_out;
 #[cfg(feature = "training")]
 pub(crate) use constraints::{Bordered, independent_rows};
 pub use constraints::{Constrained, ConstraintError, Constraints, FormulaError};
 #[doc(hidden)]
-pub use constraints::{ExpressionConstraints, FormulaConstraints, LeastNorm, ReducedMass, project};
+pub use constraints::{ExpressionConstraints, FormulaConstraints, LeastNorm, OffManifold, ReducedMass, project};
 pub use constraints::{Manifold, ManifoldRows, RowAdjoint};
-pub(crate) use constraints::{OffManifold, project_acceleration};
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
 #[cfg(feature = "training")]

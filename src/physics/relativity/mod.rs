@@ -1,8 +1,7 @@
 //! Black holes, learned or written down: what is read off their metrics, and what a camera near them sees.
 //!
 //! A [`LearnedHole`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra,
-//! falls through a horizon, mass and spin ([`nearest_parameters`]), curvature, symmetries; `LearnedHole` and `nearest_parameters` take the
-//! feature `training`.
+//! falls through a horizon, mass and spin, curvature, symmetries. It takes the feature `training`.
 //!
 //! A [`Camera`] stands at a place of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
 //! followed backwards in time, by the accelerations of the model alone, until it comes from far away, where its direction is that of a point
