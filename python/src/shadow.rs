@@ -5,9 +5,7 @@ use crate::errors::value;
 use crate::readings::shown;
 use crate::subject::Subject;
 use lnn::pipeline::Event;
-use lnn::relativity::{
-    Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, picture, time_moves_alone, views,
-};
+use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, picture, time_moves_alone, views};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::atomic::{AtomicUsize, Ordering};
