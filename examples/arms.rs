@@ -6,9 +6,9 @@
 //! `examples/systems/double_arm.toml` or `triple_arm.toml` are identified. A seed of the network may follow the file. Without a file it makes
 //! runs of its own and learns little.
 
-use lnn::cli::parse_system;
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::pipeline::parse_system;
 use lnn::prelude::*;
 use lnn::random::RngStream;
 use lnn::recording::{Columns, RecordedTrajectory, Recording, read_recording};

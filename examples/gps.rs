@@ -7,9 +7,9 @@
 //! `--csv FILE.csv` writes positions and pulls as a recording for `lnn identify`. Without files it makes orbits of its own and compares what it
 //! finds with the truth.
 
-use lnn::cli::parse_system;
 use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::pipeline::parse_system;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Options, rollout};

@@ -6,9 +6,9 @@
 //! in Einstein's theory. The pulls of the other planets and of the Sun's flattening are known forces. `--csv FILE.csv` writes positions and
 //! pulls as a recording for `lnn identify`. Without files it makes an orbit of its own and compares what it finds with the truth.
 
-use lnn::cli::parse_system;
 use lnn::identification::{Between, Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::pipeline::parse_system;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Driven, Options};
 use std::borrow::Cow;

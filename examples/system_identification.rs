@@ -4,12 +4,28 @@
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
-use lnn::lagrangian::{ClosedForm, Lagrangian, systems::DoublePendulum};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics};
 use lnn::linalg::{Workspace, solve};
 use lnn::random::RngStream;
+use lnn::scalar::Real;
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, STATES};
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use std::sync::Arc;
+
+/// Two rods with bobs; `m1`, `m2`, `l1`, `l2`, `g`.
+struct DoublePendulum;
+
+impl Lagrangian for DoublePendulum {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+        let (both, [first, second]) = (p[0] + p[1], [p[2] * v[0], p[3] * v[1]]);
+        let kinetic =
+            (both * first.sqr() + p[1] * second.sqr()) * R::half() + p[1] * first * second * (q[0] - q[1]).cos();
+        kinetic + (both * p[2] * q[0].cos() + p[1] * p[3] * q[1].cos()) * p[4]
+    }
+}
 
 /// Mean over the states of |a - target|^2, of the lanes `(q, v, target)` and the parameters.
 struct Misfit {
@@ -60,11 +76,12 @@ impl Gradient for Misfit {
 /// Largest relative error of the parameters learned from states with this noise, in parts of the rms acceleration.
 fn identify(count: usize, noise: f64) -> Result<f64, Error> {
     let (mut rng, uniform) = (RngStream::Training(0).generator(1), Uniform::new(-3.0, 3.0)?);
+    let truth = Mechanics::new(DoublePendulum, vec![2.0, 1.4, 0.8, 1.04, 9.8]);
     let mut lanes = vec![[0.0_f64; 6]; count];
     for lane in &mut lanes {
         let (x, target) = lane.split_at_mut(4);
         x.fill_with(|| uniform.sample(&mut rng));
-        target.copy_from_slice(&DoublePendulum.acceleration(&[2.0, 1.4, 0.8, 1.04, 9.8], &x[..2], &x[2..]));
+        target.copy_from_slice(&truth.acceleration(&x[..2], &x[2..])?);
     }
     let square = lanes.iter().map(|lane| lane[4].powi(2) + lane[5].powi(2)).sum::<f64>() / (2 * count) as f64;
     for a in lanes.iter_mut().flat_map(|lane| &mut lane[4..]) {

@@ -39,6 +39,8 @@
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | read a Lagrangian as a formula, from motion or from a model | [`formula`] |
 //! | find the constants of a Lagrangian whose form is known | [`identification`] |
+//! | read a system of your own from its file | `pipeline::parse_system` (feature `pipeline`), [`lagrangian::configure_system`] |
+//! | draw random numbers that a seed repeats | [`random`] |
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
@@ -194,8 +196,8 @@ pub use mechanics::rollout;
 pub use mechanics::{lagrangian, network};
 pub(crate) use numerics::platform;
 #[doc(hidden)]
-pub use numerics::{forward, ops, random};
-pub use numerics::{linalg, scalar, tape};
+pub use numerics::{forward, ops};
+pub use numerics::{linalg, random, scalar, tape};
 #[cfg(feature = "std")]
 pub use physics::certificate;
 #[cfg(feature = "data")]

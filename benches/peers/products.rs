@@ -1,6 +1,7 @@
 //! The bare matrix products of a training step: `n + 11` passes through the layers, nothing between them.
 
-use lnn::linalg::{MatMut, MatRef, gemm};
+use lnn::linalg::gemm;
+use lnn::scalar::{MatMut, MatRef};
 use lnn::scalar::{Real, Scalar};
 use rayon::prelude::*;
 

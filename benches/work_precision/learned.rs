@@ -3,8 +3,7 @@
 use super::options::Options;
 use lnn::configuration::{Config, Precision};
 use lnn::lagrangian::configure;
-use lnn::network::NetworkLagrangian;
-use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use lnn::network::{FORMAT, Header, ModelFile, NetworkLagrangian, StoredPrecision};
 use lnn::presets::Preset;
 use lnn::training::{Hooks, run};
 use std::path::Path;

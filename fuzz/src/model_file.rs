@@ -3,8 +3,7 @@
 
 use super::sealed::sealed;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::NetworkLagrangian;
-use lnn::network::file::ModelFile;
+use lnn::network::{ModelFile, NetworkLagrangian};
 
 /// Weights up to which a model is evaluated too.
 const SMALL: usize = 1 << 12;

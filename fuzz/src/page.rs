@@ -3,8 +3,7 @@
 
 use lnn::cli::parse_system;
 use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure_system};
-use lnn::network::NetworkLagrangian;
-use lnn::network::file::ModelFile;
+use lnn::network::{ModelFile, NetworkLagrangian};
 use lnn::report::page;
 use serde_json::{Value, json};
 use std::borrow::Cow;

@@ -1,8 +1,7 @@
 //! Any bytes as a file of recorded motion, CSV, XLSX, NPY or NPZ: refused with an error of one line, or trajectories of finite
 //! numbers at increasing times.
 
-use lnn::recording::Columns;
-use lnn::recording::read::read_recording;
+use lnn::recording::{Columns, read_recording};
 use std::path::PathBuf;
 
 /// Reads the bytes as columns with names, by number, with everything that can be asked for, and as trajectories side by side.

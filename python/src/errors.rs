@@ -1,7 +1,7 @@
 //! Failures of the library as exceptions of Python.
 
 use lnn::pipeline::PipelineError;
-use lnn::recording::read::{DataError, Problem};
+use lnn::recording::{DataError, Problem};
 use pyo3::PyErr;
 use pyo3::exceptions::{
     PyFileExistsError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyValueError,

@@ -144,7 +144,8 @@ pub fn train(
     let instance = system.system_instance()?;
     let config: Config = serde_json::from_str(config).map_err(value)?;
     let (starts, threads) = plan;
-    let options = RunOptions { threads, starts, ..RunOptions::default() };
+    let mut options = RunOptions::default();
+    (options.threads, options.starts) = (threads, starts);
     let report = attended(py, progress.as_ref(), |watch| {
         lnn::pipeline::train(&config, &instance, &options, output(out)?.as_ref(), &watch)
     })?;
@@ -220,8 +221,9 @@ impl Choices {
         let given =
             EARLY.iter().filter_map(|key| self.changes.remove(*key).map(|new| (key.to_string(), new))).collect();
         let config = FitConfig { constraints: self.constraints.clone(), ..FitConfig::default() };
-        let FitConfig { targets, held_out, window, noise, between, constraints, .. } = changed(&config, &given)?;
-        Ok(FitOptions { targets, held_out, window, noise, between, constraints, seed: self.seed })
+        let mut options = FitOptions::from(&changed(&config, &given)?);
+        options.seed = self.seed;
+        Ok(options)
     }
 }
 

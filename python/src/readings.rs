@@ -4,12 +4,12 @@ use crate::attend::whole;
 use crate::errors::{pipeline, runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
-use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
+use lnn::constraints::{ConstraintSearch, MotionSamples, find_constraints};
 use lnn::findings::Findings;
 use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
 use lnn::identification::{Between, IdentifyOptions, identify as identified};
 use lnn::pipeline::{FirstLook, NextStep};
-use lnn::recording::smooth::SmoothOptions;
+use lnn::recording::SmoothOptions;
 use lnn::report::Report;
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -47,8 +47,9 @@ pub fn check(py: Python<'_>, motion: Motion) -> PyResult<String> {
 pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, usize)) -> PyResult<String> {
     let (degree, velocity_degree) = degrees;
     for (what, least, given) in [("degree", 1, degree), ("velocity_degree", 0, velocity_degree)] {
-        if !(least..=MOST_DEGREE).contains(&given) {
-            return Err(value(format_args!("{what}: expected {least} to {MOST_DEGREE}, found {given}")));
+        let most = ConstraintSearch::MOST_DEGREE;
+        if !(least..=most).contains(&given) {
+            return Err(value(format_args!("{what}: expected {least} to {most}, found {given}")));
         }
     }
     let source = Source::of(motion)?;

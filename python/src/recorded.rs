@@ -2,8 +2,10 @@
 
 use crate::errors::{pipeline, value};
 use lnn::pipeline::PipelineError;
-use lnn::recording::read::{DataError, read_recording};
-use lnn::recording::{ColumnGuess, Columns, Guess, LoadedRecording, RecordedTrajectory, Recording, factor, guess};
+use lnn::recording::{
+    ColumnGuess, Columns, DataError, Guess, LoadedRecording, RecordedTrajectory, Recording, factor, guess,
+    read_recording,
+};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;

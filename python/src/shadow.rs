@@ -5,9 +5,7 @@ use crate::errors::value;
 use crate::readings::shown;
 use crate::subject::Subject;
 use lnn::pipeline::Event;
-use lnn::relativity::{
-    Camera, Chart, MOST_PIXELS, NamedMetric, Observer, ShadowSummary, Tracing, picture, time_moves_alone, views,
-};
+use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, picture, time_moves_alone, views};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -87,8 +85,9 @@ pub fn shadow<'py>(
     let usual = if learned.is_none() { FAR * camera.distance } else { tracing.far };
     tracing.far = choices.far.unwrap_or(usual);
     let pixels = camera.width.saturating_mul(camera.height);
-    if !(1..=MOST_PIXELS).contains(&pixels) {
-        return Err(value(format_args!("width, height: expected 1 to {MOST_PIXELS} pixels together, found {pixels}")));
+    let most = Camera::MOST_PIXELS;
+    if !(1..=most).contains(&pixels) {
+        return Err(value(format_args!("width, height: expected 1 to {most} pixels together, found {pixels}")));
     }
     let unit = exact.or(learned).and_then(Subject::time_unit);
     let metrics: Vec<NamedMetric<'_>> = subjects.iter().map(|(name, subject)| (*name, subject.moving())).collect();

@@ -8,14 +8,13 @@ use lnn::certificate::{self, Certificate, Signature, certify_network, certify_sy
 use lnn::constraints::{EXAMINED_STATES, examine};
 use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::{Geometry, GeometryError, geometries};
-use lnn::lagrangian::system::{Bounds, Size};
+use lnn::lagrangian::{Bounds, Size};
 use lnn::lagrangian::{
     Description, EulerLagrange, Frictionless, Interruptible, Linearization, Linearizer, MechanicsError, Request,
     SystemInstance, Terms, configure, configure_system, configure_values, constrained_systems, find,
 };
 use lnn::linalg::Workspace;
-use lnn::network::NetworkLagrangian;
-use lnn::network::file::{Header, ModelFile};
+use lnn::network::{Header, ModelFile, NetworkLagrangian};
 use lnn::pipeline::{
     CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, parse_robot, rewrite_robot, trained_on,
 };
@@ -754,10 +753,10 @@ impl Subject {
         if system.system.columns(system.coordinates) != self.columns {
             return Err(value(format_args!("expected a system with the columns {:?}", self.columns)));
         }
-        let options = EvaluationOptions::new(&system, trained_on(header), seed).map_err(pipeline)?;
+        let mut options = EvaluationOptions::new(&system, trained_on(header), seed).map_err(pipeline)?;
         // A system that is described in the model's file is the one whose constraints it was learned under.
-        let constraints = header.description.is_none().then(|| header.constraints.clone());
-        let options = EvaluationOptions { starts, constraints, threads, ..options };
+        options.constraints = header.description.is_none().then(|| header.constraints.clone());
+        (options.starts, options.threads) = (starts, threads);
         let found = whole(py, progress.as_ref(), |watch| evaluate(&system, network, options, watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }

@@ -19,8 +19,7 @@ use lnn::lagrangian::{
 };
 use lnn::network::{Initialization, Structure, initial_weights};
 use lnn::presets::Trainer;
-use lnn::recording::smooth::SmoothOptions;
-use lnn::recording::{RecordedTrajectory, Recording};
+use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions};
 use lnn::rollout::{Integrator, Options, rollout};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};

@@ -4,8 +4,7 @@
 use crate::alone;
 use crate::counting::peak;
 use lnn::lagrangian::build;
-use lnn::recording::Columns;
-use lnn::recording::read::read_recording;
+use lnn::recording::{Columns, read_recording};
 use lnn::rollout::{Options, rollout_in_pieces};
 use lnn::storage::{AtomicWriter, Disk};
 use std::ffi::OsString;

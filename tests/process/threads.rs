@@ -6,7 +6,7 @@ use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::data::{Noise, StateEstimate};
 use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
-use lnn::network::{Architecture, Layout, NetworkLagrangian, file::ModelFile};
+use lnn::network::{Architecture, Layout, ModelFile, NetworkLagrangian};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::recording::RecordedTrajectory;
 use lnn::rollout::{Between, Options, rollout, rollout_many};

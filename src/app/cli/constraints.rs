@@ -8,8 +8,8 @@ use crate::cli::result_page::{self, PageArgs};
 use crate::cli::watch::search;
 use crate::cli::{CliError, config, output};
 use crate::constraints::{
-    ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraints, MOST_DEGREE,
-    MotionSamples, examine, find_constraints,
+    ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraints, MotionSamples,
+    examine, find_constraints,
 };
 use crate::lagrangian::{EulerLagrange, FormulaConstraints};
 use crate::recording::smooth::SmoothOptions;
@@ -26,10 +26,10 @@ pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
     /// Largest total degree of the functions of the coordinates; angles enter by sine and cosine.
-    #[arg(long, value_name = "N", default_value = "2", value_parser = whole(1, MOST_DEGREE))]
+    #[arg(long, value_name = "N", default_value = "2", value_parser = whole(1, ConstraintSearch::MOST_DEGREE))]
     degree: usize,
     /// Largest total degree of the coefficients of the velocities.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = whole(0, MOST_DEGREE))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole(0, ConstraintSearch::MOST_DEGREE))]
     velocity_degree: usize,
     /// Write the table [constraints] to this file; system files and roll-outs take it.
     #[arg(long, value_name = "FILE.toml")]

@@ -66,6 +66,7 @@ mod train_config;
 mod tube;
 mod watch;
 
+pub use crate::pipeline::parse_system;
 pub use config::parse as parse_config;
 use error::argument_error;
 pub use error::{CliError, Kind};
@@ -73,7 +74,6 @@ pub use output::print;
 pub use runs::{Orders, Work, merge, perform, print_list};
 pub use shard::Shard;
 pub use states::{States, StatesError, parse_states};
-pub use system_arg::parse_system;
 
 use crate::names::{WIDTH, one_line, wrap_text};
 use clap::{CommandFactory, Parser, Subcommand};

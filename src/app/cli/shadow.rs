@@ -10,8 +10,8 @@ use crate::lagrangian::{EulerLagrange, MechanicsError};
 use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
 use crate::relativity::{
-    Camera, Chart, MOST_PIXELS, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, picture,
-    time_moves_alone, views,
+    Camera, Chart, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, picture, time_moves_alone,
+    views,
 };
 use crate::report::png;
 use std::path::PathBuf;
@@ -59,10 +59,10 @@ pub struct Args {
     #[arg(long, value_name = "DEGREES", default_value = "70", allow_hyphen_values = true, value_parser = number(1e-6, 179.0))]
     field_of_view: f64,
     /// Pixels of a row.
-    #[arg(long, value_name = "N", default_value = "400", allow_hyphen_values = true, value_parser = whole(1, MOST_PIXELS))]
+    #[arg(long, value_name = "N", default_value = "400", allow_hyphen_values = true, value_parser = whole(1, Camera::MOST_PIXELS))]
     width: usize,
     /// Rows [default: as many as pixels of a row].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_PIXELS))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, Camera::MOST_PIXELS))]
     height: Option<usize>,
     /// Distance beyond which an outgoing ray comes from the sky; keep it within the training range of a learned metric [default: 100
     /// times the distance of the camera, with a learned metric twice the distance].
@@ -228,8 +228,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let out = OutputFile::claim(&args.out, &inputs, args.overwrite)?;
 
     let pixels = camera.width.saturating_mul(camera.height);
-    if pixels > MOST_PIXELS {
-        return Err(CliError::usage(format_args!("--width, --height: expected at most {MOST_PIXELS} pixels together")));
+    let most = Camera::MOST_PIXELS;
+    if pixels > most {
+        return Err(CliError::usage(format_args!("--width, --height: expected at most {most} pixels together")));
     }
     let pixels = pixels * models.len();
     memory::require("the picture", (pixels as u64).checked_mul(PIXEL_BYTES))?;

@@ -2,9 +2,9 @@
 
 use crate::cli::{CliError, config, output};
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Description, SystemInstance, find, resolve};
+use crate::lagrangian::{SystemInstance, find, resolve};
 use crate::network::file::Header;
-use crate::pipeline::{is_robot, parse_robot};
+use crate::pipeline::{is_robot, parse_robot, parse_system};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -50,19 +50,6 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
 pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, String)>) -> Result<T, CliError> {
     let (name, text) = config::read_text_within(path, MAX_ROBOT)?;
     make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
-}
-
-/// The system of a description as text, TOML.
-///
-/// # Errors
-/// Line, from 1, and what is wrong there.
-pub fn parse_system(text: &str) -> Result<System, (usize, String)> {
-    let mut description: Description = config::parse(text)?;
-    let lines = config::lines(text);
-    let names = description.constraints.keys();
-    let placed = names.filter_map(|name| Some((name.clone(), *lines.get(&format!("constraints.{name}"))?))).collect();
-    description.constraint_lines.0 = placed;
-    description.system().map_err(|error| (config::line_of(&lines, &error.key).unwrap_or(1), error.to_string()))
 }
 
 /// The system that a model learned, if it is known: of one that was only recorded there is nothing to know.

@@ -86,6 +86,7 @@ pub struct Motion {
 
 /// States and starts of an evaluation, and how the learned motion is integrated.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct EvaluationOptions {
     /// Fresh states `(states, n)`, `q` and `v`, on which accelerations are compared.
     pub states: (Vec<f64>, Vec<f64>),

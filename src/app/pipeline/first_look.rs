@@ -44,7 +44,7 @@ pub struct FirstLook {
     pub guessed: Vec<ColumnGuess>,
     /// The survey.
     #[serde(flatten)]
-    pub survey: Survey,
+    pub(crate) survey: Survey,
     /// Why no fit can learn from the data, if none can.
     pub obstacle: Option<String>,
     /// Samples in which constraints and a formula were looked for.

@@ -35,8 +35,7 @@ pub struct FitReport {
     /// Reason for which learning ended.
     pub stop: StopReason,
     /// What an interruption after the training of the model left out, in words.
-    #[doc(hidden)]
-    pub unfinished: Option<String>,
+    pub(crate) unfinished: Option<String>,
     /// Header of the model's file.
     pub header: Header,
     /// The network with its best weights.
@@ -67,7 +66,6 @@ impl FitReport {
         Self { stop, unfinished, header, network, history, hold_out, others, json, findings }
     }
     /// Text of `summary.json`.
-    #[doc(hidden)]
     pub fn json(&self) -> &str {
         &self.json
     }

@@ -9,7 +9,7 @@ use crate::pipeline::train::RunOptions;
 use crate::pipeline::{InMemory, LockedDirectory, Output, PipelineError, Watch};
 use crate::presets::restructure;
 use crate::recording::read::read_recording;
-use crate::recording::{Columns, LoadedRecording, Recording, Targets};
+use crate::recording::{Columns, LoadedRecording, Recording};
 use std::path::PathBuf;
 
 /// A fit of recorded motion.
@@ -121,13 +121,6 @@ impl Fit {
     /// Seed of the weights and of held-out trajectories.
     pub fn seed(mut self, seed: u64) -> Self {
         self.options.seed = seed;
-        self
-    }
-
-    /// Quantities to learn from, in place of those that the data advise.
-    #[doc(hidden)]
-    pub fn targets(mut self, targets: Targets) -> Self {
-        self.options.targets = Some(targets);
         self
     }
 

@@ -282,6 +282,7 @@ impl FitConfig {
 
 /// Choices of a fit that come before its configuration: what is learned from and what is held out.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FitOptions {
     /// Targets to learn from; none for those that the data advise.
     pub targets: Option<Targets>,

@@ -82,21 +82,15 @@ mod run_table;
 mod start;
 mod sweep;
 mod tables;
+pub(crate) mod text;
 mod time_steps;
 mod train;
 mod watch;
 
 pub(crate) use checkpoints::{Begin, Checkpoints};
-#[doc(hidden)]
-pub use determination::Determined;
-#[doc(hidden)]
-pub use energy::Balance;
-#[doc(hidden)]
-pub use equivalence::Equivalence;
 pub use error::PipelineError;
+pub(crate) use evaluation::RTOL;
 pub use evaluation::{Evaluation, EvaluationOptions, evaluate};
-#[doc(hidden)]
-pub use evaluation::{Motion, RTOL};
 #[doc(hidden)]
 pub use experiment::Experiment;
 pub(crate) use experiment::{KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment};
@@ -105,35 +99,25 @@ pub use experiment_directory::{ExperimentDirectory, LockedDirectory};
 pub(crate) use experiment_report::ExperimentReport;
 #[doc(hidden)]
 pub use experiment_report::{Additions, Results};
-#[doc(hidden)]
-pub use file_names::MODEL;
-pub(crate) use file_names::{CAPTIONS, LEARNED, PLAY, RECORD, SUMMARY};
+pub(crate) use file_names::{CAPTIONS, LEARNED, MODEL, PLAY, RECORD, SUMMARY};
 pub use first_look::{FirstLook, NextStep};
 pub use fit::FitReport;
-#[doc(hidden)]
-pub use fit::fit;
+pub(crate) use fit::fit;
 pub use fit_builder::Fit;
 pub(crate) use fit_config::unit;
-#[doc(hidden)]
-pub use fit_config::{FitColumns, FitConfig, HELD_OUT};
-pub use fit_config::{FitConstraints, FitOptions};
-#[doc(hidden)]
+pub use fit_config::{FitColumns, FitConfig, FitConstraints, FitOptions};
 pub use force_errors::ForceError;
-pub use hold_out::HoldOut;
-#[doc(hidden)]
-pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_hold_out};
-#[doc(hidden)]
+pub use hold_out::{CoordinatePredictions, HoldOut, UsefulTime};
 pub use judging::Unjudged;
 #[doc(hidden)]
-pub use model::{CONSTRAINTS_UNSUPPORTED, model_file, trained_on};
+pub use model::CONSTRAINTS_UNSUPPORTED;
+pub use model::{model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
-#[doc(hidden)]
-pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
-#[doc(hidden)]
-pub use prepared_fit::PreparedFit;
+pub(crate) use prepared_fit::PreparedFit;
 pub use robot::{parse_robot, rewrite_robot};
 pub(crate) use start::StartModel;
 pub use sweep::{Sweep, Swept, sweep};
+pub use text::parse_system;
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
 pub use watch::{Event, Watch};
 

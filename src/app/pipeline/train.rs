@@ -69,6 +69,7 @@ struct Summary<'a> {
 
 /// Resources of a run, and its checkpoints.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct RunOptions {
     /// Threads; results do not depend on them.
     pub threads: usize,
@@ -77,8 +78,7 @@ pub struct RunOptions {
     /// Fraction of the time span of the trajectory test.
     pub span: f64,
     /// Checkpoints, if they are wanted.
-    #[doc(hidden)]
-    pub checkpoints: Option<Checkpoints>,
+    pub(crate) checkpoints: Option<Checkpoints>,
 }
 
 impl Default for RunOptions {
@@ -112,7 +112,6 @@ impl TrainReport {
     ///
     /// # Errors
     /// [`PipelineError::Format`].
-    #[doc(hidden)]
     pub fn json(&self) -> Result<String, PipelineError> {
         let summary = Summary { figures: &self.figures, evaluation: &self.evaluation };
         Ok(serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n")

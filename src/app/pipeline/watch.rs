@@ -109,8 +109,7 @@ impl Watch {
         }
     }
 
-    /// The same for a training.
-    #[doc(hidden)]
+    /// The same for a training, such as [`Trainer::train_watched`](crate::presets::Trainer::train_watched).
     pub fn hooks(&self) -> Hooks {
         let watcher = self.events.clone().map(|events| {
             let watcher: crate::training::Watcher = Arc::new(move |progress: Progress<'_>| match progress {

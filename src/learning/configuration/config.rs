@@ -439,7 +439,6 @@ impl Config {
     ///
     /// # Errors
     /// The first value out of range.
-    #[doc(hidden)]
     pub fn validate(&self, n: usize) -> Result<(), ConfigError> {
         self.faults(n).into_iter().next().map_or(Ok(()), Err)
     }

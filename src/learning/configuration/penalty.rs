@@ -40,8 +40,7 @@ macro_rules! penalties {
             pub const NAMES: &'static str = concat!("none" $(, ", ", $text)*);
 
             /// Name of its kind.
-            #[doc(hidden)]
-            pub fn kind(&self) -> &'static str {
+            pub(crate) fn kind(&self) -> &'static str {
                 match self {
                     Self::None => "none",
                     $(Self::$name { .. } => $text,)*
@@ -49,7 +48,6 @@ macro_rules! penalties {
             }
 
             /// Weight of the penalty, 0 without one.
-            #[doc(hidden)]
             pub fn lambda(&self) -> f64 {
                 match *self {
                     Self::None => 0.0,
@@ -123,7 +121,6 @@ pub enum Penalty {
 
 impl Penalty {
     /// Weight of the penalty, 0 without one.
-    #[doc(hidden)]
     pub fn lambda(self) -> f64 {
         match self {
             Self::None => 0.0,

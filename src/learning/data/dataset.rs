@@ -121,7 +121,6 @@ impl<S: Scalar> Dataset<S> {
     /// # Errors
     /// [`DatasetError`] for a scale that is not a positive number, and for states without forces or under constraints, whose forces are
     /// not known.
-    #[doc(hidden)]
     pub fn with_force_residuals(self, scale: Vec<S>) -> Result<Self, DatasetError> {
         check("scale of a force", &scale, self.coordinates, self.coordinates)?;
         check("force", &self.force, self.q.len(), self.coordinates)?;
@@ -148,7 +147,6 @@ impl<S: Scalar> Dataset<S> {
     ///
     /// # Errors
     /// As [`Dataset::with_constraints`], where a constraint is not finite.
-    #[doc(hidden)]
     pub fn on(self, manifold: &dyn Manifold<S>) -> Result<Self, DatasetError> {
         let (mut rows, mut matrix, mut drift) = (ManifoldRows::default(), Vec::new(), Vec::new());
         for (q, v) in self.q.chunks_exact(self.coordinates).zip(self.v.chunks_exact(self.coordinates)) {
@@ -164,7 +162,6 @@ impl<S: Scalar> Dataset<S> {
     ///
     /// # Errors
     /// [`DatasetError::Unreachable`] where there is no way; as [`Dataset::on`].
-    #[doc(hidden)]
     pub fn brought_to(mut self, manifold: &dyn Manifold<S>) -> Result<(Self, f64), DatasetError> {
         let n = self.coordinates;
         let mut square = 0.0;
@@ -185,7 +182,6 @@ impl<S: Scalar> Dataset<S> {
     ///
     /// # Errors
     /// [`DatasetError`] for a wrong number of weights or one that is not finite.
-    #[doc(hidden)]
     pub fn with_weights(self, weight: Vec<S>) -> Result<Self, DatasetError> {
         check("weight", &weight, self.len(), 1)?;
         Ok(Self { weight, ..self })
@@ -200,7 +196,6 @@ impl<S: Scalar> Dataset<S> {
         self.q.len() / self.coordinates
     }
     /// `true` if there is no state; never, once built.
-    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.q.is_empty()
     }
@@ -218,7 +213,6 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// Known external generalized forces `(states, n)`; empty if there are none.
-    #[doc(hidden)]
     pub fn force(&self) -> &[S] {
         &self.force
     }
@@ -229,13 +223,11 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// Number of constraints `m` of every state.
-    #[doc(hidden)]
     pub fn constraints(&self) -> usize {
         self.drift.len() / self.len()
     }
 
     /// Rows `A`, `(m, n)`, and drift `gamma`, `(m)`, of the constraints of a state.
-    #[doc(hidden)]
     pub fn constraint(&self, state: usize) -> (&[S], &[S]) {
         let m = self.constraints();
         let rows = state * m * self.coordinates..(state + 1) * m * self.coordinates;
@@ -243,7 +235,6 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// Weight of a state's residuals in the loss.
-    #[doc(hidden)]
     pub fn weight(&self, state: usize) -> S {
         self.weight.get(state).copied().unwrap_or(<S as Real>::one())
     }
@@ -307,14 +298,12 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// CRC-32 of coordinates, velocities, accelerations, forces, weights, constraints and scales of forces in double precision.
-    #[doc(hidden)]
     pub fn checksum(&self) -> u32 {
         let all = self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force).chain(&self.weight);
         checksum(all.chain(&self.rows).chain(&self.drift).chain(&self.force_scale), StoredPrecision::F64)
     }
 
     /// The same states in another precision.
-    #[doc(hidden)]
     pub fn cast<T: Scalar>(&self) -> Dataset<T> {
         let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
         Dataset {
@@ -373,7 +362,6 @@ pub struct Datasets<S> {
 
 impl<S: Scalar> Datasets<S> {
     /// Name and checksum of each set: training of every phase, validation, test.
-    #[doc(hidden)]
     pub fn checksums(&self) -> Vec<(String, u32)> {
         let training =
             self.training.iter().enumerate().map(|(k, set)| (format!("training states of phase {}", k + 1), set));

@@ -43,7 +43,6 @@ macro_rules! methods {
             pub const NAMES: &'static str = methods!(@names $($text)*);
 
             /// Its name in the literature.
-            #[doc(hidden)]
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $title,)*
@@ -122,7 +121,6 @@ pub struct Moments<S> {
 
 impl<S: Scalar> Moments<S> {
     /// Zero moments for this many parameters.
-    #[doc(hidden)]
     pub fn new(parameters: usize) -> Self {
         let zeros = vec![<S as Real>::zero(); parameters];
         Self { first: zeros.clone(), second: zeros, step: 0, bases: Vec::new() }
@@ -132,7 +130,6 @@ impl<S: Scalar> Moments<S> {
     ///
     /// # Panics
     /// If the matrices overlap or end past the parameters.
-    #[doc(hidden)]
     pub fn for_method(
         method: Method,
         parameters: usize,

@@ -14,7 +14,6 @@ mod preset;
 mod trainer;
 
 pub(crate) use measured::restructure;
-#[doc(hidden)]
 pub use measured::suggested;
 pub use preset::Preset;
 pub use trainer::{Learned, Trainer, TrainerError};

@@ -34,7 +34,6 @@ impl Preset {
     /// The configuration of a system for a Lagrangian of this structure; the presets of our own have other rates where a
     /// signature cannot be lost and, except around a centre, no weight decay and a higher clip. A black box has states off the
     /// mass shell, whatever the structure that the preset chooses itself.
-    #[doc(hidden)]
     pub fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         if self == Self::Paper {

@@ -201,7 +201,6 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     /// [`TrainerError`].
-    #[doc(hidden)]
     pub fn train_watched(self, hooks: &Hooks) -> Result<Learned, TrainerError> {
         match self.config.precision {
             Precision::F32 => self.train_in::<f32>(hooks),

@@ -23,35 +23,27 @@ mod held;
 mod hermite;
 mod hold_out;
 #[cfg(feature = "data")]
-#[doc(hidden)]
-pub mod read;
+pub(crate) mod read;
 mod reading;
-#[doc(hidden)]
-pub mod smooth;
+pub(crate) mod smooth;
 mod statistics;
-#[doc(hidden)]
-pub mod survey;
+pub(crate) mod survey;
 mod track;
 mod units;
 
 pub(crate) use clock::Clock;
-pub use columns::Columns;
-#[doc(hidden)]
-pub use columns::ColumnsError;
+pub use columns::{Columns, ColumnsError};
 pub use guess::{ColumnGuess, Guess, guess};
 pub(crate) use held::{Filled, filled, marks};
 pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
-#[doc(hidden)]
 pub use hold_out::HoldOutError;
 pub use read::{DataError, Problem, read_recording};
-pub use reading::LoadedRecording;
-#[doc(hidden)]
-pub use reading::Targets;
-#[doc(hidden)]
-pub use reading::{Bridged, Cut, Dropped, Rows};
+pub use reading::{Bridged, Cut, Dropped, LoadedRecording, Rows, Targets};
 pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};
+#[doc(hidden)]
+pub use survey::{Survey, SurveyOptions, survey};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub use units::factor;

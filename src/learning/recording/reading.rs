@@ -110,7 +110,7 @@ pub struct LoadedRecording {
     /// Meaning of the columns, which have the names of the first file's header without units; without files it is empty.
     pub columns: Columns,
     /// What was recognised in every file.
-    pub formats: Vec<FileFacts>,
+    pub(crate) formats: Vec<FileFacts>,
 }
 
 impl LoadedRecording {

@@ -73,7 +73,6 @@ impl RecordedTrajectory {
     }
 
     /// `true` if there is no sample.
-    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
@@ -106,7 +105,6 @@ impl RecordedTrajectory {
     ///
     /// # Errors
     /// The first [`TrajectoryError`].
-    #[doc(hidden)]
     pub fn validate(&self, n: usize) -> Result<(), TrajectoryError> {
         self.validate_repeated(n)?;
         match self.times.windows(2).position(|pair| pair[1] <= pair[0]) {
@@ -119,7 +117,6 @@ impl RecordedTrajectory {
     ///
     /// # Errors
     /// The first [`TrajectoryError`].
-    #[doc(hidden)]
     pub fn validate_repeated(&self, n: usize) -> Result<(), TrajectoryError> {
         let track = || self.name.clone();
         let expected = self.len() * n;
@@ -174,7 +171,6 @@ impl Recording {
     }
 
     /// Samples of all trajectories.
-    #[doc(hidden)]
     pub fn samples(&self) -> usize {
         self.tracks.iter().map(RecordedTrajectory::len).sum()
     }

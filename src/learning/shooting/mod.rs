@@ -32,15 +32,8 @@ mod settings;
 mod starts;
 mod starts_allowed;
 
-#[doc(hidden)]
-pub use fit::resume;
-#[doc(hidden)]
-pub use fit::{Fitted, Task};
-pub use fit::{ShootingError, fit};
-#[doc(hidden)]
-pub use objective::{ShootingObjective, ShootingReport};
-#[doc(hidden)]
+pub use fit::{Fitted, ShootingError, Task, fit, resume};
+pub use objective::ShootingObjective;
 pub use segments::Segments;
 pub use settings::Shooting;
-#[doc(hidden)]
 pub use starts::Curvature;

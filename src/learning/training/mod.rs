@@ -15,25 +15,20 @@ pub(crate) mod solver;
 pub(crate) mod trainer;
 pub(crate) mod violations;
 
+pub use checkpoint::CheckpointError;
+pub(crate) use checkpoint::Restored;
 #[doc(hidden)]
 pub use checkpoint::{
-    CheckpointError, CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Restored, Saved, Snapshot,
-    remove_checkpoints, saved,
+    CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Snapshot, remove_checkpoints, saved,
 };
 pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
-pub use objective::Objective;
-#[doc(hidden)]
-pub use objective::{BatchReport, ThreadsError};
+pub use objective::{BatchReport, Objective, ThreadsError};
 pub use phase::StopReason;
 pub use problem::TrainingProblem;
-#[doc(hidden)]
-pub use recipe::RecipeError;
-pub use recipe::{TrainingResult, run};
-pub use solver::Hooks;
-#[doc(hidden)]
-pub use solver::{Progress, StepError, Watcher};
+pub use recipe::{RecipeError, TrainingResult, run};
+pub use solver::{Hooks, Progress, StepError, Watcher};
 #[doc(hidden)]
 pub use trainer::{ResumeOptions, resume};
 pub use trainer::{Trained, TrainingError, train};

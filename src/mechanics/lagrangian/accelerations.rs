@@ -45,7 +45,6 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
 ///
 /// Of a positive definite matrix no pivot has to be searched for, nor of one that constraints border. Whether it is one is seen at each
 /// state: by the pivots, which follow the accelerations among the outputs.
-#[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Solved<'a, S> {
     /// The motion that was recorded, for a model that adds to these equations.

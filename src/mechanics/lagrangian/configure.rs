@@ -174,7 +174,6 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// As of [`build`](Self::build).
-    #[doc(hidden)]
     pub fn build_with(&self, inputs: Box<dyn Inputs<S>>) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let mut model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
         if let Some(forces) = self.forces() {
@@ -188,7 +187,6 @@ impl<S: Scalar> SystemInstance<S> {
         self.system.description().is_some_and(|own| own.inputs.len() > own.marks())
     }
     /// Names of the inputs of its forces.
-    #[doc(hidden)]
     pub fn inputs(&self) -> impl Iterator<Item = &str> {
         self.system.description().into_iter().flat_map(|own| own.inputs.keys().map(String::as_str))
     }
@@ -200,7 +198,6 @@ impl<S: Scalar> SystemInstance<S> {
         if self.is_timed() { Err(SystemError::Timed { system: self.system.name.to_string() }) } else { Ok(()) }
     }
     /// `true` if the Lagrangian or forces of its description depend on the time or on inputs, which are then their last coordinates.
-    #[doc(hidden)]
     pub fn is_timed(&self) -> bool {
         self.system.described.as_ref().is_some_and(|described| described.is_timed())
     }
@@ -209,7 +206,6 @@ impl<S: Scalar> SystemInstance<S> {
         self.system.described.as_ref()?.forces.as_ref()
     }
     /// The events of a system by its description, in the order of their names.
-    #[doc(hidden)]
     pub fn events(&self) -> Vec<GivenEvent<S>> {
         let events = self.system.described.as_ref().map_or(&[][..], |described| &described.events);
         events.iter().map(|event| GivenEvent::new(event.clone(), self.parameters.clone())).collect()
@@ -309,7 +305,6 @@ impl<S: Scalar> SystemInstance<S> {
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
     /// [`SystemInstance::build`] gives.
-    #[doc(hidden)]
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
         if self.forces().is_some() || self.is_timed() {
@@ -332,7 +327,6 @@ impl<S: Scalar> SystemInstance<S> {
         })
     }
     /// Index of the coordinate whose velocity the mass shell fixes.
-    #[doc(hidden)]
     pub fn constrained_coordinate(&self) -> Option<usize> {
         self.system.time_like.filter(|_| self.system.constraint.is_some())
     }
@@ -343,7 +337,6 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length.
-    #[doc(hidden)]
     pub fn impose_constraint(&self, q: &[S], v: &mut [S]) -> Result<(), SystemError> {
         self.check_lengths(q, v)?;
         let velocity = match &self.system.described {
@@ -366,7 +359,6 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// The condition that the coordinates violate.
-    #[doc(hidden)]
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
         self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }

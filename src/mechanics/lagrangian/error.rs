@@ -112,7 +112,6 @@ impl core::error::Error for MechanicsError {}
 
 impl MechanicsError {
     /// Row of the state that failed; `None` of an error that is not about one state.
-    #[doc(hidden)]
     pub fn row(&self) -> Option<usize> {
         match *self {
             Self::Singular { row, .. }

@@ -11,7 +11,6 @@ use alloc::vec::Vec;
 
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
-    #[doc(hidden)]
     pub fn clear(&mut self) {
         let Self {
             lagrangian,
@@ -67,7 +66,6 @@ impl<S: Scalar> Terms<S> {
     /// # Errors
     /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite, every such row in
     /// [`Terms::failures`]; accelerations that cannot be solved for are `NaN`, everything else is filled.
-    #[doc(hidden)]
     pub fn complete(
         &mut self,
         n: usize,

@@ -35,7 +35,6 @@ impl FormulaReading {
 
 impl<S: Scalar> SystemInstance<S> {
     /// The measured quantities of the system's file, in the order of their names; none if it has no table `[measured]`.
-    #[doc(hidden)]
     pub fn readings(&self) -> &[FormulaReading] {
         self.system.described.as_ref().map_or(&[], |described| &described.readings)
     }

@@ -27,8 +27,7 @@ mod pattern;
 mod programs;
 mod recursion;
 mod right_hand_side;
-#[doc(hidden)]
-pub mod system;
+pub(crate) mod system;
 #[doc(hidden)]
 pub mod systems;
 mod taylor;
@@ -39,26 +38,22 @@ mod wrappers;
 pub use accelerations::Accelerations;
 pub(crate) use accelerations::Solved;
 pub(crate) use configure::{LagrangianVisitor, resolve};
-pub use configure::{SystemError, SystemInstance, build, configure, systems};
-#[doc(hidden)]
-pub use configure::{configure_system, configure_values, find};
+pub use configure::{SystemError, SystemInstance, build, configure, configure_system, configure_values, find, systems};
 #[doc(hidden)]
 pub use constrained_systems::constrained_systems;
 pub(crate) use constraints::RowEquations;
 #[cfg(feature = "training")]
 pub(crate) use constraints::Tangent;
 pub(crate) use constraints::dot;
+pub(crate) use constraints::project_acceleration;
 #[cfg(feature = "data")]
 pub(crate) use constraints::take_out;
 #[cfg(feature = "training")]
 pub(crate) use constraints::{Bordered, independent_rows};
 pub use constraints::{Constrained, ConstraintError, Constraints, FormulaError};
 #[doc(hidden)]
-pub use constraints::{
-    ExpressionConstraints, FormulaConstraints, LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold,
-    ReducedMass, RowAdjoint, project, project_acceleration,
-};
-#[doc(hidden)]
+pub use constraints::{ExpressionConstraints, FormulaConstraints, LeastNorm, OffManifold, ReducedMass, project};
+pub use constraints::{Manifold, ManifoldRows, RowAdjoint};
 pub use derivatives::MetricJet;
 pub(crate) use derivatives::metric_jets;
 #[cfg(feature = "training")]
@@ -72,18 +67,13 @@ pub(crate) use description::{is_free_name, turned};
 #[cfg(feature = "training")]
 pub(crate) use equations::{EquationPart, Equations};
 pub use error::MechanicsError;
-#[doc(hidden)]
-pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics, inverse_dynamics_by_drives};
+pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
 #[cfg(feature = "cli")]
 pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
-pub use expression::ExpressionLagrangian;
 #[cfg(feature = "cli")]
 pub(crate) use expression::quantity;
-#[doc(hidden)]
-pub use expression::{Expression, ExpressionError};
-#[doc(hidden)]
+pub use expression::{ExpressionError, ExpressionLagrangian};
 pub use formula_events::GivenEvent;
-#[doc(hidden)]
 pub use formula_readings::FormulaReading;
 #[cfg(feature = "rollout")]
 pub(crate) use groups::{Regrouped, acting_groups};
@@ -91,16 +81,14 @@ pub(crate) use groups::{Regrouped, acting_groups};
 pub(crate) use groups::{group_factors, groups};
 pub use in_time::{InTime, Inputs};
 pub use linearization::{Gradient, Linearization, Linearizer};
-#[doc(hidden)]
-pub use linearization::{Held, Products, Slopes};
+pub(crate) use linearization::{Held, Products, Slopes};
 pub use mechanics::Mechanics;
 pub use pattern::{Element, Pattern};
-#[doc(hidden)]
-pub use recursion::Chain;
+pub(crate) use recursion::Chain;
 #[cfg(feature = "pipeline")]
 pub(crate) use recursion::{Matrix, Vector, applied, product, transposed};
 pub use right_hand_side::RightHandSide;
-pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System};
+pub use system::{Bounds, ClosedForm, Coordinate, Layout, Parameter, Range, Size, System, TrajectoryTest};
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
 pub use torques::Torques;

@@ -105,7 +105,6 @@ impl Layout {
 
 impl Size {
     /// The number of coordinates unless chosen otherwise.
-    #[doc(hidden)]
     pub const fn default(self) -> usize {
         match self {
             Self::Fixed(n) => n,
@@ -113,7 +112,6 @@ impl Size {
         }
     }
     /// The number of coordinates if this integer, which is within the bounds, is chosen.
-    #[doc(hidden)]
     pub const fn coordinates(self, chosen: usize) -> usize {
         match self {
             Self::Fixed(n) => n,
@@ -140,7 +138,6 @@ impl Bounds {
 
 /// The paper's trajectory test of a system.
 #[derive(Clone, Debug, PartialEq)]
-#[doc(hidden)]
 pub struct TrajectoryTest {
     /// Box of the random starts.
     pub start: Bounds,
@@ -298,12 +295,10 @@ pub struct System {
 
 impl System {
     /// The description that the system was made from; none for a system of the catalogue.
-    #[doc(hidden)]
     pub fn description(&self) -> Option<&Description> {
         self.described.as_deref().map(|described| &described.description)
     }
     /// The description as it was given, with other values of parameters, by name; none for a system of the catalogue.
-    #[doc(hidden)]
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Option<Description> {
         self.described.as_deref().map(|described| described.with_defaults(values))
     }
@@ -325,22 +320,18 @@ impl System {
         self.coordinates.of(n)
     }
     /// Box of the training states of `n` coordinates.
-    #[doc(hidden)]
     pub fn training(&self, n: usize) -> Bounds {
         self.training.of(n)
     }
     /// Box of the states of `n` coordinates on which errors are stated.
-    #[doc(hidden)]
     pub fn validation(&self, n: usize) -> Bounds {
         self.validation.of(n)
     }
     /// Trajectory test of `n` coordinates.
-    #[doc(hidden)]
     pub fn trajectory(&self, n: usize) -> TrajectoryTest {
         self.trajectory.of(n)
     }
     /// Names of the columns of a state of `n` coordinates: coordinates, then velocities (`theta1_dot`).
-    #[doc(hidden)]
     pub fn columns(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.name.to_string());
@@ -402,7 +393,6 @@ impl Range {
 
 /// Shell around a centre, and how fast what moves in it is at most.
 #[derive(Clone, Debug, PartialEq)]
-#[doc(hidden)]
 pub struct ShellAdvice {
     /// Cartesian coordinates around the centre.
     pub coordinates: Cow<'static, [usize]>,

@@ -120,7 +120,6 @@ impl<M, F> WithForces<M, F> {
     }
 
     /// The model without the force.
-    #[doc(hidden)]
     pub fn model(&self) -> &M {
         &self.model
     }

@@ -103,7 +103,6 @@ macro_rules! choices {
             pub const NAMES: &'static str = concat!($($text, ", ",)* "quadratic-softplus");
 
             /// Activation of each branch; the branches share the widths equally.
-            #[doc(hidden)]
             pub fn branches(self) -> &'static [Activation] {
                 match self {
                     $(Self::$name => &[Activation::$name],)*
@@ -118,7 +117,6 @@ crate::ops::activations! { choices }
 
 impl ActivationChoice {
     /// The name in configuration files.
-    #[doc(hidden)]
     pub fn name(self) -> &'static str {
         match self.branches() {
             [single] => single.name(),

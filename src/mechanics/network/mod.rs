@@ -20,8 +20,7 @@
 mod config;
 mod dynamics;
 #[cfg(feature = "model-files")]
-#[doc(hidden)]
-pub mod file;
+pub(crate) mod file;
 mod joint_friction;
 mod layout;
 mod model;
@@ -30,18 +29,14 @@ mod slopes;
 mod structure;
 
 pub use crate::ops::Activation;
-#[doc(hidden)]
-pub use config::UnknownActivation;
-pub use config::{ActivationChoice, Architecture, Initialization, InputLayer};
-#[doc(hidden)]
-pub use dynamics::{Dynamics, Model};
+pub use config::{ActivationChoice, Architecture, Initialization, InputLayer, UnknownActivation};
+pub(crate) use dynamics::{Dynamics, Model};
 #[cfg(feature = "model-files")]
-pub use file::{Header, ModelFile, ModelFileError};
-#[doc(hidden)]
+pub use file::{FORMAT, Header, ModelFile, ModelFileError, StoredPrecision};
 pub use joint_friction::JointFriction;
+pub use layout::initial_weights;
+pub(crate) use layout::{DissipationLayout, Layer};
 #[doc(hidden)]
-pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap, initial_weights};
+pub use layout::{Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
-pub use structure::Structure;
-#[doc(hidden)]
-pub use structure::{Factor, Form, Radial, Sizes};
+pub use structure::{Factor, Form, Radial, Sizes, Structure};

@@ -81,7 +81,6 @@ impl Architecture {
     ///
     /// # Errors
     /// The first mismatch, in words.
-    #[doc(hidden)]
     pub fn validate(&self) -> Result<(), NetworkError> {
         let n = self.coordinates;
         let fault = |text: String| Err(NetworkError::Architecture(text));
@@ -182,7 +181,6 @@ impl<S: Scalar> NetworkLagrangian<S> {
     }
 
     /// Shape of the network.
-    #[doc(hidden)]
     pub fn architecture(&self) -> &Architecture {
         &self.architecture
     }
@@ -191,7 +189,6 @@ impl<S: Scalar> NetworkLagrangian<S> {
         &self.weights
     }
     /// The same network in another precision.
-    #[doc(hidden)]
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
         NetworkLagrangian::of_valid(self.architecture.clone(), weights)

@@ -52,7 +52,6 @@ impl Architecture {
     ///
     /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per
     /// unit of time. Angles are taken as they are, not wrapped.
-    #[doc(hidden)]
     pub fn rayleigh_dissipation<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let layout = Layout::new(self);
         let (positions, velocities) = (self.position_features_of(q), self.scaled_velocities(v));

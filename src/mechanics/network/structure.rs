@@ -42,7 +42,6 @@ macro_rules! structures {
             pub const NAMES: &'static str = concat!($first_text $(, ", ", $text)*);
 
             /// The name in configuration files.
-            #[doc(hidden)]
             pub fn name(self) -> &'static str {
                 match self {
                     Self::$first => $first_text,

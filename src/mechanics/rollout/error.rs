@@ -165,7 +165,6 @@ pub enum RolloutError {
 
 impl RolloutError {
     /// Time at which the motion stopped, if it had begun.
-    #[doc(hidden)]
     pub fn time(&self) -> Option<f64> {
         match self {
             Self::Invalid { .. } | Self::OffConstraints { .. } => None,

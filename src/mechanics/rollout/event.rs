@@ -120,7 +120,6 @@ impl<S: Scalar> Event<S> {
     }
 
     /// `true` for an impact.
-    #[doc(hidden)]
     pub fn is_impact(&self) -> bool {
         self.restitution.is_some()
     }

@@ -73,7 +73,6 @@ impl<S: Scalar> SampledForce<S> {
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] for no numbers or numbers that are not finite.
-    #[doc(hidden)]
     pub fn constant(values: Vec<S>) -> Result<Self, RolloutError> {
         Self::new(values.len(), vec![<S as Real>::zero()], values)
     }
@@ -206,7 +205,6 @@ impl<'a, S: Scalar> Driven<'a, S> {
     }
 
     /// [`rollout_in_pieces`](super::rollout_in_pieces) under the force.
-    #[doc(hidden)]
     pub fn rollout_in_pieces(
         &self,
         q: &[S],
@@ -221,7 +219,6 @@ impl<'a, S: Scalar> Driven<'a, S> {
     }
 
     /// [`rollout_fixed`](super::rollout_fixed) under the force.
-    #[doc(hidden)]
     pub fn rollout_fixed(&self, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
         fixed(self.model, Some(self.force), q, v, options)
     }
@@ -230,7 +227,6 @@ impl<'a, S: Scalar> Driven<'a, S> {
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] if there is no sample, or a sample at which the model or the force cannot be evaluated.
-    #[doc(hidden)]
     pub fn energy_balance(&self, trajectory: &Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError> {
         EnergyBalance::of(trajectory, self.model, Some(self.force))
     }
@@ -239,7 +235,6 @@ impl<'a, S: Scalar> Driven<'a, S> {
     ///
     /// # Errors
     /// [`MechanicsError`] of the model; a force that is not finite.
-    #[doc(hidden)]
     pub fn acceleration(&self, t: S, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         let (mut terms, mut force) = (Terms::default(), vec![<S as Real>::zero(); q.len()]);
         self.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut terms)?;

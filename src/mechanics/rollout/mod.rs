@@ -46,24 +46,16 @@ pub use between::Between;
 pub use ensemble::{Start, rollout_many};
 #[doc(hidden)]
 pub use ensemble::{rollout_each, rollout_together};
-pub use error::RolloutError;
-#[doc(hidden)]
-pub use error::UnderflowCause;
+pub use error::{RolloutError, UnderflowCause};
 pub use event::{Event, Impact, Occurrence};
 pub use flow::{Flow, FlowGradient, FlowJacobian};
 pub use force::{Driven, Force, SampledForce};
-#[doc(hidden)]
 pub use ode::Integrable;
 pub use options::{Domain, Integrator, Options};
-#[doc(hidden)]
 pub use pieces::{Ending, EnergyBalance, rollout_in_pieces};
-#[doc(hidden)]
-pub use run::rollout_fixed;
-pub use run::{Motion, Rollout, rollout};
-#[doc(hidden)]
-pub use trajectory::StepCounts;
-pub use trajectory::Trajectory;
+pub use run::{Motion, Rollout, rollout, rollout_fixed};
 pub(crate) use trajectory::quoted;
+pub use trajectory::{StepCounts, Trajectory};
 
 use run::StepFailure;
 

@@ -51,7 +51,6 @@ pub(super) enum Adaptive {
 }
 
 /// Problem to integrate.
-#[doc(hidden)]
 pub struct Integration<'a, S> {
     pub(super) method: Adaptive,
     pub(super) rtol: S,
@@ -68,7 +67,6 @@ pub struct Integration<'a, S> {
 }
 
 /// Why an integration ended early.
-#[doc(hidden)]
 #[derive(Debug)]
 pub enum EarlyEnd<E> {
     /// The right-hand side fails ahead, however short the step.
@@ -84,7 +82,6 @@ pub enum EarlyEnd<E> {
 }
 
 /// Result of an integration.
-#[doc(hidden)]
 pub struct Ran<S, E> {
     pub(super) statistics: StepCounts,
     /// Elapsed time and state at the end of the last accepted step or at the event within it, and the size of the step.
@@ -94,9 +91,13 @@ pub struct Ran<S, E> {
     pub(super) ended: Option<EarlyEnd<E>>,
 }
 
-/// The scalars that roll-outs work in: `f32` and `f64`. The methods are compiled in this crate, once for each.
-pub trait Integrable: Scalar {
-    #[doc(hidden)]
+/// The number types of adaptive integration and of roll-outs: `f32` and `f64`. Other numbers are integrated by fixed steps
+/// ([`rollout_fixed`](super::rollout_fixed)).
+pub trait Integrable: Integrates {}
+
+/// What is compiled in this crate, once for each of these number types.
+pub trait Integrates: Scalar {
+    /// A motion from its start, sample by sample.
     fn roll_out(
         model: &dyn EulerLagrange<Self>,
         force: Option<&dyn Force<Self>>,
@@ -105,7 +106,7 @@ pub trait Integrable: Scalar {
         receivers: run::Receivers<'_, '_, Self>,
     ) -> (StepCounts, Option<RolloutError>);
 
-    #[doc(hidden)]
+    /// The solution of differential equations.
     fn integrate<E>(
         task: &Integration<'_, Self>,
         f: &mut Rhs<'_, Self, E>,
@@ -117,7 +118,9 @@ pub trait Integrable: Scalar {
 macro_rules! integrable {
     ($($float:ty)*) => {
         $(
-            impl Integrable for $float {
+            impl Integrable for $float {}
+
+            impl Integrates for $float {
                 fn roll_out(
                     model: &dyn EulerLagrange<Self>,
                     force: Option<&dyn Force<Self>>,

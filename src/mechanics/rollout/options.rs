@@ -45,7 +45,6 @@ impl Integrator {
     }
 
     /// `true` if steps are fixed and the motion is symplectic.
-    #[doc(hidden)]
     pub const fn is_structure_preserving(self) -> bool {
         !matches!(self, Self::Dopri5 | Self::Dop853)
     }

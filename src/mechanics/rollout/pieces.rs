@@ -196,7 +196,6 @@ impl<S: Scalar> Trajectory<S> {
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] if there is no sample, or a sample at which the model cannot be evaluated.
-    #[doc(hidden)]
     pub fn energy_balance(&self, model: &dyn EulerLagrange<S>) -> Result<EnergyBalance<S>, RolloutError> {
         EnergyBalance::of(self, model, None)
     }

@@ -24,7 +24,6 @@ pub struct Rollout<S> {
 
 impl<S: Scalar> Rollout<S> {
     /// `true` if `t_end` was reached, or an event that ends the motion.
-    #[doc(hidden)]
     pub fn is_complete(&self) -> bool {
         self.stop.is_none()
     }

@@ -50,7 +50,6 @@ pub(super) const CHUNK: usize = 256;
 
 impl<S: Scalar> Trajectory<S> {
     /// No states of `n` coordinates.
-    #[doc(hidden)]
     pub fn empty(coordinates: usize) -> Self {
         Self { coordinates, t: Vec::new(), q: Vec::new(), v: Vec::new(), energy: None }
     }
@@ -68,7 +67,6 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// `true` if there are no states.
-    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
@@ -83,7 +81,6 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot evaluate it.
-    #[doc(hidden)]
     pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
         let size = CHUNK * self.coordinates.max(1);
         let mut energy = Vec::with_capacity(self.len());
@@ -105,7 +102,6 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// The same states in another precision.
-    #[doc(hidden)]
     pub fn cast<T: Scalar>(&self) -> Trajectory<T> {
         let cast = |values: &[S]| values.iter().map(|&x| x.cast()).collect::<Vec<T>>();
         Trajectory {
@@ -124,7 +120,6 @@ impl<S: Scalar> Trajectory<S> {
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] if the number of columns is not `2n`.
-    #[doc(hidden)]
     pub fn to_csv<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
         Ok(self.csv_header(columns)? + &self.csv_rows())
     }
@@ -152,7 +147,6 @@ impl<S: Scalar> Trajectory<S> {
     }
 
     /// The lines of [`Trajectory::to_csv`] below its header.
-    #[doc(hidden)]
     pub fn csv_rows(&self) -> String {
         let mut text = String::new();
         for (k, t) in self.t.iter().enumerate() {

@@ -36,18 +36,16 @@ mod signature;
 mod singular;
 mod solve;
 
-#[doc(hidden)]
-pub use crate::scalar::{MatMut, MatRef};
+pub(crate) use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
 pub(crate) use batch::{Buffer, LANES};
-#[doc(hidden)]
-pub use components::components;
-#[doc(hidden)]
+pub(crate) use components::components;
 pub use condition::condition_number;
 pub use eigen::{eigenvalues, eigh};
 pub use inertia::Inertia;
+pub(crate) use inertia::Scaled;
 #[doc(hidden)]
-pub use inertia::{Scaled, adjugate, inertia, is_positive_definite, leading_minors};
+pub use inertia::{adjugate, inertia, is_positive_definite, leading_minors};
 #[doc(hidden)]
 pub use matmul::gemm;
 #[doc(hidden)]
@@ -59,9 +57,7 @@ pub(crate) use singular::singular;
 #[doc(hidden)]
 pub use singular::{MinimumNorm, minimum_norm};
 pub(crate) use solve::SMALL_PIVOT;
-#[doc(hidden)]
-pub use solve::inverse;
-pub use solve::{solve, solve_symmetric};
+pub use solve::{inverse, solve, solve_symmetric};
 
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};

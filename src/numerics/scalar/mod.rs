@@ -16,7 +16,9 @@
 //! assert!((lost - exact).abs() > 0.1 * exact && (kept - exact).abs() < 1e-15 * exact);
 //! ```
 
+mod compiled;
 mod dd;
+mod elementary;
 mod float;
 mod lanes;
 mod loops;
@@ -24,14 +26,15 @@ mod matrix;
 mod primitive;
 mod sum;
 
-pub use dd::Dd;
-#[doc(hidden)]
-pub use dd::UnreadableNumber;
+pub(crate) use compiled::Compiled;
+pub use dd::{Dd, UnreadableNumber};
+pub(crate) use elementary::Elementary;
 #[doc(hidden)]
 pub use float::{AnyFloat, Foreign};
 pub(crate) use lanes::sin_cos_lane;
 #[doc(hidden)]
-pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
+pub use lanes::sin_cos_lanes;
+pub(crate) use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 #[doc(hidden)]
 pub use loops::vectorized;
 pub(crate) use loops::{
@@ -39,25 +42,12 @@ pub(crate) use loops::{
 };
 pub(crate) use matrix::product_by_loops;
 pub use matrix::{MatMut, MatRef, Matrices};
-#[doc(hidden)]
-pub use sum::{Dots, Sum};
+pub(crate) use sum::{Dots, Sum};
 
 use alloc::string::String;
 use alloc::vec::Vec;
-use core::any::Any;
 use core::fmt::{Debug, Display};
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
-
-/// An elementary function of one number with its derivatives.
-#[doc(hidden)]
-pub trait Elementary: Copy + 'static {
-    /// `f(x)`.
-    fn value<R: Real>(self, x: R) -> R;
-    /// `(f(x), f'(x))`.
-    fn value_first<R: Real>(self, x: R) -> (R, R);
-    /// `(f(x), f'(x), f''(x))`.
-    fn jet<R: Real>(self, x: R) -> (R, R, R);
-}
 
 /// A real number that model code computes with: a float, a forward number over one, a tape variable over either.
 ///
@@ -240,14 +230,6 @@ pub trait Real:
         rows.iter_mut().zip(bias).for_each(|(row, &b)| *row += b);
         rows
     }
-}
-
-/// What a higher module compiles in this crate for each scalar: code that is generic over the scalar takes it from here, and no crate that
-/// calls such code compiles it again.
-#[doc(hidden)]
-pub trait Compiled {
-    /// A type of the module that evaluates Lagrangians.
-    fn routines() -> &'static dyn Any;
 }
 
 /// An innermost floating-point number: `f32`, `f64`, [`Dd`] or an [`AnyFloat`].

@@ -51,16 +51,15 @@ mod program;
 mod var;
 
 #[doc(hidden)]
-pub use eager::{Adjoints, Tape, TapeSize};
-pub use engine::{Depth, Evaluation, Recorded};
-#[doc(hidden)]
-pub use engine::{MixedDirections, STATES};
+pub use eager::{Adjoints, Tape};
+pub use engine::{Depth, Evaluation, MixedDirections, Recorded, STATES};
 pub use function::Function;
 pub(crate) use function::{ROWS, TANGENTS};
 pub(crate) use program::Directions;
+pub(crate) use program::Listing;
 pub use program::Tracer;
 #[doc(hidden)]
-pub use program::{Listing, Operation, Program, Replay};
+pub use program::{Operation, Program, Replay};
 #[doc(hidden)]
 pub use var::Var;
 
@@ -146,8 +145,7 @@ pub fn gradient<T: Real>(f: &impl ScalarFunction, x: &[T]) -> Result<(T, Vec<T>)
 ///
 /// # Errors
 /// The tape's, and [`TapeError::Shape`] if `out` is not as long as `x`.
-#[doc(hidden)]
-pub fn gradient_on<T: Real>(
+fn gradient_on<T: Real>(
     tape: &mut Tape<T>,
     adjoints: &mut Adjoints<T>,
     f: &impl ScalarFunction,

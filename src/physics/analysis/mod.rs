@@ -29,41 +29,37 @@ mod terms;
 mod trajectories;
 mod tube;
 
+pub(crate) use determination::{Decay, decay};
 #[doc(hidden)]
-pub use determination::{
-    Decay, Determination, Estimate, MOST_MISFIT, Observed, RANGE, constants, decay, determination, misfit,
-};
-#[doc(hidden)]
-pub use distance::{
+pub use determination::{Determination, Estimate, MOST_MISFIT, Observed, constants, determination, misfit};
+pub(crate) use distance::{
     CoordinateError, VALID, ValidTime, ValidTimes, coordinate_error, spread, valid_time, velocity_error,
 };
 pub(crate) use distance::{angle_difference, relative_error};
 pub(crate) use energy::conserved_change;
 pub use energy::{EnergyError, energy_error};
-#[doc(hidden)]
-pub use energy::{EnergyLoss, conserved_error, energy_drift, energy_loss};
-#[doc(hidden)]
-pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
+pub(crate) use energy::{EnergyLoss, conserved_error, energy_drift, energy_loss};
+pub use grid::GridError;
+pub(crate) use grid::{Axis, Grid, determinant_grid, lagrangian_grid};
 pub(crate) use grid::{
     MetricComponent, Spread, curvature_grid, curvature_scalars, grid_points, is_metric, metric_components, metric_grids,
 };
-#[doc(hidden)]
-pub use lyapunov::REGULAR;
+pub(crate) use lyapunov::REGULAR;
 pub use lyapunov::{Lyapunov, lyapunov};
+pub use prediction::PredictionError;
+pub(crate) use prediction::follow;
 #[doc(hidden)]
-pub use prediction::{
-    PredictionError, Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error,
-};
+pub use prediction::{Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error};
 pub(crate) use prediction::{coordinate_errors, window_valid_times};
+pub use statistics::ErrorDistribution;
 pub(crate) use statistics::training_instability;
-#[doc(hidden)]
-pub use statistics::{ErrorDistribution, Statistics, statistics, stretches};
+pub(crate) use statistics::{Statistics, statistics, stretches};
 pub(crate) use terms::wrong_signatures;
 pub(crate) use terms::{AffineFit, affine_fit, element_factor, matrices_at_rest, nearest_factor};
 pub use terms::{MassMatrixError, mass_matrix_error};
 #[doc(hidden)]
 pub use terms::{acceleration_errors, mass_matrix_error_within};
+pub(crate) use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
 #[doc(hidden)]
-pub use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
-#[doc(hidden)]
-pub use tube::{Tube, TubeError};
+pub use tube::Tube;
+pub(crate) use tube::TubeError;

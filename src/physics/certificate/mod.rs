@@ -46,10 +46,7 @@ mod says;
 mod search;
 mod spectrum;
 
-#[doc(hidden)]
-pub use models::Guarded;
-pub use models::certify_network;
-#[doc(hidden)]
+pub use models::{Guarded, certify_network};
 pub use search::Verdict;
 
 use crate::lagrangian::system::Bounds;
@@ -81,7 +78,6 @@ impl From<Signature> for [usize; 2] {
 
 impl Signature {
     /// Of `n` coordinates, one of which may be a time: all positive but one for the time.
-    #[doc(hidden)]
     pub fn of(n: usize, time_like: bool) -> Self {
         let negative = usize::from(time_like && n > 0);
         Self { positive: n - negative, negative }

@@ -5,6 +5,9 @@ use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Usual number of states at which a Lagrangian is examined.
+pub const EXAMINED_STATES: usize = 64;
+
 /// Eigenvalues of a mass matrix within its constraints below so many roundings of the largest count as zero.
 const ROUNDINGS: f64 = 1024.0;
 

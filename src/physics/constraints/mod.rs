@@ -18,8 +18,9 @@ mod says;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use examine::ExaminedLagrangian;
 #[doc(hidden)]
-pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
+pub use examine::{EXAMINED_STATES, examine};
 pub use samples::MotionSamples;
 
 use crate::cancellation::Cancelled;
@@ -37,12 +38,6 @@ pub(crate) const OBEDIENCE: (f64, f64) = (5.0, 0.01);
 
 /// Largest number of terms that are searched together.
 const MOST_TERMS: usize = 1000;
-/// Largest degree of terms.
-#[doc(hidden)]
-pub const MOST_DEGREE: usize = 8;
-/// Usual number of states at which a Lagrangian is examined.
-#[doc(hidden)]
-pub const EXAMINED_STATES: usize = 64;
 /// A row follows from others if the root mean square of its part outside their span is below this share.
 const OUTSIDE: f64 = 0.15;
 /// Share of the states at which a combination must have a part outside the span of the constraints found so far, and the smallest size of that
@@ -65,6 +60,11 @@ pub struct ConstraintSearch {
     pub degree: usize,
     /// Largest total degree of the coefficients of velocities.
     pub velocity_degree: usize,
+}
+
+impl ConstraintSearch {
+    /// Largest degree of terms.
+    pub const MOST_DEGREE: usize = 8;
 }
 
 impl Default for ConstraintSearch {

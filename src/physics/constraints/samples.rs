@@ -97,7 +97,6 @@ impl MotionSamples {
     ///
     /// # Errors
     /// [`SmoothError::Shape`] for a trajectory without velocities.
-    #[doc(hidden)]
     pub fn exact(recording: &Recording) -> Result<Self, SmoothError> {
         let n = recording.n();
         let mut samples = Self {

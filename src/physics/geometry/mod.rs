@@ -35,13 +35,12 @@ mod point_report;
 mod surfaces;
 mod tensors;
 
-#[doc(hidden)]
 pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn, TurningPoint};
 #[cfg(feature = "cli")]
 pub(crate) use point_report::{PointReport, Value, depends_on_velocity, point_reports};
+pub use surfaces::{Change, Character, Surface, surfaces};
 #[doc(hidden)]
-pub use surfaces::{Change, characters, grid};
-pub use surfaces::{Character, Surface, surfaces};
+pub use surfaces::{characters, grid};
 pub use tensors::{Connection, Curvature, Metric};
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};

@@ -36,7 +36,6 @@ impl<S: Scalar> Metric<S> {
     /// # Errors
     /// [`GeometryError::Shape`], [`GeometryError::NotFinite`]; [`GeometryError::Degenerate`] where it is singular to working
     /// precision in any units of the coordinates.
-    #[doc(hidden)]
     pub fn new(n: usize, components: &[S]) -> Result<Self, GeometryError> {
         super::expect_length("metric", n * n, components.len())?;
         let mut found = vec![S::nan(); n * n];

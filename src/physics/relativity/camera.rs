@@ -41,10 +41,10 @@ pub struct Camera {
     pub height: usize,
 }
 
-/// Pixels of a picture at most: minutes of work, and a gigabyte.
-pub const MOST_PIXELS: usize = 1 << 24;
-
 impl Camera {
+    /// Pixels of a picture at most: minutes of work, and a gigabyte.
+    pub const MOST_PIXELS: usize = 1 << 24;
+
     /// A camera at rest over `x` with 400 x 400 pixels of 70 degrees, at a distance and an inclination in rad.
     pub fn new(distance: f64, inclination: f64) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl Camera {
         expect(azimuth.is_finite(), "azimuth", "a finite number", azimuth)?;
         let narrow = field_of_view > 0.0 && field_of_view < PI;
         expect(narrow, "field of view", "an angle between 0 and pi", field_of_view)?;
-        let pixels = width.checked_mul(height).filter(|pixels| (1..=MOST_PIXELS).contains(pixels));
+        let pixels = width.checked_mul(height).filter(|pixels| (1..=Self::MOST_PIXELS).contains(pixels));
         expect(pixels.is_some(), "pixels", "1 to 2^24", width as f64 * height as f64)
     }
 

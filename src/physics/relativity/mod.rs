@@ -1,8 +1,7 @@
 //! Black holes, learned or written down: what is read off their metrics, and what a camera near them sees.
 //!
 //! A [`LearnedHole`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra,
-//! falls through a horizon, mass and spin ([`nearest_parameters`]), curvature, symmetries; `LearnedHole` and `nearest_parameters` take the
-//! feature `training`.
+//! falls through a horizon, mass and spin, curvature, symmetries. It takes the feature `training`.
 //!
 //! A [`Camera`] stands at a place of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
 //! followed backwards in time, by the accelerations of the model alone, until it comes from far away, where its direction is that of a point
@@ -35,27 +34,20 @@ mod sky;
 mod two_sided;
 
 pub use camera::{Camera, Observer};
-#[doc(hidden)]
-pub use camera::{MOST_PIXELS, Tetrad};
-#[doc(hidden)]
-pub use coordinates::CentralCoordinates;
-pub use coordinates::Chart;
+pub use coordinates::{CentralCoordinates, Chart};
 #[doc(hidden)]
 pub use coordinates::{depends_on_time, time_moves_alone};
 #[doc(hidden)]
 pub use orbits::orbits;
-pub use rays::{Ray, RayOutcome};
-#[doc(hidden)]
-pub use rays::{TOLERANCES, Tracing, trace};
+pub(crate) use rays::TOLERANCES;
+pub use rays::{Ray, RayOutcome, Tracing};
 #[cfg(feature = "training")]
-#[doc(hidden)]
-pub use readings::{LearnedHole, Reading, nearest_parameters};
+pub use readings::{LearnedHole, Reading};
 pub use says::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary, picture, views};
-#[doc(hidden)]
-pub use shadow::Difference;
 pub use shadow::{Edge, Outline, Shadow, outline, shadow};
 #[doc(hidden)]
-pub use sky::{Image, Sky, difference_image};
+pub use sky::difference_image;
+pub use sky::{Image, Sky};
 pub use two_sided::TwoSided;
 
 use crate::geometry::GeometryError;

@@ -23,7 +23,6 @@ pub enum Chart {
 impl Chart {
     /// The chart of a coordinate of this unit over this range: an angle that is not periodic and stays between two poles, any
     /// other angle, a number of one sign, any number. A number of unit 1 between 0 and `pi` may be a polar angle.
-    #[doc(hidden)]
     pub fn of(periodic: bool, unit: &str, [low, high]: [f64; 2]) -> Self {
         let between_poles = low > 0.0 && high < PI;
         match (periodic, unit) {
@@ -371,13 +370,11 @@ impl Basis {
     }
 
     /// Number of functions.
-    #[doc(hidden)]
     pub fn len(&self) -> usize {
         self.products.len()
     }
 
     /// `true` without functions.
-    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.products.is_empty()
     }

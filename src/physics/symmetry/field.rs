@@ -116,7 +116,6 @@ impl Field {
     }
 
     /// The gauge function as a formula; `0` without one.
-    #[doc(hidden)]
     pub fn gauge_text(&self, basis: &Basis) -> String {
         sum(self.gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f))))
     }

@@ -50,19 +50,17 @@ pub(crate) use basis::MOST_UNKNOWNS;
 pub use basis::{Basis, Chart, Degrees};
 #[doc(hidden)]
 pub use basis::{most_states, unknowns};
-#[doc(hidden)]
 pub use canonical::{Canonical, CanonicalForm};
 pub use compare::{Comparison, compare};
 pub(crate) use conserved::quadratic_unknowns;
 pub use conserved::{Conserved, Quadratic, quadratic};
 pub(crate) use field::drifts;
 pub use field::{Charge, Field, charges};
-#[doc(hidden)]
-pub use find::EXACT;
-pub use find::{Symmetries, symmetries};
+pub use find::{EXACT, Symmetries, symmetries};
+pub use null_space::Separation;
 pub(crate) use null_space::TOLERANCES;
 #[doc(hidden)]
-pub use null_space::{Separation, bases, enough, most_symmetries};
+pub use null_space::{bases, enough, most_symmetries};
 #[doc(hidden)]
 pub use sample::middle;
 pub use sample::{Invariant, Region};

@@ -279,7 +279,6 @@ impl Region {
     ///
     /// `accept` may change a velocity, such as the one that a mass shell fixes, and refuses a state by `false`; the result is
     /// shorter where it refuses nearly all.
-    #[doc(hidden)]
     pub fn states(
         &self,
         states: usize,

@@ -18,8 +18,7 @@ use lnn::cli::{CliError, Orders, Shard, Work, merge, perform, print, print_list}
 use lnn::experiments::Run;
 use lnn::findings::text_table;
 use lnn::lagrangian::SystemInstance;
-use lnn::recording::Columns;
-use lnn::recording::read::read_recording;
+use lnn::recording::{Columns, read_recording};
 use lnn::relativity::depends_on_time;
 use planned::Planned;
 use std::collections::BTreeMap;

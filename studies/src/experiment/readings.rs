@@ -6,9 +6,8 @@ use lnn::experiments::{Record, Run, RunSpread};
 use lnn::geometry::GeometryError;
 use lnn::lagrangian::SystemInstance;
 use lnn::names::{percentage, rounded};
-use lnn::network::NetworkLagrangian;
-use lnn::network::file::ModelFile;
-use lnn::pipeline::{Event, ExperimentDirectory, MODEL, Output, PipelineError, Watch};
+use lnn::network::{ModelFile, NetworkLagrangian};
+use lnn::pipeline::{Event, ExperimentDirectory, Output, PipelineError, Watch};
 use lnn::relativity::{CentralCoordinates, LearnedHole, Reading};
 use lnn::report::Report;
 use std::sync::atomic::Ordering;
@@ -131,6 +130,7 @@ fn readings_of(run: &Run, store: &ExperimentDirectory) -> Result<Vec<Reading>, P
     if let Some(readings) = store.read(&run.name, READINGS).and_then(|json| serde_json::from_slice(&json).ok()) {
         return Ok(readings);
     }
+    const MODEL: &str = "model.safetensors";
     let Some(bytes) = store.read(&run.name, MODEL) else { return Ok(Vec::new()) };
     let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
     let ModelFile { header, weights } = ModelFile::<f64>::from_bytes(&bytes).map_err(wrong)?;

@@ -18,8 +18,7 @@ use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_model, form
 use lnn::lagrangian::configure;
 use lnn::network::Structure;
 use lnn::presets::Preset;
-use lnn::recording::Columns;
-use lnn::recording::read::read_recording;
+use lnn::recording::{Columns, read_recording};
 use lnn::training::{Hooks, run as train};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

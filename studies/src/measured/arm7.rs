@@ -87,10 +87,12 @@ pub fn compare(
         let truth = held_out(seed, seconds);
         for targets in [Targets::Forces, Targets::Smoothed] {
             let [joints, torques] = ["q", "tau"].map(names);
-            let fit = Fit::new(&file).targets(targets).threads(threads).columns(|columns| {
-                columns.coords = joints.clone();
-                (columns.periodic, columns.force, columns.time) = (joints, torques, Some("t".to_string()));
-            });
+            let fit = Fit::new(&file).options(|options| options.targets = Some(targets)).threads(threads).columns(
+                |columns| {
+                    columns.coords = joints.clone();
+                    (columns.periodic, columns.force, columns.time) = (joints, torques, Some("t".to_string()));
+                },
+            );
             let fit = match targets {
                 Targets::Forces => fit,
                 _ => fit.structure(Structure::Mechanical).friction(true),

@@ -3,12 +3,11 @@
 //! At every tick of the clock of what falls its place and the coordinate time are taken, all four with noise of a part of the distance.
 
 use super::recorded_orbits::{self, Orbit, distance};
-use lnn::configuration::{Precision, Regularizer, Scaling};
+use lnn::configuration::{Regularizer, Scaling};
 use lnn::lagrangian::{SystemInstance, configure};
 use lnn::network::Structure;
-use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
-use lnn::recording::smooth::{SmoothOptions, Smoothing};
-use lnn::recording::{LoadedRecording, RecordedTrajectory, Recording, Targets};
+use lnn::pipeline::{Fit, FitConfig};
+use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions, Smoothing, Targets};
 use lnn::relativity::{CentralCoordinates, Chart, LearnedHole, Reading};
 use std::time::Instant;
 
@@ -123,10 +122,19 @@ fn accelerations(orbits: usize, noise: f64) -> [Vec<f64>; 2] {
 
 /// Fits one recording as `lnn fit` does, and reads the hole.
 fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, usize)) -> Vec<Reading> {
-    let loaded = LoadedRecording::from(recording(way, &recorded_orbits::orbits(orbits, noise, 0)));
-    let options = FitOptions { targets: Some(Targets::Smoothed), ..FitOptions::default() };
-    let prepared = PreparedFit::new(&loaded, &options).expect("long orbits");
-    let mut config = prepared.suggest("orbits", Precision::F32).expect("states with full windows");
+    let fit = Fit::recording(recording(way, &recorded_orbits::orbits(orbits, noise, 0)))
+        .options(|options| options.targets = Some(Targets::Smoothed))
+        .configure(move |config| choose(config, way, epochs))
+        .threads(threads);
+    let (system, learned) = (way.system(), fit.run().expect("a fit").network);
+    let exact = system.build().expect("the defaults are valid");
+    let range = if way == Way::Spherical { (3.0, 36.0) } else { (2.5, 36.0) };
+    let pair = LearnedHole { exact: &*exact, learned: &learned, system: &system, around: way.around(), range };
+    pair.readings().expect("an exact metric")
+}
+
+/// What is chosen beside the usual configuration, for a way to learn.
+fn choose(config: &mut FitConfig, way: Way, epochs: Option<usize>) {
     let training = &mut config.training;
     let time = || "t".to_string();
     training.network.time_like = Some(time());
@@ -148,13 +156,6 @@ fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, 
         (training.phases[0].epochs, training.phases[0].t_max) = (epochs, epochs as f64);
         training.network.hidden = vec![8];
     }
-    let run = RunOptions { threads, ..RunOptions::default() };
-    let fitted = fit(&prepared, &config, &run, &InMemory::default(), &Watch::default()).expect("a fit");
-    let (system, learned) = (way.system(), fitted.network);
-    let exact = system.build().expect("the defaults are valid");
-    let range = if way == Way::Spherical { (3.0, 36.0) } else { (2.5, 36.0) };
-    let pair = LearnedHole { exact: &*exact, learned: &learned, system: &system, around: way.around(), range };
-    pair.readings().expect("an exact metric")
 }
 
 /// Prints and returns rows `learned by,orbits,noise,quantity,error,seconds`.

@@ -1,9 +1,7 @@
 //! Recorded rows read and surveyed as `lnn check FILE --coords q1,q2` does: seconds, and the memory that it took.
 
 use lnn::random::RngStream;
-use lnn::recording::Columns;
-use lnn::recording::read::read_recording;
-use lnn::recording::survey::{Survey, SurveyOptions, survey};
+use lnn::recording::{Columns, Survey, SurveyOptions, read_recording, survey};
 use rand_distr::{Distribution, StandardNormal};
 use std::fs::File;
 use std::io::{BufWriter, Write};

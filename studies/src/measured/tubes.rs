@@ -4,8 +4,7 @@ use super::Scale;
 use super::determination::{CASES, Case, learn};
 use lnn::analysis::{Tube, Window, predict_by_motion};
 use lnn::data::StateEstimate;
-use lnn::recording::Recording;
-use lnn::recording::smooth::{SmoothOptions, Smoothing};
+use lnn::recording::{Recording, SmoothOptions, Smoothing};
 use lnn::rollout::Between;
 
 /// Systems whose models predict the motion.

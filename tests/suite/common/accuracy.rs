@@ -1,7 +1,6 @@
 //! Errors of a system's outputs in units of rounding and condition.
 
-use lnn::lagrangian::system::Bounds;
-use lnn::lagrangian::{self, EulerLagrange, Request, SystemInstance, Terms};
+use lnn::lagrangian::{self, Bounds, EulerLagrange, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::scalar::{Dd, Scalar};
 use rand::Rng;

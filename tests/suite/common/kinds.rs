@@ -1,10 +1,10 @@
 //! A model file of every kind that the program writes, with weights of no meaning.
 
 use lnn::lagrangian::Description;
-use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, InputLayer, JointFriction, Layout, Radial, Sizes, Structure,
 };
+use lnn::network::{FORMAT, Header, ModelFile, StoredPrecision};
 use serde_json::json;
 use std::collections::BTreeMap;
 

@@ -1,7 +1,8 @@
 //! The program `lnn` from outside: runs with a time limit, files to give it, a small model.
 
-use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout};
+use lnn::network::{
+    ActivationChoice, Architecture, FORMAT, Form, Header, InputLayer, Layout, ModelFile, StoredPrecision,
+};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,8 +1,9 @@
 //! Relativistic systems: mass shell, signature, the ends of their charts; energy of every system along its motion.
 
 use crate::common::accuracy::{cast, configure, input_conditions, outputs, random_state, recast};
-use lnn::lagrangian::system::{Bounds, System};
-use lnn::lagrangian::{self, EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, SystemInstance, Terms};
+use lnn::lagrangian::{
+    self, Bounds, EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, System, SystemInstance, Terms,
+};
 use lnn::linalg::{self, Inertia};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Real, Scalar};

@@ -132,15 +132,15 @@ fn closed_forms_agree<S: Scalar>(rng: &mut ChaCha8Rng) {
     for system in lagrangian::systems() {
         // Of a size that is chosen, all with up to twelve coordinates.
         for chosen in match system.size {
-            lagrangian::system::Size::Fixed(n) => n..=n,
-            lagrangian::system::Size::Chosen { least, .. } => least..=8,
+            lagrangian::Size::Fixed(n) => n..=n,
+            lagrangian::Size::Chosen { least, .. } => least..=8,
         } {
             let (n, text) = (system.size.coordinates(chosen), chosen.to_string());
             if n > 12 {
                 continue;
             }
             let given = [("n", text.as_str())];
-            let given = if matches!(system.size, lagrangian::system::Size::Fixed(_)) { &given[..0] } else { &given };
+            let given = if matches!(system.size, lagrangian::Size::Fixed(_)) { &given[..0] } else { &given };
             let configured = configure::<S>(&system.name, given);
             let wide: SystemInstance<Dd> = recast(&configured);
             let (built, judge) = (configured.build().unwrap(), wide.build().unwrap());

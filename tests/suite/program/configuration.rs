@@ -4,7 +4,7 @@
 use crate::common::program::{Folder, lnn, piped, text};
 use lnn::cli::parse_config;
 use lnn::configuration::{Config, Regularizer};
-use lnn::network::file::ModelFile;
+use lnn::network::ModelFile;
 use std::fs;
 
 /// A training so small that it takes a moment.

@@ -3,7 +3,7 @@
 #![cfg(feature = "cli")]
 
 use crate::common::program::{Folder, lnn, model, piped, text};
-use lnn::network::file::ModelFile;
+use lnn::network::ModelFile;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

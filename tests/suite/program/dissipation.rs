@@ -2,8 +2,7 @@
 #![cfg(feature = "cli")]
 
 use crate::common::program::{Folder, lnn, model, text};
-use lnn::network::file::ModelFile;
-use lnn::network::{Layout, NetworkLagrangian};
+use lnn::network::{Layout, ModelFile, NetworkLagrangian};
 use lnn::rollout::{Integrator, Options, rollout};
 use serde_json::Value;
 use std::fs;

@@ -4,7 +4,7 @@
 use crate::common::damped;
 use crate::common::program::{Folder, Run, joined, lead, lnn, text};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::file::ModelFile;
+use lnn::network::ModelFile;
 use lnn::rollout::{Integrator, Options, rollout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

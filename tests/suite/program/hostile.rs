@@ -40,7 +40,7 @@
 
 use crate::common::program::{Folder, HEADER, Run, command, inspect, lnn, model, text};
 use lnn::lagrangian::configure;
-use lnn::network::file::ModelFile;
+use lnn::network::ModelFile;
 use lnn::presets::Preset;
 use std::fs;
 use std::process::Command;

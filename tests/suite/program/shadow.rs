@@ -2,8 +2,7 @@
 
 use crate::common::program::{Folder, lnn, text};
 use lnn::lagrangian::configure;
-use lnn::network::Layout;
-use lnn::network::file::{Header, ModelFile, StoredPrecision};
+use lnn::network::{Header, Layout, ModelFile, StoredPrecision};
 use serde_json::Value;
 use std::fs;
 
@@ -27,7 +26,7 @@ fn flat_network(folder: &Folder) -> String {
     let weights = vec![0.0; Layout::new(&architecture).parameters];
     let columns = system.system.columns(4);
     let header = Header {
-        format: lnn::network::file::FORMAT,
+        format: lnn::network::FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         architecture,
         system: "schwarzschild-cartesian".to_string(),

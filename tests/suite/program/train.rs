@@ -4,7 +4,7 @@
 use crate::common::program::{joined, lead, said_by};
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
-use lnn::network::file::ModelFile;
+use lnn::network::ModelFile;
 use lnn::presets::Preset;
 use serde_json::Value;
 use std::fs;

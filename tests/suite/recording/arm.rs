@@ -1,7 +1,6 @@
 //! Runs of a two-link arm of very different pace, one of them whirling: no run chooses the windows of the others.
 
-use lnn::recording::smooth::{SmoothOptions, Smoothing};
-use lnn::recording::{RecordedTrajectory, Recording};
+use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions, Smoothing};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,9 +1,7 @@
 //! Recordings with dropped frames and uneven clocks beside the same without.
 
 use lnn::lagrangian::{Request, Terms, build};
-use lnn::recording::read::read_recording;
-use lnn::recording::smooth::{SmoothOptions, Smoothing};
-use lnn::recording::{Columns, LoadedRecording};
+use lnn::recording::{Columns, LoadedRecording, SmoothOptions, Smoothing, read_recording};
 use lnn::rollout::{Options, rollout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,7 @@
 //! Derivatives of a simulated double pendulum's positions, with noise, against its exact velocities and accelerations.
 
 use lnn::lagrangian::{Request, Terms, build};
-use lnn::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
-use lnn::recording::{RecordedTrajectory, Recording};
+use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions, Smoothed, Smoothing};
 use lnn::rollout::{Options, rollout};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -2,7 +2,7 @@
 
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Terms, systems::DoublePendulum};
-use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::network::{ModelFile, NetworkLagrangian};
 use lnn::rollout::Options;
 use lnn::training::Objective;
 use lnn::{analysis, linalg, network, recording, rollout as motion, scalar, storage, tape, training};
@@ -31,7 +31,6 @@ const _: () = {
     shared::<Options<f64>>();
     shared::<recording::Recording>();
     shared::<linalg::Workspace<f64>>();
-    shared::<network::Dynamics<f32>>();
     shared::<lnn::tape::Evaluation<f32>>();
 
     error::<lnn::lagrangian::MechanicsError>();
@@ -41,7 +40,7 @@ const _: () = {
     error::<motion::UnderflowCause>();
     error::<network::NetworkError>();
     error::<network::UnknownActivation>();
-    error::<network::file::ModelFileError>();
+    error::<network::ModelFileError>();
     error::<recording::TrajectoryError>();
     error::<scalar::UnreadableNumber>();
     error::<storage::ReadError>();

@@ -1,8 +1,7 @@
 //! The page of the model format: every key, value and tensor that the program writes, and none that it does not.
 
 use crate::common::kinds::kinds;
-use lnn::network::file::{Header, ModelFile};
-use lnn::network::{ActivationChoice, Factor, Structure};
+use lnn::network::{ActivationChoice, Factor, Header, ModelFile, Structure};
 use safetensors::SafeTensors;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;

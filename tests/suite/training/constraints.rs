@@ -3,7 +3,7 @@
 use lnn::configuration::Penalty;
 use lnn::data::{Dataset, DatasetError};
 use lnn::lagrangian::{EulerLagrange, FormulaConstraints, configure, project};
-use lnn::network::file::ModelFile;
+use lnn::network::ModelFile;
 use lnn::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,
 };

@@ -4,8 +4,9 @@ use super::faulty::{Fault, Faulty};
 use lnn::configuration::Config;
 use lnn::data::sample_all;
 use lnn::lagrangian::configure;
-use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout};
+use lnn::network::{
+    ActivationChoice, Architecture, FORMAT, Form, Header, InputLayer, Layout, ModelFile, StoredPrecision,
+};
 use lnn::presets::Preset;
 use lnn::storage::{Disk, Files, write_whole};
 use lnn::training::{

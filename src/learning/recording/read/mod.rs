@@ -51,7 +51,7 @@ const MAX_BYTES: u64 = 1 << 36;
 /// byte order), the first sheet of an Excel workbook (`.xlsx`), anything else is text of numbers, separated by commas, semicolons,
 /// tabs, bars or blanks, with or without a header and with comments behind a `#`; lines end with LF, CR LF, or CR in all of the file.
 /// Text may be packed by gzip, and be in UTF-8, UTF-16 or Windows-1252; its decimals have a point or a comma. What was recognised is
-/// kept in [`LoadedRecording::formats`].
+/// kept in the [`LoadedRecording`].
 ///
 /// Numbers are converted to SI, by the units of the description or else by those in brackets behind the names of a header; angles are
 /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps

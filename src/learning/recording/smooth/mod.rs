@@ -165,7 +165,6 @@ impl Smoothed {
     }
 
     /// Samples with full windows.
-    #[doc(hidden)]
     pub fn interior(&self) -> std::ops::Range<usize> {
         let [before, after] = self.margins;
         let end = self.times.len().saturating_sub(after);
@@ -173,7 +172,6 @@ impl Smoothed {
     }
 
     /// `true` for a sample with a full window that no gap spoils.
-    #[doc(hidden)]
     pub fn is_full(&self, sample: usize) -> bool {
         self.interior().contains(&sample) && self.lacking.binary_search(&sample).is_err()
     }

@@ -38,13 +38,11 @@ pub struct Quality {
 
 impl Quality {
     /// Root mean square error of position, velocity (1) or acceleration (2): noise and bias together.
-    #[doc(hidden)]
     pub fn total(&self, derivative: usize) -> f64 {
         self.error[derivative].hypot(self.bias[derivative])
     }
 
     /// Error of the acceleration over its size; 0 if nothing accelerates.
-    #[doc(hidden)]
     pub fn relative(&self) -> f64 {
         let total = self.total(2);
         if total == 0.0 { 0.0 } else { total / self.acceleration }

@@ -13,7 +13,7 @@ mod fingerprint;
 mod format;
 mod manager;
 
-pub use fingerprint::{Fingerprint, Saved};
+pub use fingerprint::Fingerprint;
 pub use manager::{
     CheckpointError, CheckpointInterval, CheckpointManager, LATEST, PREVIOUS, Restored, remove_checkpoints, saved,
 };

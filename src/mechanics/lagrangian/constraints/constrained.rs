@@ -160,7 +160,6 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
     ///
     /// # Errors
     /// [`ConstraintError::Contradiction`] if none of the states can be, [`ConstraintError::TooMany`] if no motion is left.
-    #[doc(hidden)]
     pub fn independent(mut self, q: &[S], v: &[S]) -> Result<Self, ConstraintError> {
         let n = self.model.coordinates().max(1);
         let (mut needed, mut nearest): (Vec<usize>, Option<super::OffManifold>) = (Vec::new(), None);

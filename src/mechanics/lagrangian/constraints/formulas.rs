@@ -87,7 +87,6 @@ impl FormulaConstraints {
     ///
     /// # Errors
     /// [`FormulaError`].
-    #[doc(hidden)]
     pub fn new(coordinates: &[impl AsRef<str>], formulas: BTreeMap<String, String>) -> Result<Self, FormulaError> {
         if formulas.is_empty() || formulas.len() > MOST {
             return Err(FormulaError::Number(formulas.len()));
@@ -140,7 +139,6 @@ impl FormulaConstraints {
     ///
     /// # Errors
     /// None, since the coordinates are their own.
-    #[doc(hidden)]
     pub fn manifold<S: Scalar>(&self) -> Result<impl Manifold<S> + use<S>, ConstraintError> {
         self.alone()
     }

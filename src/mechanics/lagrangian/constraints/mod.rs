@@ -31,7 +31,7 @@ pub(crate) use equations::{RowEquations, Tangent};
 pub use formulas::{FormulaConstraints, FormulaError};
 pub(crate) use kkt::Bordered;
 pub(super) use kkt::{Motion, accelerate};
-pub use least_norm::{LeastNorm, LeastNormMotion};
+pub use least_norm::LeastNorm;
 pub use manifold::{Manifold, ManifoldRows, RowAdjoint};
 pub(super) use projection::along_rows;
 pub use projection::{OffManifold, project, project_acceleration};

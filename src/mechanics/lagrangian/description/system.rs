@@ -52,7 +52,6 @@ impl Description {
     ///
     /// # Errors
     /// The first key that is wrong, and how.
-    #[doc(hidden)]
     pub fn system(&self) -> Outcome<System> {
         let taken = constrained_description(&self.name);
         if systems().iter().any(|system| system.name == self.name)

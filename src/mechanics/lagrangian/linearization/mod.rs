@@ -22,7 +22,6 @@ use alloc::vec::Vec;
 use differences::Differences;
 
 /// A batch of states with their accelerations and multipliers, which are held.
-#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Held<'a, S> {
     /// Number of coordinates `n`.
@@ -38,7 +37,6 @@ pub struct Held<'a, S> {
 }
 
 /// Sums of a [`Slopes::add_products`].
-#[doc(hidden)]
 #[derive(Debug)]
 pub struct Products<'a, S> {
     /// By the coordinates, `(batch, n)`.
@@ -71,7 +69,6 @@ impl<S: Scalar> Products<'_, S> {
 
 /// Derivatives of the equations of motion `f = [g - c + Q - M a + A^T lambda; -(A a + gamma)]`, `n + m` of them, by the state and the
 /// parameters, with `a` and `lambda` held. Buffers are reused.
-#[doc(hidden)]
 pub trait Slopes<S: Scalar> {
     /// Adds `df/d(q, v)` to matrices `(batch, n + m, 2 n)`.
     ///

@@ -149,7 +149,6 @@ impl<R> Default for Passes<R> {
 }
 
 /// A tree of links with its constants.
-#[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Chain<R> {
     links: Vec<Link<R>>,

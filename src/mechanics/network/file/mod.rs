@@ -52,7 +52,6 @@ impl<S: Scalar> ModelFile<S> {
     ///
     /// # Errors
     /// A header that contradicts itself, a wrong number of weights, a weight that is not finite.
-    #[doc(hidden)]
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelFileError> {
         self.header.validate()?;
         let slots = slots(&self.header.architecture)?;
@@ -82,7 +81,6 @@ impl<S: Scalar> ModelFile<S> {
     ///
     /// # Errors
     /// [`ModelFileError`] for anything but a whole, undamaged model file of this format.
-    #[doc(hidden)]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelFileError> {
         let (header, file) = unpack::<Header>(&MODEL, bytes)?;
         header.validate()?;
@@ -187,7 +185,6 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
 }
 
 /// Format that this version writes and reads.
-#[doc(hidden)]
 pub const FORMAT: u32 = 1;
 
 /// Most coordinates of a model: the memory of an evaluation grows with their square, that of a file does not.
@@ -296,7 +293,6 @@ impl Header {
     ///
     /// # Errors
     /// [`ContainerError::Header`] for constraints that contradict each other or leave no motion, or a network of other coordinates.
-    #[doc(hidden)]
     pub fn constrain<'a, S: Scalar>(
         &self,
         network: Box<dyn EulerLagrange<S> + 'a>,

@@ -40,7 +40,6 @@ macro_rules! table {
             }
 
             /// The name, as in configuration files.
-            #[doc(hidden)]
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $text,)*
@@ -91,7 +90,6 @@ table! {
 
 impl Activation {
     /// The activation of any kind of real number.
-    #[doc(hidden)]
     pub fn apply<R: Real>(self, x: R) -> R {
         self.operation().map_or(x, |operation| operation.evaluate(x))
     }
@@ -131,13 +129,11 @@ impl Activation {
     ///
     /// Closed forms, each accurate to a few units of rounding times its own condition number `1 + |x f^(k+1) / f^(k)|`,
     /// into the tails until underflow; finite for every finite `x` but the value of the quadratic.
-    #[doc(hidden)]
     pub fn derivatives<S: Scalar>(self, x: S) -> Jet<S> {
         each_activation!(self, jet => jet(x))
     }
 
     /// `f = act(z)` elementwise. All slices have the same length.
-    #[doc(hidden)]
     pub fn value<S: Scalar>(self, z: &[S], f: &mut [S]) {
         each_activation!(self, jet => {
             let n = z.len();
@@ -149,7 +145,6 @@ impl Activation {
     }
 
     /// Value and first derivative, elementwise. All slices have the same length.
-    #[doc(hidden)]
     pub fn jet1<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S]) {
         each_activation!(self, jet => {
             let n = z.len();
@@ -161,7 +156,6 @@ impl Activation {
     }
 
     /// Value and two derivatives, elementwise. All slices have the same length.
-    #[doc(hidden)]
     pub fn jet2<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S], d2: &mut [S]) {
         each_activation!(self, jet => {
             let n = z.len();
@@ -173,7 +167,6 @@ impl Activation {
     }
 
     /// Value and three derivatives, elementwise. All slices have the same length.
-    #[doc(hidden)]
     pub fn jet3<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S], d2: &mut [S], d3: &mut [S]) {
         each_activation!(self, jet => {
             let n = z.len();

@@ -25,7 +25,6 @@ impl Dd {
 
     /// The sum `high + low`, renormalised so that `high` is its nearest `f64`.
     #[inline]
-    #[doc(hidden)]
     pub fn new(high: f64, low: f64) -> Self {
         Self::sum(high, low)
     }

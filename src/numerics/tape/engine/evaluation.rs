@@ -212,7 +212,6 @@ impl<S: Scalar> Evaluation<S> {
     }
 
     /// Gradient of the first derivative `u . dL/d(v/s)`, with `u` the directions' `s`.
-    #[doc(hidden)]
     pub fn add_momentum_gradient(
         &mut self,
         parameters: &[S],
