@@ -147,6 +147,11 @@ impl FirstLook {
         laws
     }
 
+    /// `true` if the velocities follow from the positions and other columns: see [`lnn check`](crate::docs::commands#lnn-check).
+    pub fn is_first_order(&self) -> bool {
+        self.survey.first_order.is_some()
+    }
+
     /// `true` if a formula is to be looked for with friction: it has terms of friction, or none was found in time.
     pub fn has_friction(&self) -> bool {
         self.unfinished || self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
