@@ -81,7 +81,9 @@ fn driven(tanks: bool, draw: &mut Draw) -> LoadedRecording {
 /// A recording with one more quantity.
 fn beside(recording: Recording, inputs: Vec<Vec<f64>>) -> LoadedRecording {
     let columns = Columns { input: vec!["u".to_string()], ..Columns::default() };
-    LoadedRecording { inputs, columns, ..LoadedRecording::from(recording) }
+    let mut reading = LoadedRecording::from(recording);
+    (reading.inputs, reading.columns) = (inputs, columns);
+    reading
 }
 
 /// A recording with a tone that has nothing to do with it.
