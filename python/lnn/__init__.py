@@ -25,7 +25,7 @@ _WHERE = {
     **dict.fromkeys(["Checked", "Comparison", "Shadow", "Surface", "Swept", "View"], "_results"),
     **dict.fromkeys(["Bodies", "Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
     **dict.fromkeys(["Identified", "IdentifiedConstant", "InverseDynamics", "Learned", "Linearization", "Outlier", "OwnConstraints"], "_results"),
-    **dict.fromkeys(["Event", "Residual", "SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
+    **dict.fromkeys(["Event", "PeriodicDrive", "Residual", "SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
 }
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ._readings import check, find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
     from ._results import Bodies, Certificate, Checked, Combination, Comparison, Constraint, Constraints, Event, Formula, Geometry, Identified, IdentifiedConstant
-    from ._results import InverseDynamics, Learned, Linearization, Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory
+    from ._results import InverseDynamics, Learned, Linearization, Outlier, OwnConstraints, PeriodicDrive, Residual, SensorConstant, Symmetries, Trajectory
     from ._results import Shadow, Surface, Swept, Undetermined, View
     from ._views import compare, shadow
     from .reader import Terms

@@ -1,0 +1,370 @@
+//! Frequencies of a periodic drive, in what libraries without one leave of the motion.
+//!
+//! The weak form of a library leaves a mean acceleration in every window. A drive shows in them as a spectral line: as a force on a coordinate,
+//! `cos(om t)`, or as a factor of a function of the coordinates. Its power is compared with that of the neighbouring frequencies, so that a
+//! continuous spectrum, of noise or of what the library lacks, has no line.
+
+use super::find::{WeakForm, best};
+use super::function::{Factor, Function};
+use super::library::{Kind, Library};
+use super::motion::{Model, Motion};
+use super::prepared::Prepared;
+use crate::cancellation::Cancellation;
+use crate::linalg::dot;
+use crate::names::rounded;
+use crate::recording::RecordedTrajectory;
+use std::collections::BTreeSet;
+use std::f64::consts::{LN_2, PI, TAU};
+
+/// Smallest number of periods in the longest trajectory.
+const LEAST_PERIODS: f64 = 3.0;
+/// Largest product of a frequency and the width of the test functions, which damp faster drives.
+const MOST_DAMPED: f64 = 15.0;
+/// Frequencies that are looked at within the resolution of the recording, and their largest number.
+const OVERSAMPLED: f64 = 4.0;
+const MOST_FREQUENCIES: f64 = 50_000.0;
+/// Distance from a line, in units of the resolution, of the frequencies that show the spectrum without it; and their smallest number, in the
+/// same units.
+const BESIDE: [f64; 2] = [2.0, 14.0];
+const LEAST_BESIDE: f64 = 6.0;
+/// Largest rate of false alarms, for all frequencies that are looked at together.
+const MOST_ALARMS: f64 = 1e-3;
+/// Independent frequencies for each unit of the resolution, of which a maximum is taken.
+const INDEPENDENT: f64 = 3.0;
+/// Largest number of terms whose effect is removed from the motion first.
+const MOST_REMOVED: usize = 20;
+
+/// What a library leaves of the motion.
+pub(super) struct Rest {
+    /// Times of the windows, in s.
+    times: Vec<f64>,
+    /// Errors of their accelerations, `(windows, n)`.
+    errors: Vec<f64>,
+    /// The same for everything that a drive may multiply, with a factor of 1.
+    driven: Vec<Vec<f64>>,
+    n: usize,
+    /// Lowest and highest frequency, in rad/s.
+    band: [f64; 2],
+    /// Resolution of the longest trajectory, and of the whole recording.
+    resolution: [f64; 2],
+}
+
+/// A line of the spectrum.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    /// Its angular frequency, in rad/s.
+    pub frequency: f64,
+    /// Rate of false alarms, for all frequencies together.
+    pub alarms: f64,
+}
+
+/// Time from the first to the last sample of a trajectory.
+fn span(track: &RecordedTrajectory) -> f64 {
+    track.times.last().zip(track.times.first()).map_or(0.0, |(last, first)| last - first)
+}
+
+/// Time from the first to the last sample of the longest trajectory.
+fn longest(data: &Prepared<'_>) -> f64 {
+    data.recording.tracks.iter().map(span).fold(0.0, f64::max)
+}
+
+impl Rest {
+    /// What the best choice of terms leaves in the windows that are not held out; `None` without a choice.
+    pub fn of(weak: &WeakForm, data: &Prepared<'_>, held: &BTreeSet<usize>) -> Option<Self> {
+        let WeakForm { library, quotient, windows, path } = weak;
+        let choice = best(path)?;
+        let kept = |at: &usize| quotient.kept[*at];
+        let still = |at: &usize| library.kinetic(kept(at)).is_none();
+        let mut removed: Vec<usize> = path.order.iter().copied().filter(still).take(MOST_REMOVED).collect();
+        removed.extend(choice.set.iter().filter(|at| still(at) && !path.order[..].contains(at)));
+        let shaken: Vec<usize> = library
+            .driven()
+            .iter()
+            .skip(library.n())
+            .filter_map(|f| (0..quotient.kept.len()).find(|at| is_potential(library, kept(at), f)))
+            .collect();
+        let of = |set: &[usize]| windows.columns(&choice.coefficients, set, &data.sigma);
+        let [own, units] = of(&choice.set);
+        let mut errors = vec![0.0; windows.len() * data.n];
+        let c = choice.set.iter().map(|&at| choice.coefficients[at]);
+        own.iter().zip(c).for_each(|(column, c)| add(&mut errors, c, column));
+        for (j, unit) in units.iter().enumerate().filter(|_| windows.driven()) {
+            let of = |at: usize| windows.forces[at / data.n * data.n + j];
+            errors.iter_mut().zip(unit).enumerate().for_each(|(at, (e, u))| *e -= of(at) * u);
+        }
+        let learned: Vec<usize> = (0..windows.len()).filter(|&w| !held.contains(&windows.blocks[w])).collect();
+        let some = |column: &[f64]| -> Vec<f64> {
+            learned.iter().flat_map(|w| &column[w * data.n..(w + 1) * data.n]).copied().collect()
+        };
+        let mut errors = some(&errors);
+        remove(&mut errors, of(&removed)[0].iter().map(|column| some(column)));
+        let driven = units.iter().chain(&of(&shaken)[0]).map(|column| some(column)).collect();
+        let times: Vec<f64> = learned.iter().map(|&w| windows.centres[w]).collect();
+        let ends = [times.iter().copied().fold(f64::INFINITY, f64::min), times.iter().copied().fold(0.0, f64::max)];
+        let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+        let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
+        let band = [TAU * LEAST_PERIODS / longest, (MOST_DAMPED / data.width().0).min(PI / apart)];
+        let resolution = [TAU / longest, TAU / (ends[1] - ends[0]).max(longest)];
+        Some(Self { times, errors, driven, n: data.n, band, resolution })
+    }
+
+    /// The most significant line; `None` if none stands out.
+    pub fn line(&self, stop: &Cancellation) -> Option<Line> {
+        let [low, high] = self.band;
+        let step = self.resolution[1] / OVERSAMPLED;
+        let count = (high - low) / step;
+        if !(2.0..MOST_FREQUENCIES).contains(&count) {
+            return None;
+        }
+        let grid: Vec<f64> = (0..=count as usize).map(|k| low + k as f64 * step).collect();
+        let powers: Vec<Vec<f64>> = grid.iter().take_while(|_| stop.go_on()).map(|om| self.powers(*om)).collect();
+        if powers.len() < grid.len() {
+            return None;
+        }
+        let tests = INDEPENDENT * (high - low) / self.resolution[1] * self.driven.len() as f64;
+        let of = |k: usize| {
+            let own: Vec<f64> = powers.iter().map(|powers| powers[k]).collect();
+            let peak = (0..own.len()).max_by(|&a, &b| own[a].total_cmp(&own[b]))?;
+            let alarms = tests * self.chance(&grid, &own, peak)?;
+            tracing::debug!(k, frequency = grid[peak], alarms, "line");
+            Some(Line { frequency: self.refined(k, [grid[peak] - step, grid[peak] + step]), alarms })
+        };
+        let lines = (0..self.driven.len()).filter_map(of);
+        lines.min_by(|a, b| a.alarms.total_cmp(&b.alarms)).filter(|line| line.alarms < MOST_ALARMS)
+    }
+
+    /// Reduction of the sum of squares by a drive of each kind at a frequency.
+    fn powers(&self, frequency: f64) -> Vec<f64> {
+        let waves: Vec<(f64, f64)> = self.times.iter().map(|t| (frequency * t).sin_cos()).collect();
+        self.driven.iter().map(|driven| self.power(driven, &waves)).collect()
+    }
+
+    fn power(&self, driven: &[f64], waves: &[(f64, f64)]) -> f64 {
+        let [mut cc, mut cs, mut ss, mut ce, mut se] = [0.0; 5];
+        let rows = driven.chunks_exact(self.n).zip(self.errors.chunks_exact(self.n));
+        for ((row, errors), (sin, cos)) in rows.zip(waves) {
+            let (square, product) = (dot(row, row), dot(row, errors));
+            cc += square * cos * cos;
+            cs += square * cos * sin;
+            ss += square * sin * sin;
+            ce += product * cos;
+            se += product * sin;
+        }
+        let whole = cc * ss - cs * cs;
+        // Near a frequency of 0 the sine and the cosine are one function.
+        if whole <= 1e-9 * cc * ss { 0.0 } else { (ss * ce * ce - 2.0 * cs * ce * se + cc * se * se) / whole }
+    }
+
+    /// Probability of a power as large as that at a peak, from the median of those beside it: of `k` of them, `(1 + z/k)^-k` for a power of `z`
+    /// times their mean, where all are exponentially distributed. `None` if there are too few.
+    fn chance(&self, grid: &[f64], powers: &[f64], peak: usize) -> Option<f64> {
+        let [from, to] = BESIDE.map(|units| units * self.resolution[0]);
+        let is_beside = |om: &f64| (from..to).contains(&(om - grid[peak]).abs());
+        let mut beside: Vec<f64> = grid.iter().zip(powers).filter(|(om, _)| is_beside(om)).map(|(_, p)| *p).collect();
+        beside.sort_by(f64::total_cmp);
+        let count = beside.len() as f64 * (grid[1] - grid[0]) / self.resolution[0];
+        let mean = beside.get(beside.len() / 2).filter(|_| count >= LEAST_BESIDE)? / LN_2;
+        Some((-count * (powers[peak] / mean / count).ln_1p()).exp())
+    }
+
+    /// The frequency of the largest power between two.
+    fn refined(&self, k: usize, [mut low, mut high]: [f64; 2]) -> f64 {
+        let power = |om: f64| self.powers(om)[k];
+        for _ in 0..12 {
+            let [a, b] = [low + 0.382 * (high - low), low + 0.618 * (high - low)];
+            if power(a) > power(b) { high = b } else { low = a }
+        }
+        (low + high) / 2.0
+    }
+}
+
+/// `true` for the function `f` as a term of `L`.
+fn is_potential(library: &Library, k: usize, f: &Function) -> bool {
+    library.terms[k].kind == Kind::Potential && library.functions[library.terms[k].function] == *f
+}
+
+fn add(to: &mut [f64], factor: f64, column: &[f64]) {
+    to.iter_mut().zip(column).for_each(|(to, x)| *to += factor * x);
+}
+
+/// Removes from a column what others explain.
+fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) {
+    let mut directions: Vec<Vec<f64>> = Vec::new();
+    for mut column in columns {
+        let before = dot(&column, &column);
+        for _ in 0..2 {
+            for direction in &directions {
+                let own = dot(direction, &column);
+                add(&mut column, -own, direction);
+            }
+        }
+        let size = dot(&column, &column);
+        if size > 1e-16 * before {
+            column.iter_mut().for_each(|x| *x /= size.sqrt());
+            let own = dot(&column, from);
+            add(from, -own, &column);
+            directions.push(column);
+        }
+    }
+}
+
+/// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
+const REPEATED: f64 = 0.05;
+const MOST_REPEATED: usize = 4;
+
+/// Reasons why a model with a drive may not be the law of the motion that it fits.
+pub(super) fn doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
+    let (data, library) = (motion.data, motion.library);
+    let period = TAU / model.frequency.abs();
+    let mut doubts = Vec::new();
+    let periods = longest(data) / period;
+    if periods < LEAST_PERIODS {
+        let periods = rounded(periods, 2);
+        doubts.push(format!(
+            "the longest trajectory has {periods} periods of the drive: too few to tell that it is periodic"
+        ));
+    }
+    if let Some(count) = (1..=MOST_REPEATED).find(|&count| repeats(data, count as f64 * period)) {
+        let periods = if count == 1 { "period".to_string() } else { format!("{count} periods") };
+        doubts.push(format!(
+            "the motion repeats itself after each {periods} of the drive: a system that oscillates by itself moves in the same way"
+        ));
+    }
+    if data.recording.tracks.len() == 1 && model.terms.iter().all(|&k| is_linear(library, k)) {
+        doubts.push(
+            "the equations are linear without friction: in a single trajectory, another coordinate that was not recorded has the same effect as a drive"
+                .to_string(),
+        );
+    }
+    doubts
+}
+
+/// `true` for a term with linear equations of motion and without friction.
+fn is_linear(library: &Library, k: usize) -> bool {
+    let degree = |factor: &Factor| match factor {
+        Factor::Power(_, degree) if *degree > 0 => *degree,
+        _ => 3,
+    };
+    let term = library.terms[k];
+    let function = match &library.functions[term.function] {
+        Function::Product(factors) => factors.iter().map(degree).sum(),
+        Function::Formula(..) => 3,
+    };
+    let own = match term.kind {
+        Kind::Kinetic(..) => 2,
+        Kind::Gyroscopic(_) => 1,
+        Kind::Potential => 0,
+        Kind::Dissipation(..) => return false,
+    };
+    library.is_driven(k) || own + function <= 2
+}
+
+/// `true` if the whole motion is the same after a time.
+fn repeats(data: &Prepared<'_>, after: f64) -> bool {
+    let n = data.n;
+    let (mut squares, mut count) = (vec![0.0; n], 0.0);
+    for track in &data.recording.tracks {
+        for (k, t) in track.times.iter().enumerate() {
+            let next = track.times.partition_point(|later| *later < t + after);
+            if next == 0 || next >= track.len() {
+                continue;
+            }
+            let share = (t + after - track.times[next - 1]) / (track.times[next] - track.times[next - 1]);
+            let at = |sample: usize, i: usize| track.q[sample * n + i];
+            for (i, square) in squares.iter_mut().enumerate() {
+                let gone = at(next - 1, i) + share * (at(next, i) - at(next - 1, i)) - at(k, i);
+                *square += if data.recording.periodic[i] { 2.0 * (gone / 2.0).sin() } else { gone }.powi(2);
+            }
+            count += 1.0;
+        }
+    }
+    let same = |i: usize| {
+        let noise = 2.0 * data.sigma[i].powi(2);
+        squares[i] / count - noise < 2.0 * (REPEATED * data.spread[i]).powi(2)
+    };
+    count >= 10.0 && (0..n).all(same)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::RngStream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Errors of 400 windows, 0.25 s apart, of one coordinate that a force and a factor of a function may drive.
+    fn rest(seed: u64, mut error: impl FnMut(f64, f64) -> f64) -> Rest {
+        let mut rng = RngStream::Trajectories.generator(seed);
+        let mut draw = || <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
+        let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
+        let function: Vec<f64> = times.iter().map(|t| (0.7 * t + (0.31 * t).sin()).cos()).collect();
+        let errors = times.iter().map(|t| error(*t, draw())).collect();
+        let (span, count) = (100.0, times.len());
+        let resolution = [TAU / span; 2];
+        Rest {
+            times,
+            errors,
+            driven: vec![vec![1.0; count], function],
+            n: 1,
+            band: [3.0 * TAU / span, 10.0],
+            resolution,
+        }
+    }
+
+    fn line(rest: &Rest) -> Option<Line> {
+        rest.line(&Cancellation::default())
+    }
+
+    #[test]
+    fn a_line_is_found_at_its_frequency() {
+        for seed in 0..20 {
+            let found = line(&rest(seed, |t, noise| 0.6 * (2.3 * t + 0.4).cos() + noise)).unwrap();
+            // The standard error is sqrt(24 / 400) / 0.6 / 100.
+            assert!((found.frequency - 2.3).abs() < 4.0 * 4.1e-3, "{seed} {found:?}");
+            let shaken = |t: f64| (0.7 * t + (0.31 * t).sin()).cos() * (5.1 * t + 1.0).sin();
+            let found = line(&rest(seed, |t, noise| shaken(t) + noise)).unwrap();
+            assert!((found.frequency - 5.1).abs() < 0.02, "{seed} {found:?}");
+        }
+    }
+
+    #[test]
+    fn continuous_spectra_have_no_line() {
+        let seeds = 200;
+        let alarms = |make: &dyn Fn(u64) -> Rest| (0..seeds).filter(|&seed| line(&make(seed)).is_some()).count();
+        assert!(alarms(&|seed| rest(seed, |_, noise| noise)) <= 2);
+        // Correlated over 1 s.
+        let red = |seed| {
+            let mut last = 0.0;
+            rest(seed, move |_, noise| {
+                last = 0.78 * last + noise;
+                last
+            })
+        };
+        assert!(alarms(&red) <= 2);
+        // A sign that changes at random.
+        let jumps = |seed| {
+            let mut sign = 1.0;
+            rest(seed, move |_, noise| {
+                sign *= if noise > 1.0 { -1.0 } else { 1.0 };
+                sign + 0.1 * noise
+            })
+        };
+        assert!(alarms(&jumps) <= 2);
+    }
+
+    #[test]
+    fn a_band_without_neighbours_has_no_line() {
+        let few = |high: f64| Rest { band: [1.0, high], ..rest(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
+        assert!(line(&few(1.0 + 5.0 * TAU / 100.0)).is_none() && line(&few(10.0)).is_some());
+    }
+
+    #[test]
+    fn what_others_explain_is_removed() {
+        let wave = |om: f64| (0..50).map(|k| (om * f64::from(k)).cos()).collect::<Vec<f64>>();
+        let (a, b) = (wave(0.3), wave(0.8));
+        let mut left: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
+        // The third column has no part of its own.
+        let sum = a.iter().zip(&b).map(|(a, b)| a + b).collect();
+        remove(&mut left, [a, b, sum].into_iter());
+        assert!(left.iter().all(|x| x.abs() < 1e-12), "{left:?}");
+    }
+}
