@@ -10,6 +10,7 @@ use super::library::{Kind, Library};
 use super::motion::{Model, Motion};
 use super::prepared::Prepared;
 use crate::cancellation::Cancellation;
+use crate::identification::Between;
 use crate::linalg::dot;
 use crate::names::rounded;
 use crate::recording::RecordedTrajectory;
@@ -69,25 +70,31 @@ fn longest(data: &Prepared<'_>) -> f64 {
 }
 
 impl Rest {
-    /// What the best choice of terms leaves in the windows that are not held out; `None` without a choice.
-    pub fn of(weak: &WeakForm, data: &Prepared<'_>, held: &BTreeSet<usize>) -> Option<Self> {
+    /// What is left of the motion in the windows that are not held out, with the mass matrix of the best choice of terms, which a drive may have
+    /// led astray, and with one of unit masses.
+    pub fn of(weak: &WeakForm, data: &Prepared<'_>, held: &BTreeSet<usize>) -> Vec<Self> {
+        let units = weak.windows.unit_mass(&weak.library, &weak.quotient.kept, &data.speeds);
+        let masses = [Some(&units), best(&weak.path).map(|choice| &choice.coefficients)];
+        masses.into_iter().flatten().map(|mass| Self::with_mass(weak, mass, data, held)).collect()
+    }
+
+    fn with_mass(weak: &WeakForm, coefficients: &[f64], data: &Prepared<'_>, held: &BTreeSet<usize>) -> Self {
         let WeakForm { library, quotient, windows, path } = weak;
-        let choice = best(path)?;
+        let set: Vec<usize> = (0..coefficients.len()).filter(|&at| coefficients[at] != 0.0).collect();
         let kept = |at: &usize| quotient.kept[*at];
         let still = |at: &usize| library.kinetic(kept(at)).is_none();
         let mut removed: Vec<usize> = path.order.iter().copied().filter(still).take(MOST_REMOVED).collect();
-        removed.extend(choice.set.iter().filter(|at| still(at) && !path.order[..].contains(at)));
+        removed.extend(set.iter().filter(|at| still(at) && !path.order.contains(at)));
         let shaken: Vec<usize> = library
             .driven()
             .iter()
             .skip(library.n())
             .filter_map(|f| (0..quotient.kept.len()).find(|at| is_potential(library, kept(at), f)))
             .collect();
-        let of = |set: &[usize]| windows.columns(&choice.coefficients, set, &data.sigma);
-        let [own, units] = of(&choice.set);
+        let of = |set: &[usize]| windows.columns(coefficients, set, &data.sigma);
+        let [own, units] = of(&set);
         let mut errors = vec![0.0; windows.len() * data.n];
-        let c = choice.set.iter().map(|&at| choice.coefficients[at]);
-        own.iter().zip(c).for_each(|(column, c)| add(&mut errors, c, column));
+        own.iter().zip(&set).for_each(|(column, &at)| add(&mut errors, coefficients[at], column));
         for (j, unit) in units.iter().enumerate().filter(|_| windows.driven()) {
             let of = |at: usize| windows.forces[at / data.n * data.n + j];
             errors.iter_mut().zip(unit).enumerate().for_each(|(at, (e, u))| *e -= of(at) * u);
@@ -105,11 +112,20 @@ impl Rest {
         let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
         let band = [TAU * LEAST_PERIODS / longest, (MOST_DAMPED / data.width().0).min(PI / apart)];
         let resolution = [TAU / longest, TAU / (ends[1] - ends[0]).max(longest)];
-        Some(Self { times, errors, driven, n: data.n, band, resolution })
+        Self { times, errors, driven, n: data.n, band, resolution }
+    }
+
+    /// The lines of several, the most significant first, those that are one within the resolution once.
+    pub fn lines(rests: &[Self], stop: &Cancellation) -> Vec<Line> {
+        let mut lines: Vec<Line> = rests.iter().filter_map(|rest| rest.line(stop)).collect();
+        lines.sort_by(|a, b| a.alarms.total_cmp(&b.alarms));
+        let width = rests.first().map_or(0.0, |rest| rest.resolution[0]);
+        lines.dedup_by(|a, b| (a.frequency - b.frequency).abs() < width / 2.0);
+        lines
     }
 
     /// The most significant line; `None` if none stands out.
-    pub fn line(&self, stop: &Cancellation) -> Option<Line> {
+    fn line(&self, stop: &Cancellation) -> Option<Line> {
         let [low, high] = self.band;
         let step = self.resolution[1] / OVERSAMPLED;
         let count = (high - low) / step;
@@ -209,7 +225,7 @@ fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) {
 }
 
 /// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
-const REPEATED: f64 = 0.05;
+const REPEATED: f64 = 0.02;
 const MOST_REPEATED: usize = 4;
 
 /// Reasons why a model with a drive may not be the law of the motion that it fits.
@@ -270,9 +286,12 @@ fn repeats(data: &Prepared<'_>, after: f64) -> bool {
                 continue;
             }
             let share = (t + after - track.times[next - 1]) / (track.times[next] - track.times[next - 1]);
-            let at = |sample: usize, i: usize| track.q[sample * n + i];
+            let mut later = vec![0.0; n];
+            Between::Cubic.weigh(&track.times, (next, share), |at, weight| {
+                later.iter_mut().zip(&track.q[at * n..]).for_each(|(q, x)| *q += weight * x);
+            });
             for (i, square) in squares.iter_mut().enumerate() {
-                let gone = at(next - 1, i) + share * (at(next, i) - at(next - 1, i)) - at(k, i);
+                let gone = later[i] - track.q[k * n + i];
                 *square += if data.recording.periodic[i] { 2.0 * (gone / 2.0).sin() } else { gone }.powi(2);
             }
             count += 1.0;

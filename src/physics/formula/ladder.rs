@@ -73,7 +73,7 @@ struct Ladder<'a> {
     /// Smallest error of accelerations so far.
     least: f64,
     /// What libraries without a drive leave of the motion.
-    rests: Vec<(Extent, Rest)>,
+    rests: Vec<(Extent, Vec<Rest>)>,
 }
 
 impl<'a> Ladder<'a> {
@@ -136,7 +136,7 @@ impl<'a> Ladder<'a> {
                 false => self.kept(weak.follow_all(self.data, self.judges, self.options))?,
             };
             if self.options.drive && followed.as_ref().is_none_or(|found| found.verdict == Verdict::NotInLibrary) {
-                self.rests.extend(Rest::of(&weak, self.data, self.judges).map(|rest| (extent, rest)));
+                self.rests.push((extent, Rest::of(&weak, self.data, self.judges)));
             }
             let Some(mut found) = followed else { continue };
             let done = found.verdict != Verdict::NotInLibrary;
@@ -164,12 +164,14 @@ impl<'a> Ladder<'a> {
         let stop = &self.options.cancellation;
         stop.stage("periodic drives");
         let (mut least, mut tried) = (f64::INFINITY, Vec::new());
-        for (extent, rest) in std::mem::take(&mut self.rests) {
-            stop.check()?;
-            let Some(Line { frequency, .. }) = rest.line(stop) else { continue };
+        let rests = std::mem::take(&mut self.rests);
+        for (extent, Line { frequency, .. }) in rests
+            .iter()
+            .flat_map(|(extent, rests)| Rest::lines(rests, stop).into_iter().map(move |line| (extent, line)))
+        {
             stop.check()?;
             let families = extent.families;
-            let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent };
+            let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent.clone() };
             let Some(weak) = self.weak_form(&extent)? else { continue };
             if weak.least() > BETTER * least {
                 continue;
