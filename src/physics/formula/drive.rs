@@ -5,20 +5,17 @@
 //! continuous spectrum, of noise or of what the library lacks, has no line.
 
 use super::find::{WeakForm, best};
-use super::function::{Factor, Function};
+use super::function::Function;
 use super::library::{Kind, Library};
-use super::motion::{Model, Motion};
 use super::prepared::Prepared;
 use crate::cancellation::Cancellation;
-use crate::identification::Between;
 use crate::linalg::dot;
-use crate::names::rounded;
 use crate::recording::RecordedTrajectory;
 use std::collections::BTreeSet;
 use std::f64::consts::{LN_2, PI, TAU};
 
 /// Smallest number of periods in the longest trajectory.
-const LEAST_PERIODS: f64 = 3.0;
+pub(super) const LEAST_PERIODS: f64 = 3.0;
 /// Largest product of a frequency and the width of the test functions, which damp faster drives.
 const MOST_DAMPED: f64 = 15.0;
 /// Frequencies that are looked at within the resolution of the recording, and their largest number.
@@ -39,15 +36,50 @@ const MOST_REMOVED: usize = 20;
 pub(super) struct Rest {
     /// Times of the windows, in s.
     times: Vec<f64>,
-    /// Errors of their accelerations, `(windows, n)`.
-    errors: Vec<f64>,
-    /// The same for everything that a drive may multiply, with a factor of 1.
-    driven: Vec<Vec<f64>>,
-    n: usize,
+    /// Everything that a drive may multiply.
+    driven: Vec<Driven>,
     /// Lowest and highest frequency, in rad/s.
     band: [f64; 2],
     /// Resolution of the longest trajectory, and of the whole recording.
     resolution: [f64; 2],
+}
+
+/// The effect on accelerations of what a drive multiplies, for a factor of 1, by window: its square, its product with the errors that are left,
+/// and with each of the orthonormal effects of other terms, which are not in the errors.
+struct Driven {
+    squares: Vec<f64>,
+    products: Vec<f64>,
+    others: Vec<Vec<f64>>,
+}
+
+impl Driven {
+    /// From effects and errors, `(windows, n)`.
+    fn new(effect: &[f64], errors: &[f64], others: &[Vec<f64>], n: usize) -> Self {
+        let by = |other: &[f64]| effect.chunks_exact(n).zip(other.chunks_exact(n)).map(|(a, b)| dot(a, b)).collect();
+        let others = others.iter().map(|other| by(other)).collect();
+        Self { squares: by(effect), products: by(errors), others }
+    }
+
+    /// Reduction of the sum of squares by a drive with these sines and cosines, all other terms refitted.
+    fn power(&self, sines: &[f64], cosines: &[f64]) -> f64 {
+        let sum =
+            |a: &[f64], b: &[f64]| self.squares.iter().zip(a.iter().zip(b)).map(|(x, (a, b))| x * a * b).sum::<f64>();
+        let [whole_cc, mut cs, whole_ss] = [sum(cosines, cosines), sum(cosines, sines), sum(sines, sines)];
+        let [ce, se] = [dot(&self.products, cosines), dot(&self.products, sines)];
+        let (mut cc, mut ss) = (whole_cc, whole_ss);
+        for other in &self.others {
+            let [c, s] = [dot(other, cosines), dot(other, sines)];
+            cc -= c * c;
+            cs -= c * s;
+            ss -= s * s;
+        }
+        let determinant = cc * ss - cs * cs;
+        // Near a frequency of 0 the sine and the cosine are one function; others may be both of them.
+        if determinant <= 1e-9 * whole_cc * whole_ss {
+            return 0.0;
+        }
+        (ss * ce * ce - 2.0 * cs * ce * se + cc * se * se) / determinant
+    }
 }
 
 /// A line of the spectrum.
@@ -65,7 +97,7 @@ fn span(track: &RecordedTrajectory) -> f64 {
 }
 
 /// Time from the first to the last sample of the longest trajectory.
-fn longest(data: &Prepared<'_>) -> f64 {
+pub(super) fn longest(data: &Prepared<'_>) -> f64 {
     data.recording.tracks.iter().map(span).fold(0.0, f64::max)
 }
 
@@ -104,15 +136,17 @@ impl Rest {
             learned.iter().flat_map(|w| &column[w * data.n..(w + 1) * data.n]).copied().collect()
         };
         let mut errors = some(&errors);
-        remove(&mut errors, of(&removed)[0].iter().map(|column| some(column)));
-        let driven = units.iter().chain(&of(&shaken)[0]).map(|column| some(column)).collect();
+        let others = remove(&mut errors, of(&removed)[0].iter().map(|column| some(column)));
+        let effects = of(&shaken);
+        let effects = units.iter().chain(&effects[0]).map(|effect| some(effect));
+        let driven = effects.map(|effect| Driven::new(&effect, &errors, &others, data.n)).collect();
         let times: Vec<f64> = learned.iter().map(|&w| windows.centres[w]).collect();
         let ends = [times.iter().copied().fold(f64::INFINITY, f64::min), times.iter().copied().fold(0.0, f64::max)];
         let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
         let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
         let band = [TAU * LEAST_PERIODS / longest, (MOST_DAMPED / data.width().0).min(PI / apart)];
         let resolution = [TAU / longest, TAU / (ends[1] - ends[0]).max(longest)];
-        Self { times, errors, driven, n: data.n, band, resolution }
+        Self { times, driven, band, resolution }
     }
 
     /// The lines of several, the most significant first, those that are one within the resolution once.
@@ -151,24 +185,8 @@ impl Rest {
 
     /// Reduction of the sum of squares by a drive of each kind at a frequency.
     fn powers(&self, frequency: f64) -> Vec<f64> {
-        let waves: Vec<(f64, f64)> = self.times.iter().map(|t| (frequency * t).sin_cos()).collect();
-        self.driven.iter().map(|driven| self.power(driven, &waves)).collect()
-    }
-
-    fn power(&self, driven: &[f64], waves: &[(f64, f64)]) -> f64 {
-        let [mut cc, mut cs, mut ss, mut ce, mut se] = [0.0; 5];
-        let rows = driven.chunks_exact(self.n).zip(self.errors.chunks_exact(self.n));
-        for ((row, errors), (sin, cos)) in rows.zip(waves) {
-            let (square, product) = (dot(row, row), dot(row, errors));
-            cc += square * cos * cos;
-            cs += square * cos * sin;
-            ss += square * sin * sin;
-            ce += product * cos;
-            se += product * sin;
-        }
-        let whole = cc * ss - cs * cs;
-        // Near a frequency of 0 the sine and the cosine are one function.
-        if whole <= 1e-9 * cc * ss { 0.0 } else { (ss * ce * ce - 2.0 * cs * ce * se + cc * se * se) / whole }
+        let (sines, cosines): (Vec<f64>, Vec<f64>) = self.times.iter().map(|t| (frequency * t).sin_cos()).unzip();
+        self.driven.iter().map(|driven| driven.power(&sines, &cosines)).collect()
     }
 
     /// Probability of a power as large as that at a peak, from the median of those beside it: of `k` of them, `(1 + z/k)^-k` for a power of `z`
@@ -203,8 +221,8 @@ fn add(to: &mut [f64], factor: f64, column: &[f64]) {
     to.iter_mut().zip(column).for_each(|(to, x)| *to += factor * x);
 }
 
-/// Removes from a column what others explain.
-fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) {
+/// Removes from a column what others explain; returns orthonormal directions of these.
+fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
     let mut directions: Vec<Vec<f64>> = Vec::new();
     for mut column in columns {
         let before = dot(&column, &column);
@@ -222,86 +240,7 @@ fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) {
             directions.push(column);
         }
     }
-}
-
-/// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
-const REPEATED: f64 = 0.02;
-const MOST_REPEATED: usize = 4;
-
-/// Reasons why a model with a drive may not be the law of the motion that it fits.
-pub(super) fn doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
-    let (data, library) = (motion.data, motion.library);
-    let period = TAU / model.frequency.abs();
-    let mut doubts = Vec::new();
-    let periods = longest(data) / period;
-    if periods < LEAST_PERIODS {
-        let periods = rounded(periods, 2);
-        doubts.push(format!(
-            "the longest trajectory has {periods} periods of the drive: too few to tell that it is periodic"
-        ));
-    }
-    if let Some(count) = (1..=MOST_REPEATED).find(|&count| repeats(data, count as f64 * period)) {
-        let periods = if count == 1 { "period".to_string() } else { format!("{count} periods") };
-        doubts.push(format!(
-            "the motion repeats itself after each {periods} of the drive: a system that oscillates by itself moves in the same way"
-        ));
-    }
-    if data.recording.tracks.len() == 1 && model.terms.iter().all(|&k| is_linear(library, k)) {
-        doubts.push(
-            "the equations are linear without friction: in a single trajectory, another coordinate that was not recorded has the same effect as a drive"
-                .to_string(),
-        );
-    }
-    doubts
-}
-
-/// `true` for a term with linear equations of motion and without friction.
-fn is_linear(library: &Library, k: usize) -> bool {
-    let degree = |factor: &Factor| match factor {
-        Factor::Power(_, degree) if *degree > 0 => *degree,
-        _ => 3,
-    };
-    let term = library.terms[k];
-    let function = match &library.functions[term.function] {
-        Function::Product(factors) => factors.iter().map(degree).sum(),
-        Function::Formula(..) => 3,
-    };
-    let own = match term.kind {
-        Kind::Kinetic(..) => 2,
-        Kind::Gyroscopic(_) => 1,
-        Kind::Potential => 0,
-        Kind::Dissipation(..) => return false,
-    };
-    library.is_driven(k) || own + function <= 2
-}
-
-/// `true` if the whole motion is the same after a time.
-fn repeats(data: &Prepared<'_>, after: f64) -> bool {
-    let n = data.n;
-    let (mut squares, mut count) = (vec![0.0; n], 0.0);
-    for track in &data.recording.tracks {
-        for (k, t) in track.times.iter().enumerate() {
-            let next = track.times.partition_point(|later| *later < t + after);
-            if next == 0 || next >= track.len() {
-                continue;
-            }
-            let share = (t + after - track.times[next - 1]) / (track.times[next] - track.times[next - 1]);
-            let mut later = vec![0.0; n];
-            Between::Cubic.weigh(&track.times, (next, share), |at, weight| {
-                later.iter_mut().zip(&track.q[at * n..]).for_each(|(q, x)| *q += weight * x);
-            });
-            for (i, square) in squares.iter_mut().enumerate() {
-                let gone = later[i] - track.q[k * n + i];
-                *square += if data.recording.periodic[i] { 2.0 * (gone / 2.0).sin() } else { gone }.powi(2);
-            }
-            count += 1.0;
-        }
-    }
-    let same = |i: usize| {
-        let noise = 2.0 * data.sigma[i].powi(2);
-        squares[i] / count - noise < 2.0 * (REPEATED * data.spread[i]).powi(2)
-    };
-    count >= 10.0 && (0..n).all(same)
+    directions
 }
 
 #[cfg(test)]
@@ -316,17 +255,11 @@ mod tests {
         let mut draw = || <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
         let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
         let function: Vec<f64> = times.iter().map(|t| (0.7 * t + (0.31 * t).sin()).cos()).collect();
-        let errors = times.iter().map(|t| error(*t, draw())).collect();
-        let (span, count) = (100.0, times.len());
+        let errors: Vec<f64> = times.iter().map(|t| error(*t, draw())).collect();
+        let (span, force) = (100.0, vec![1.0; times.len()]);
         let resolution = [TAU / span; 2];
-        Rest {
-            times,
-            errors,
-            driven: vec![vec![1.0; count], function],
-            n: 1,
-            band: [3.0 * TAU / span, 10.0],
-            resolution,
-        }
+        let driven = [force, function].map(|effect| Driven::new(&effect, &errors, &[], 1)).into();
+        Rest { times, driven, band: [3.0 * TAU / span, 10.0], resolution }
     }
 
     fn line(rest: &Rest) -> Option<Line> {
@@ -383,7 +316,21 @@ mod tests {
         let mut left: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
         // The third column has no part of its own.
         let sum = a.iter().zip(&b).map(|(a, b)| a + b).collect();
-        remove(&mut left, [a, b, sum].into_iter());
-        assert!(left.iter().all(|x| x.abs() < 1e-12), "{left:?}");
+        let directions = remove(&mut left, [a, b, sum].into_iter());
+        assert!(directions.len() == 2 && left.iter().all(|x| x.abs() < 1e-12), "{left:?}");
+    }
+
+    #[test]
+    fn a_line_that_another_term_hides_is_found() {
+        // A term holds the drive and an oscillation; without it an equal part of each is left.
+        let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
+        let wave = |om: f64, size: f64| times.iter().map(|t| size * (om * t).cos()).collect::<Vec<f64>>();
+        let (drive, other) = (wave(1.3, 1.0), wave(1.9, 1.2));
+        let term: Vec<f64> = drive.iter().zip(&other).map(|(a, b)| a + b).collect();
+        let mut errors = drive.clone();
+        let others = remove(&mut errors, [term].into_iter());
+        let driven = vec![Driven::new(&vec![1.0; times.len()], &errors, &others, 1)];
+        let rest = Rest { times, driven, band: [0.2, 10.0], resolution: [TAU / 100.0; 2] };
+        assert!((line(&rest).unwrap().frequency - 1.3).abs() < 2e-3);
     }
 }

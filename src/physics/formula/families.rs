@@ -1,5 +1,6 @@
 //! Families of functions that terms are made of.
 
+use super::error::FormulaError;
 use super::function::{Factor, Function};
 
 /// Highest degree of a family.
@@ -139,6 +140,16 @@ fn harmonics(count: usize, degree: i32) -> Vec<Vec<i32>> {
     all.retain(|m| m.iter().find(|m| **m != 0).is_some_and(|first| *first > 0));
     all.sort_by_key(|m| m.iter().map(|m| m.abs()).sum::<i32>());
     all
+}
+
+/// A user's function, which must not depend on velocities.
+pub(super) fn own_function(names: &[String], text: &str) -> Result<Function, FormulaError> {
+    let wrong = |problem: String| FormulaError::Function { text: text.to_string(), problem };
+    let function = Function::formula(names, text).map_err(|error| wrong(error.to_string()))?;
+    if function.moves() {
+        return Err(wrong("expected coordinates alone, found a velocity".to_string()));
+    }
+    Ok(function)
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! Finds a formula from recorded motion.
 
-use super::drive;
+use super::drive_doubts::drive_doubts;
 use super::error::FormulaError;
+use super::extent::Drive;
 use super::families::Families;
 use super::found::{FoundDrive, FoundFormula, Rival, Verdict};
 use super::function::Notation;
 use super::judged::Judged;
-use super::library::{Drive, Library, Values};
+use super::library::{Library, Values};
 use super::motion::{Model, Motion};
 use super::prepared::{LEAST_SAMPLES, Prepared};
 use super::quotient::Quotient;
@@ -287,7 +288,7 @@ impl WeakForm {
         }
         found.doubts.extend(judged.doubts());
         if found.drive.is_some() {
-            found.doubts.extend(drive::doubts(&search.motion, &model));
+            found.doubts.extend(drive_doubts(&search.motion, &model));
         }
         found.verdict = judged.verdict(&found.doubts);
         if found.verdict == Verdict::NotInLibrary {

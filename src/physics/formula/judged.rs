@@ -2,8 +2,8 @@
 
 use super::found::Verdict;
 use super::motion::Model;
+use super::regular::is_regular;
 use super::search::Search;
-use super::weak::is_regular;
 use crate::identification::{ResidualPath, Segment};
 use crate::names::rounded;
 

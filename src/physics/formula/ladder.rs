@@ -2,10 +2,11 @@
 
 use super::drive::{Line, Rest};
 use super::error::FormulaError;
+use super::extent::{Drive, Extent, Friction};
 use super::families::Families;
 use super::find::{FormulaOptions, WeakForm, held_out};
 use super::found::{FoundFormula, Verdict};
-use super::library::{Drive, Extent, Friction, Library};
+use super::library::Library;
 use super::obstacles::constrained;
 use super::prepared::Prepared;
 use crate::names::rounded;

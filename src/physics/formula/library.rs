@@ -1,12 +1,13 @@
 //! Terms that a Lagrangian may have: functions of the coordinates times velocities.
 
 use super::error::FormulaError;
-use super::families::Families;
+use super::extent::{Drive, Extent};
+use super::families::own_function;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
 use super::quotient::Quotient;
 use crate::lagrangian::{EquationPart, Equations, Lagrangian};
 use crate::linalg::{self, dot};
-use crate::names::{latex_name, rounded};
+use crate::names::latex_name;
 use crate::random::RngStream;
 use crate::scalar::Real;
 use crate::tape::TapeError;
@@ -33,53 +34,6 @@ pub(super) enum Kind {
 pub(super) struct Term {
     pub kind: Kind,
     pub function: usize,
-}
-
-/// Dissipation functions of a library.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Friction {
-    None,
-    /// `v_i v_j`.
-    Constant,
-    /// `v_i v_j f(q)` with simple functions.
-    OfPosition,
-}
-
-/// Largest complexity of a function that multiplies a term of a dissipation function, or a drive: of a square, or the sine of an angle.
-const MOST_FRICTION: f64 = 2.5;
-const MOST_DRIVEN: f64 = 2.0;
-
-/// Kinds of terms in a library, besides `v_i v_j f(q)` and `f(q)`.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Extent {
-    pub families: Families,
-    pub gyroscopic: bool,
-    pub friction: Friction,
-    /// A drive, for terms `f(q) cos(om t)` and `f(q) sin(om t)`.
-    pub drive: Option<Drive>,
-}
-
-impl std::fmt::Display for Extent {
-    /// The families, and what goes beyond them.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}", self.families)?;
-        if self.friction == Friction::OfPosition {
-            f.write_str(" with friction of the position")?;
-        }
-        match &self.drive {
-            Some(Drive { name, frequency }) => write!(f, " with a drive of {name} = {}", rounded(*frequency, 4)),
-            None => Ok(()),
-        }
-    }
-}
-
-/// A periodic drive.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Drive {
-    /// Name of its angular frequency.
-    pub name: String,
-    /// Angular frequency `om` in rad/s; that of a [`Model`](super::motion::Model) is fitted.
-    pub frequency: f64,
 }
 
 /// Functions of the coordinates and the terms that they make.
@@ -134,46 +88,6 @@ impl Library {
         }
         library.add_products(&angles);
         Ok(library)
-    }
-
-    /// Adds the terms of a dissipation function.
-    fn add_friction(&mut self, friction: Friction) {
-        let n = self.n();
-        let within = |f: &Function| match friction {
-            Friction::None => false,
-            Friction::Constant => f.is_one(),
-            Friction::OfPosition => f.complexity() <= MOST_FRICTION,
-        };
-        for function in (0..self.functions.len()).filter(|&k| within(&self.functions[k])) {
-            let pairs = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
-            self.terms.extend(pairs.map(|(i, j)| Term { kind: Kind::Dissipation(i, j), function }));
-        }
-    }
-
-    /// Adds the terms of a drive: forces on the coordinates, `q_i cos(om t)`, and simple functions that it shakes.
-    fn add_drive(&mut self) {
-        if self.drive.is_none() {
-            return;
-        }
-        let n = self.n();
-        let mut phase = vec![0; n + 1];
-        phase[n] = 1;
-        for driven in self.driven() {
-            for wave in [Factor::Cosine(phase.clone()), Factor::Sine(phase.clone())] {
-                let Some(product) = driven.product(&Function::Product(vec![wave])) else { continue };
-                self.terms.push(Term { kind: Kind::Potential, function: self.functions.len() });
-                self.functions.push(product);
-            }
-        }
-    }
-
-    /// Functions that a drive may multiply.
-    pub fn driven(&self) -> Vec<Function> {
-        let mut all: Vec<Function> = (0..self.n()).map(Function::coordinate).collect();
-        let simple = |f: &&Function| f.is_smooth() && !f.is_one() && f.complexity() <= MOST_DRIVEN;
-        let shaken = self.functions.iter().filter(simple).filter(|f| !all.contains(f)).cloned().collect::<Vec<_>>();
-        all.extend(shaken);
-        all
     }
 
     /// Adds products of sines and cosines of single angles, each of which is a sum of the functions that are searched.
@@ -448,18 +362,10 @@ impl Lagrangian for Sum<'_> {
     }
 }
 
-/// A user's function, which must not depend on velocities.
-fn own_function(names: &[String], text: &str) -> Result<Function, FormulaError> {
-    let wrong = |problem: String| FormulaError::Function { text: text.to_string(), problem };
-    let function = Function::formula(names, text).map_err(|error| wrong(error.to_string()))?;
-    if function.moves() {
-        return Err(wrong("expected coordinates alone, found a velocity".to_string()));
-    }
-    Ok(function)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::extent::Friction;
+    use super::super::families::Families;
     use super::*;
 
     fn library(periodic: &[bool], gyroscopic: bool) -> Library {

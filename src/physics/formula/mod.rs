@@ -30,8 +30,10 @@
 
 mod constants;
 mod drive;
+mod drive_doubts;
 mod error;
 mod exchange;
+mod extent;
 mod families;
 mod find;
 mod found;
@@ -44,6 +46,7 @@ mod obstacles;
 mod prepared;
 mod quotient;
 mod regress;
+mod regular;
 mod says;
 mod search;
 mod select;

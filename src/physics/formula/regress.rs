@@ -1,9 +1,10 @@
 //! Finds a formula from a Lagrangian that can be evaluated, learned or given.
 
 use super::error::FormulaError;
+use super::extent::{Extent, Friction};
 use super::find::FormulaOptions;
 use super::found::{FoundFormula, Verdict};
-use super::library::{Extent, Friction, Library, Values};
+use super::library::{Library, Values};
 use super::motion::Model;
 use super::select::{Choice, Path, eliminate_backward, mean};
 use super::wald::RIDGE;
