@@ -331,7 +331,7 @@ mod tests {
         let text = function.written(&names(), Notation::System).join("*");
         let again = Function::formula(&names(), &text).unwrap();
         let q = [0.7, -1.1, 0.4];
-        assert!((function.taylor(&q, 3).value - again.taylor(&q).value).abs() < 1e-14, "{text}");
+        assert!((function.taylor(&q, 3).value - again.taylor(&q, 3).value).abs() < 1e-14, "{text}");
         assert_eq!(function.written(&names(), Notation::Latex)[2], "\\sin^{2}(2a)");
     }
 }
