@@ -11,8 +11,8 @@ from . import _lnn
 from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
 from ._recorded import errors_beside, inputs_beside, measured_columns, recorded
 from ._mechanics import System
-from ._results import Alone, Bodies, Checked, Combination, Constraint, Constraints, Each, Formula, Identified, IdentifiedConstant, Outlier, Residual
-from ._results import Scatter, SensorConstant, Undetermined
+from ._results import Alone, Bodies, Checked, Combination, Constraint, Constraints, Each, Formula, Identified, IdentifiedConstant, Outlier
+from ._results import PeriodicDrive, Residual, Scatter, SensorConstant, Undetermined
 
 if TYPE_CHECKING:
     from ._arrays import Beside, Meaning, Recorded, Units
@@ -114,6 +114,7 @@ def formula(
     basis: str | None = None,
     functions: Sequence[str] = (),
     gyroscopic: bool = True,
+    drive: bool = True,
     scale: tuple[str, float] | None = None,
     bootstraps: int = 40,
     seed: int = 0,
@@ -128,7 +129,8 @@ def formula(
     data, coordinates, angles, dt, t, v, force, trajectory, columns, units
         The motion, as in `fit`.
     friction : bool
-        Whether a Rayleigh dissipation function is looked for beside L.
+        Whether a Rayleigh dissipation function is looked for beside L, first with constant coefficients, then with functions of the
+        coordinates.
     noise : sequence of float, optional
         Standard deviation of the noise of every coordinate in SI units; estimated by default.
     basis : str, optional
@@ -138,6 +140,8 @@ def formula(
         Functions of the coordinates beside them, such as ``"exp(-x)"``.
     gyroscopic : bool
         Whether terms that are linear in the velocities are tried, those of magnetic fields and turning frames.
+    drive : bool
+        Whether a periodic drive of unknown frequency is looked for where no formula without one is found.
     scale : (str, float), optional
         Term and coefficient that fix the common factor; the first square of a velocity and 1/2 by default, known forces where there are some.
     bootstraps : int
@@ -153,7 +157,7 @@ def formula(
         data, coordinates, angles, dt=dt, t=t, v=v, force=force, trajectory=trajectory, columns=columns, units=units
     )
     noise = None if noise is None else doubles_list("noise", noise, positive=True)
-    choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between)
+    choices = formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between, drive)
     return read_formula(_lnn.formula(motion, choices))
 
 
@@ -283,10 +287,11 @@ def formula_choices(
     threads: int | None,
     name: str,
     between: str | None = None,
+    drive: bool = True,
 ) -> str:
     """Choices of a search as the library takes them."""
     given: dict[str, object] = {"basis": basis, "functions": names("functions", functions), "gyroscopic": bool(gyroscopic)}
-    given |= {"friction": bool(friction), "noise": noise, "scale": scale, "bootstraps": whole("bootstraps", bootstraps, 1, 10_000)}
+    given |= {"friction": bool(friction), "drive": bool(drive), "noise": noise, "scale": scale, "bootstraps": whole("bootstraps", bootstraps, 1, 10_000)}
     return as_json(given | {"seed": whole("seed", seed), "threads": thread_count(threads), "name": str(name), "between": between})
 
 
@@ -306,6 +311,7 @@ def read_formula(text: str) -> Formula:
         probabilities=column("probability"),
         dissipative=np.array([term["dissipation"] for term in terms], bool),
         near=tuple(term["near"] for term in terms),
+        drive=None if found["drive"] is None else PeriodicDrive(**found["drive"]),
         residual=number(found["residual"]),
         noise=np.array(found["noise"], float),
         noise_resolved=found["noise_resolved"],

@@ -388,6 +388,23 @@ class OwnConstraints(_Shown):
 
 
 @dataclass(frozen=True)
+class PeriodicDrive:
+    """A periodic drive of a formula.
+
+    Attributes
+    ----------
+    name : str
+        Name of its angular frequency in the terms.
+    frequency, standard_error : float
+        The angular frequency in rad by unit of time.
+    """
+
+    name: str
+    frequency: float
+    standard_error: float
+
+
+@dataclass(frozen=True)
 class Formula(_Shown):
     """A Lagrangian as a formula, and a dissipation function if there is one; arrays have an entry for each term.
 
@@ -412,6 +429,8 @@ class Formula(_Shown):
         Which terms are those of D.
     near : tuple of str or None
         Simple fractions within the errors of the coefficients.
+    drive : PeriodicDrive or None
+        The periodic drive, if terms have one.
     residual : float
         What is left of held-out motion over its noise, or of the accelerations of a model over their size.
     noise : (n,)
@@ -434,6 +453,7 @@ class Formula(_Shown):
     probabilities: np.ndarray
     dissipative: np.ndarray
     near: tuple[str | None, ...]
+    drive: PeriodicDrive | None
     residual: float
     noise: np.ndarray
     noise_resolved: bool

@@ -112,6 +112,7 @@ pub struct FormulaChoices {
     functions: Vec<String>,
     gyroscopic: bool,
     friction: bool,
+    drive: bool,
     noise: Option<Vec<f64>>,
     scale: Option<(String, f64)>,
     bootstraps: usize,
@@ -127,7 +128,7 @@ impl FormulaChoices {
     /// # Errors
     /// `ValueError` for a choice that is none.
     pub fn read(choices: &str) -> PyResult<(FormulaOptions, String)> {
-        let Self { basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name, between } =
+        let Self { basis, functions, gyroscopic, friction, drive, noise, scale, bootstraps, seed, threads, name, between } =
             serde_json::from_str(choices).map_err(value)?;
         let families = basis.map(|text| text.parse::<Families>()).transpose();
         let families = families.map_err(|problem| value(format_args!("basis: {problem}")))?;
@@ -145,6 +146,7 @@ impl FormulaChoices {
             functions,
             gyroscopic,
             friction,
+            drive,
             noise,
             scale,
             bootstraps,

@@ -33,9 +33,13 @@ pub struct Args {
     /// Leave out terms that are linear in the velocities, as in magnetic fields and rotating frames.
     #[arg(long)]
     no_gyroscopic: bool,
-    /// Also look for a Rayleigh dissipation function of the velocities.
+    /// Also look for a Rayleigh dissipation function of the velocities, first with constant coefficients, then with
+    /// functions of the coordinates.
     #[arg(long)]
     friction: bool,
+    /// Do not look for a periodic drive where no formula without one is found.
+    #[arg(long)]
+    no_drive: bool,
     /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
@@ -124,6 +128,7 @@ impl Args {
             functions: self.function.clone(),
             gyroscopic: !self.no_gyroscopic,
             friction: self.friction,
+            drive: !self.no_drive,
             noise: self.noise.clone(),
             between: self.between,
             scale: self.scale.clone(),

@@ -196,7 +196,14 @@ fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFo
         return Ok((None, false));
     }
     let cancellation = stop.within(LIMIT);
-    let options = FormulaOptions { friction: true, bootstraps: 0, cancellation, ..FormulaOptions::default() };
+    let options = FormulaOptions {
+        friction: true,
+        friction_of_position: false,
+        drive: false,
+        bootstraps: 0,
+        cancellation,
+        ..FormulaOptions::default()
+    };
     match formula_of_motion(recording, &options) {
         Err(FormulaError::Cancelled(Cancelled)) if stop.is_cancelled() => Err(PipelineError::Interrupted),
         Err(FormulaError::Cancelled(Cancelled)) => Ok((None, true)),

@@ -123,7 +123,8 @@ impl Search<'_> {
                 let terms: Vec<usize> = left.iter().map(|&k| self.candidates[longer[k]]).collect();
                 let coefficients: Vec<f64> = left.iter().map(|&k| x[k] - dot(&column(k), &away)).collect();
                 if cost < WITHIN {
-                    proposals.push(Exchanged { model: Model { terms, coefficients }, cost });
+                    let model = Model { terms, coefficients, frequency: model.frequency };
+                    proposals.push(Exchanged { model, cost });
                 }
             }
         }

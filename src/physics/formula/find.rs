@@ -1,20 +1,22 @@
 //! Finds a formula from recorded motion.
 
+use super::drive_doubts::drive_doubts;
 use super::error::FormulaError;
-use super::found::{FoundFormula, Rival, Verdict};
+use super::extent::Drive;
+use super::families::Families;
+use super::found::{FoundDrive, FoundFormula, Rival, Verdict};
 use super::function::Notation;
-use super::library::{Extent, Families, Library, Quotient, Values};
+use super::judged::Judged;
+use super::library::{Library, Values};
 use super::motion::{Model, Motion};
-use super::obstacles::constrained;
 use super::prepared::{LEAST_SAMPLES, Prepared};
+use super::quotient::Quotient;
 use super::search::{Search, THRESHOLD, covariance, left_over, shorten};
 use super::select::{Choice, Path, eliminate_backward};
-use super::weak::{Windows, is_regular};
+use super::weak::Windows;
 use crate::cancellation::Cancellation;
-use crate::identification::{Between, ResidualPath, Segment};
-use crate::names::rounded;
+use crate::identification::{Between, Segment};
 use crate::random::RngStream;
-use crate::recording::Recording;
 use rand::Rng;
 use std::collections::BTreeSet;
 
@@ -29,6 +31,10 @@ pub struct FormulaOptions {
     pub gyroscopic: bool,
     /// `true` for a Rayleigh dissipation function of the velocities.
     pub friction: bool,
+    /// `true` to go on, if there is friction and no library with a constant one fits, with friction that depends on the position.
+    pub friction_of_position: bool,
+    /// `true` to go on, if no library fits, with a periodic drive of unknown frequency.
+    pub drive: bool,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,
     /// Interpolation of known forces between the samples; by default the one that fits the motion best.
@@ -57,6 +63,8 @@ impl Default for FormulaOptions {
             functions: Vec::new(),
             gyroscopic: true,
             friction: false,
+            friction_of_position: true,
+            drive: true,
             noise: None,
             between: None,
             scale: None,
@@ -84,130 +92,19 @@ const START_ERROR: f64 = 1.3;
 /// formula; and the number of these.
 const DEFINITE_ERROR: f64 = 3.0;
 const OTHER_STARTS: usize = 2;
-/// Smallest and largest held-out residual over noise at which a formula is found; if the noise is given or is that of exact numbers, only the
-/// largest one applies.
-const LEAST_RESIDUAL: f64 = 0.8;
-const MOST_RESIDUAL: f64 = 1.1;
-/// Smallest ratio of a coordinate's motion to its residual at which it can confirm a law: noise is below half of the spread.
-const SIGNAL: f64 = 2.0;
-/// Largest error of accelerations, over that of smaller libraries, at which a larger library is fitted to the motion.
-const BETTER: f64 = 0.8;
 /// Largest number of choices of terms that are fitted to the motion.
 const ROUNDS: usize = 6;
 
-/// Finds a formula for the Lagrangian of recorded motion. If no families are given, searches larger and larger libraries until one fits the
-/// held-out motion.
-///
-/// # Errors
-/// [`FormulaError`] for motion that is too short, cannot be smoothed or does not determine a law, for example because a coordinate stands still;
-/// for a library that is too large, and for invalid functions and terms. Motion that the library cannot fit is not an error: the verdict reports
-/// it.
-pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Result<FoundFormula, FormulaError> {
-    let rungs = options.families.map_or_else(|| rungs(&recording.periodic), |families| vec![families]);
-    let libraries: Vec<(Families, Result<Library, FormulaError>)> =
-        rungs.into_iter().map(|families| (families, library(recording, families, options))).collect();
-    if let Some((_, Err(error))) = libraries.first() {
-        return Err(error.clone());
-    }
-    let stop = &options.cancellation;
-    stop.stage("smoothed motion");
-    let data = Prepared::new(recording, options)?;
-    stop.check()?;
-    let held = constrained(recording, options.noise.as_ref(), stop)?;
-    stop.check()?;
-    let judges = held_out(&data, options.seed);
-    let (mut searched, mut refused) = (Vec::new(), None);
-    // A formula of high powers may be the series of a shorter one of other functions.
-    let mut long = false;
-    let mut best: Option<FoundFormula> = None;
-    let mut least = f64::INFINITY;
-    for (families, library) in libraries {
-        let Ok(library) = library else {
-            searched.push(format!("{families} (too many terms)"));
-            continue;
-        };
-        if long && families.is_polynomial() {
-            continue;
-        }
-        searched.push(families.to_string());
-        stop.check()?;
-        let followed = WeakForm::new(&data, library, &judges, options).and_then(|weak| {
-            // A library is fitted to the motion only if it fits accelerations better.
-            let (error, before) = (weak.least(), least);
-            least = least.min(error);
-            let most = if long { before / BETTER } else { BETTER * before };
-            if error > most { Ok(None) } else { weak.follow_all(&data, &judges, options).map(Some) }
-        });
-        stop.check()?;
-        match followed {
-            Err(error) => refused = refused.or(Some(error)),
-            Ok(None) => {}
-            Ok(Some(mut found)) => {
-                let done = found.verdict != Verdict::NotInLibrary;
-                let is_better = match &best {
-                    None => true,
-                    Some(best) if long => found.verdict == Verdict::Found && found.terms.len() < best.terms.len(),
-                    Some(best) => done || found.residual < best.residual,
-                };
-                let is_found = found.verdict == Verdict::Found;
-                if is_better {
-                    found.basis = families.to_string();
-                    best = Some(found);
-                }
-                if done && !(is_found && families.is_polynomial() && families.polynomial > 2) {
-                    break;
-                }
-                long |= is_found;
-            }
-        }
-    }
-    let mut found = best.ok_or_else(|| refused.unwrap_or(FormulaError::Singular))?;
-    found.tried = searched;
-    found.notes.extend(data.suspicious.iter().cloned());
-    if let Some(formula) = held {
-        found.notes.push(format!(
-            "the only trajectory satisfies {formula} = 0, by a constraint or by chance: terms that vanish with it are not determined, record more trajectories"
-        ));
-        found.several = true;
-    }
-    found.rescale(options.scale.as_ref())?;
-    found.name_constants();
-    stop.check()?;
-    Ok(found)
-}
-
-/// Libraries in the order in which they are searched.
-fn rungs(periodic: &[bool]) -> Vec<Families> {
-    let lines = periodic.iter().filter(|periodic| !**periodic).count();
-    let degree = |degree: usize| Families { polynomial: degree, trigonometric: degree, ..Families::default() };
-    let mut rungs = vec![degree(2), degree(3), degree(4)];
-    if lines > 1 {
-        rungs.push(Families { radial: 3, ..degree(2) });
-    }
-    if lines > 0 {
-        rungs.push(Families { reciprocal: 3, ..degree(3) });
-    }
-    if lines > 1 {
-        rungs.push(Families { radial: 3, reciprocal: 3, ..degree(3) });
-    }
-    rungs
-}
-
-fn library(recording: &Recording, families: Families, options: &FormulaOptions) -> Result<Library, FormulaError> {
-    let extent = Extent { families, gyroscopic: options.gyroscopic, friction: options.friction };
-    Library::new(&recording.coordinates, &recording.periodic, extent, &options.functions)
-}
-
 /// A library with the results of the weak form for its terms.
-struct WeakForm {
-    library: Library,
-    quotient: Quotient,
-    windows: Windows,
-    path: Path,
+pub(super) struct WeakForm {
+    pub library: Library,
+    pub quotient: Quotient,
+    pub windows: Windows,
+    pub path: Path,
 }
 
 impl WeakForm {
-    fn new(
+    pub fn new(
         data: &Prepared<'_>,
         library: Library,
         held: &BTreeSet<usize>,
@@ -265,12 +162,12 @@ impl WeakForm {
     }
 
     /// The smallest held-out error of choices with which the search through the motion may start.
-    fn least(&self) -> f64 {
+    pub fn least(&self) -> f64 {
         best(&self.path).map_or(f64::INFINITY, judged)
     }
 
     /// Fits the choice to the motion, or another choice of the weak form if that gives no formula.
-    fn follow_all(
+    pub fn follow_all(
         &self,
         data: &Prepared<'_>,
         held: &BTreeSet<usize>,
@@ -302,6 +199,7 @@ impl WeakForm {
         let mut model = Model {
             terms: choice.set.iter().map(|&k| kept[k]).collect(),
             coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
+            frequency: library.drive.as_ref().map_or(0.0, |drive| drive.frequency),
         };
         let mut candidates: Vec<usize> = self.path.order.iter().take(MOST_CANDIDATES).map(|&k| kept[k]).collect();
         candidates.extend(model.terms.iter().filter(|k| !candidates.contains(k)).copied().collect::<Vec<_>>());
@@ -314,7 +212,7 @@ impl WeakForm {
         let states = learned.iter().step_by(learned.len().div_ceil(60).max(1)).map(|s| {
             let mut values = Values::new();
             let all: Vec<usize> = (0..library.functions.len()).collect();
-            library.evaluate(&all, &s.start[..data.n], &mut values);
+            library.evaluate(&all, (&s.start[..data.n], 0.0), &mut values);
             values
         });
         let mut search = Search { library, motion, candidates, states: states.collect() };
@@ -348,7 +246,7 @@ impl WeakForm {
         let resampled = search.resample(&model, &blocks, &learned, (options.bootstraps, options.seed));
         stop.check()?;
         let shortened = shorten(&search, &self.quotient, &mut model, &mut learned);
-        let (covariance, settled) = covariance(&search, &mut model, &mut learned);
+        let covariance = covariance(&search, &mut model, &mut learned);
         let (square, count) = search.motion.settle(&model, &mut judges, 8);
         let share = |k: &usize| resampled.share.get(k).copied().unwrap_or(1.0);
         let probability = |k: &usize| match shortened.get(k) {
@@ -357,7 +255,7 @@ impl WeakForm {
         };
         let probability: Vec<f64> = model.terms.iter().map(probability).collect();
         let periodic = &data.recording.periodic;
-        let mut found = FoundFormula::new(library, periodic, &model, (&covariance, &probability), options);
+        let mut found = FoundFormula::new(library, periodic, &model, (&covariance.coefficients, &probability), options);
         let residuals = search.motion.residuals(&model, &judges);
         let judged = Judged { search: &search, model: &model, segments: &judges, residuals: &residuals, square, count };
         found.paths = judged.paths();
@@ -382,10 +280,16 @@ impl WeakForm {
         if !chosen {
             found.notes.push(format!("the choice of terms has not converged after {ROUNDS} rounds"));
         }
-        if !settled {
+        if let (Some(Drive { name, .. }), Some(standard_error)) = (&library.drive, covariance.frequency) {
+            found.drive = Some(FoundDrive { name: name.clone(), frequency: model.frequency, standard_error });
+        }
+        if !covariance.converged {
             found.doubts.push("the fit of the coefficients has not converged".to_string());
         }
         found.doubts.extend(judged.doubts());
+        if found.drive.is_some() {
+            found.doubts.extend(drive_doubts(&search.motion, &model));
+        }
         found.verdict = judged.verdict(&found.doubts);
         if found.verdict == Verdict::NotInLibrary {
             found.doubts.clear();
@@ -397,91 +301,8 @@ impl WeakForm {
     }
 }
 
-/// Held-out motion as a test of a model.
-struct Judged<'a> {
-    search: &'a Search<'a>,
-    model: &'a Model,
-    segments: &'a [Segment],
-    /// Residuals of the segments in units of the noise, `(samples, n)` each.
-    residuals: &'a [Vec<f64>],
-    square: f64,
-    count: f64,
-}
-
-impl Judged<'_> {
-    fn residual(&self) -> f64 {
-        (self.square / self.count.max(1.0)).sqrt()
-    }
-
-    /// Three standard deviations of the residual, which matter if its count is small.
-    fn scatter(&self) -> f64 {
-        3.0 / (2.0 * self.count.max(1.0)).sqrt()
-    }
-
-    fn verdict(&self, doubts: &[String]) -> Verdict {
-        match self.residual() <= MOST_RESIDUAL + self.scatter() {
-            true if doubts.is_empty() => Verdict::Found,
-            true => Verdict::Undecided,
-            false => Verdict::NotInLibrary,
-        }
-    }
-
-    /// Reasons why small residuals do not confirm the formula.
-    fn doubts(&self) -> Vec<String> {
-        let data = self.search.motion.data;
-        let mut doubts = Vec::new();
-        let residual = self.residual();
-        if data.estimated.iter().all(|estimated| *estimated) && residual < LEAST_RESIDUAL - self.scatter() {
-            doubts.push(format!("the residual is {residual:.2} times the noise: the initial states overfit the noise"));
-        }
-        let masses = self.search.masses(&self.model.terms, &self.model.coefficients);
-        if !is_regular(data.n, &masses) {
-            doubts.push("its mass matrix is nearly singular".to_string());
-        }
-        for (i, [moved, left]) in self.motion_and_rest().into_iter().enumerate() {
-            if moved < SIGNAL * left {
-                let name = &data.recording.coordinates[i];
-                doubts.push(format!(
-                    "{name} moves by only {} times its residual in the held-out motion: too little to confirm a law",
-                    rounded(moved / left, 2)
-                ));
-            }
-        }
-        doubts
-    }
-
-    /// Positions and residuals of the segments in SI units.
-    fn paths(&self) -> Vec<ResidualPath> {
-        let data = self.search.motion.data;
-        let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
-            ResidualPath::of(data.recording, segment, residuals, |_, i| data.sigma_of[segment.track][i])
-        };
-        self.segments.iter().zip(self.residuals).map(of).collect()
-    }
-
-    /// Standard deviation of each coordinate within segments, and of its residual, in units of noise.
-    fn motion_and_rest(&self) -> Vec<[f64; 2]> {
-        let data = self.search.motion.data;
-        let n = data.n;
-        let mut sums = vec![[0.0; 4]; n];
-        for (segment, residuals) in self.segments.iter().zip(self.residuals) {
-            let q = &data.recording.tracks[segment.track].q[segment.first * n..][..segment.samples * n];
-            for (i, [moved, free, left, rest]) in sums.iter_mut().map(|[a, b, c, d]| [a, b, c, d]).enumerate() {
-                let sigma = data.sigma_of[segment.track][i];
-                let values = || q.iter().skip(i).step_by(n);
-                let mean = values().sum::<f64>() / segment.samples as f64;
-                *moved += values().map(|x| ((x - mean) / sigma).powi(2)).sum::<f64>();
-                *free += segment.samples as f64 - 1.0;
-                *left += residuals.iter().skip(i).step_by(n).filter(|r| r.is_finite()).map(|r| r * r).sum::<f64>();
-                *rest += segment.samples as f64 - 2.0;
-            }
-        }
-        sums.into_iter().map(|[moved, free, left, rest]| [(moved / free).sqrt(), (left / rest).sqrt()]).collect()
-    }
-}
-
 /// The blocks that are held out: one in so many, chosen at random.
-fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
+pub(super) fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     let tracks = 0..data.recording.tracks.len();
     let mut blocks: Vec<usize> = tracks.flat_map(|t| data.pieces(t).into_iter().map(|(block, _)| block)).collect();
     blocks.dedup();
@@ -505,7 +326,7 @@ fn beginnings<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
 }
 
 /// The choice with the smallest error that the search through the motion may start with.
-fn best(path: &Path) -> Option<&Choice> {
+pub(super) fn best(path: &Path) -> Option<&Choice> {
     let few = path.best.values().filter(|choice| choice.set.len() <= MOST_START);
     few.min_by(|a, b| judged(a).total_cmp(&judged(b)))
 }

@@ -5,10 +5,8 @@ use super::find::FormulaOptions;
 use super::function::Notation;
 use super::library::{Library, blocks};
 use super::motion::Model;
-use super::units::{Dimension, Units, of_coefficient};
-use crate::identification::linear::{inverse, part};
+use super::units::{Dimension, Units};
 use crate::identification::{Between, ResidualPath};
-use crate::linalg::dot;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -65,7 +63,7 @@ pub struct FoundTerm {
     pub near: Option<Near>,
     /// Index of the term of its block whose coefficient is fixed, if there is one.
     #[serde(skip)]
-    reference: Option<usize>,
+    pub(super) reference: Option<usize>,
     /// Coefficients of bootstrap samples in which terms were chosen again.
     #[serde(skip)]
     drawn: Vec<f64>,
@@ -73,11 +71,11 @@ pub struct FoundTerm {
     #[serde(skip)]
     joined: Vec<usize>,
     #[serde(skip)]
-    dimension: Option<Dimension>,
+    pub(super) dimension: Option<Dimension>,
     #[serde(skip)]
-    latex: String,
+    pub(super) latex: String,
     #[serde(skip)]
-    rust: String,
+    pub(super) rust: String,
 }
 
 /// Residuals in a part of the range of a coordinate.
@@ -95,6 +93,17 @@ pub struct Left {
     pub samples: usize,
 }
 
+/// A periodic drive: terms of the Lagrangian contain the cosine and the sine of `om t`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundDrive {
+    /// Name of its angular frequency in the terms.
+    pub name: String,
+    /// The angular frequency, in rad by unit of time.
+    pub frequency: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+}
+
 /// A formula of the Lagrangian, and of the dissipation function if there is one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundFormula {
@@ -106,6 +115,8 @@ pub struct FoundFormula {
     pub verdict: Verdict,
     /// Its terms.
     pub terms: Vec<FoundTerm>,
+    /// The periodic drive, if there is one.
+    pub drive: Option<FoundDrive>,
     /// Root mean square of the held-out residual over the noise: 1 if only noise remains.
     pub residual: f64,
     /// Noise of every coordinate that scales the residual.
@@ -144,38 +155,9 @@ pub struct FoundFormula {
     pub(super) forced: Vec<bool>,
     pub(super) bounds: Vec<[f64; 2]>,
     pub(super) speeds: Vec<f64>,
-    covariance: Vec<f64>,
+    pub(super) covariance: Vec<f64>,
     /// Units of the coordinates, empty if they are not known, and of time.
-    units: (Vec<String>, String),
-}
-
-/// A formula with the texts made from it, as JSON.
-#[derive(Clone, Debug, Serialize)]
-pub struct FormulaSummary<'a> {
-    verdict: Verdict,
-    lagrangian: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    dissipation: Option<String>,
-    latex: [String; 2],
-    rust: String,
-    toml: String,
-    coordinates: &'a [String],
-    terms: &'a [FoundTerm],
-    residual: f64,
-    noise: &'a [f64],
-    noise_resolved: bool,
-    searched: usize,
-    removed: usize,
-    basis: &'a str,
-    tried: &'a [String],
-    blocks: &'a [Vec<String>],
-    rival: Option<&'a Rival>,
-    several: bool,
-    doubts: &'a [String],
-    notes: &'a [String],
-    forces_between_samples: Option<Between>,
-    left: &'a [Left],
-    seed: u64,
+    pub(super) units: (Vec<String>, String),
 }
 
 impl FoundFormula {
@@ -223,6 +205,7 @@ impl FoundFormula {
             periodic: periodic.to_vec(),
             verdict: Verdict::NotInLibrary,
             terms: order.iter().map(|(_, term)| term.clone()).collect(),
+            drive: None,
             residual: f64::NAN,
             noise: Vec::new(),
             noise_resolved: true,
@@ -361,246 +344,5 @@ impl FoundFormula {
         for &(at, value) in references {
             self.terms[at].coefficient = value;
         }
-    }
-
-    /// Sets the units of coefficients, one name for equal coefficients, and fractions near them.
-    pub(super) fn name_constants(&mut self) {
-        let dimensions: Vec<Option<Dimension>> = self.terms.iter().map(|t| t.dimension.clone()).collect();
-        for term in &mut self.terms {
-            term.unit = match term.reference.map(|at| &dimensions[at]) {
-                Some(None) => None,
-                known => of_coefficient(term.dimension.as_ref(), known.and_then(Option::as_ref)),
-            };
-        }
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        for k in 0..self.terms.len() {
-            match groups.iter_mut().find(|group| self.equal(group[0], k)) {
-                Some(group) => group.push(k),
-                None => groups.push(vec![k]),
-            }
-        }
-        // A letter that, followed by a number, is not the name of a coordinate.
-        let letter =
-            ['c', 'k', 'w'].into_iter().find(|letter| !self.coordinates.iter().any(|q| q.starts_with(*letter)));
-        for (number, group) in groups.iter().enumerate() {
-            let (value, error) = self.common(group);
-            for &k in group {
-                let term = &mut self.terms[k];
-                term.constant = format!("{}{}", letter.unwrap_or('z'), number + 1);
-                (term.coefficient, term.standard_error) = (value.copysign(term.coefficient), error);
-                term.near = near(term.coefficient, error);
-            }
-        }
-    }
-
-    /// `true` if two coefficients are the same constant or its negative: in the same block, with the same unit, equal within their errors, and
-    /// not by chance.
-    fn equal(&self, a: usize, b: usize) -> bool {
-        const ACCIDENT: f64 = 5e-3;
-        let (m, [x, y]) = (self.terms.len(), [a, b].map(|k| &self.terms[k]));
-        let sign = x.coefficient.signum() * y.coefficient.signum();
-        let covariance = |i: usize, j: usize| self.covariance[i * m + j];
-        let variance = covariance(a, a) + covariance(b, b) - 2.0 * sign * covariance(a, b);
-        let (size, error) = (x.coefficient.abs(), variance.max(0.0).sqrt() + 1e-9 * x.coefficient.abs());
-        let same = x.unit.is_some() && x.unit == y.unit && x.dissipation == y.dissipation && x.reference == y.reference;
-        same && error < ACCIDENT * size && (size - y.coefficient.abs()).abs() <= 2.0 * error
-    }
-
-    /// The best estimate of a constant and its standard error, from the coefficients that equal it.
-    fn common(&self, group: &[usize]) -> (f64, f64) {
-        let own = |k: usize| (self.terms[k].coefficient.abs(), self.terms[k].standard_error);
-        if let Some(&fixed) = group.iter().find(|k| group.len() == 1 || own(**k).1 == 0.0) {
-            return own(fixed);
-        }
-        let (count, m) = (group.len(), self.terms.len());
-        let sign = |at: usize| self.terms[group[at]].coefficient.signum();
-        let mut block = part(m, &self.covariance, group);
-        (0..count * count).for_each(|e| block[e] *= sign(e / count) * sign(e % count));
-        let Some(weights) = inverse(count, &block) else { return own(group[0]) };
-        let sums: Vec<f64> = weights.chunks_exact(count).map(|row| row.iter().sum()).collect();
-        let (whole, sizes): (f64, Vec<f64>) = (sums.iter().sum(), group.iter().map(|&k| own(k).0).collect());
-        (dot(&sums, &sizes) / whole, whole.recip().max(0.0).sqrt())
-    }
-
-    /// The formula as JSON, with the dissipation function if one was searched; `name` is the name of the system in its file.
-    pub fn summary(&self, name: &str) -> FormulaSummary<'_> {
-        FormulaSummary {
-            verdict: self.verdict,
-            lagrangian: self.text(false),
-            dissipation: self.friction.then(|| self.text(true)),
-            latex: [false, true].map(|dissipation| self.latex(dissipation)),
-            rust: self.rust(),
-            toml: self.system_file(name),
-            coordinates: &self.coordinates,
-            terms: &self.terms,
-            residual: self.residual,
-            noise: &self.noise,
-            noise_resolved: self.noise_resolved,
-            searched: self.searched.0,
-            removed: self.searched.1,
-            basis: &self.basis,
-            tried: &self.tried,
-            blocks: &self.blocks,
-            rival: self.rival.as_ref(),
-            several: self.several,
-            doubts: &self.doubts,
-            notes: &self.notes,
-            forces_between_samples: self.between,
-            left: &self.left,
-            seed: self.seed,
-        }
-    }
-
-    /// The Lagrangian, or the dissipation function, as a formula in the grammar of system files.
-    pub fn text(&self, dissipation: bool) -> String {
-        self.sum(dissipation, |t| (number(t.coefficient), t.term.clone()), "*")
-    }
-
-    /// The same in LaTeX.
-    pub fn latex(&self, dissipation: bool) -> String {
-        self.sum(dissipation, |t| (latex_number(t.coefficient), t.latex.clone()), "\\,")
-    }
-
-    fn sum(&self, dissipation: bool, write: impl Fn(&FoundTerm) -> (String, String), product: &str) -> String {
-        let mut text = String::new();
-        for term in self.terms.iter().filter(|t| t.dissipation == dissipation) {
-            let (coefficient, factor) = write(term);
-            let (sign, size) = match coefficient.strip_prefix('-') {
-                Some(size) => (if text.is_empty() { "-" } else { " - " }, size.to_string()),
-                None => (if text.is_empty() { "" } else { " + " }, coefficient),
-            };
-            text += &format!("{sign}{size}{product}{factor}");
-        }
-        if text.is_empty() { "0".to_string() } else { text }
-    }
-
-    /// A Rust type with this Lagrangian.
-    pub fn rust(&self) -> String {
-        let n = self.coordinates.len();
-        let body: Vec<String> = self
-            .terms
-            .iter()
-            .filter(|t| !t.dissipation)
-            .map(|t| format!("R::of({:?}) * {}", t.coefficient, t.rust))
-            .collect();
-        format!(
-            "struct Found; // q = ({})\nimpl lnn::lagrangian::Lagrangian for Found {{\n    fn coordinates(&self) -> usize {{\n        {n}\n    }}\n    fn lagrangian<R: lnn::scalar::Real>(&self, _parameters: &[R], q: &[R], v: &[R]) -> R {{\n        {}\n    }}\n}}\n",
-            self.coordinates.join(", "),
-            body.join("\n            + ")
-        )
-    }
-
-    /// A system file, with its constants as parameters that a training may learn.
-    pub fn system_file(&self, name: &str) -> String {
-        let mut text = format!("name = {name:?}\n");
-        let sum = |dissipation: bool| {
-            let positive = |constant: &String| self.constants().any(|t| t.constant == *constant && t.coefficient > 0.0);
-            let own = self.terms.iter().filter(|t| t.dissipation == dissipation).enumerate();
-            let one = |(k, t): (usize, &FoundTerm)| {
-                let sign = match (k, (t.coefficient > 0.0) == positive(&t.constant)) {
-                    (0, true) => "",
-                    (0, false) => "-",
-                    (_, true) => " + ",
-                    (_, false) => " - ",
-                };
-                format!("{sign}{}*{}", t.constant, t.term)
-            };
-            own.map(one).collect::<String>()
-        };
-        text += &format!("lagrangian = {:?}\n", sum(false));
-        if self.units.1 != "s" {
-            text += &format!("time_unit = {:?}\n", self.units.1);
-        }
-        if self.terms.iter().any(|t| t.dissipation) {
-            text += &format!("dissipation = {:?}\n", sum(true));
-        }
-        for (i, name) in self.coordinates.iter().enumerate() {
-            text += &format!("\n[[coordinates]]\nname = {name:?}\n");
-            match self.units.0.get(i).filter(|unit| !unit.is_empty()) {
-                Some(unit) => text += &format!("unit = {unit:?}\n"),
-                None if self.periodic[i] => text += "unit = \"rad\"\n",
-                None => {}
-            }
-            if self.periodic[i] {
-                text += "periodic = true\n";
-            }
-            let [low, high] = self.bounds[i];
-            if !self.periodic[i] {
-                text += &format!("bounds = [{low:?}, {high:?}]\n");
-            }
-            let speed = 3.0 * self.speeds[i];
-            text += &format!("velocity_bounds = [{:?}, {speed:?}]\n", -speed);
-        }
-        text += "\n[parameters]\n";
-        for FoundTerm { constant, coefficient, standard_error, unit, .. } in self.constants() {
-            let unit = unit.as_ref().map_or(String::new(), |unit| format!(", unit = {unit:?}"));
-            text += &format!(
-                "{constant} = {{ default = {coefficient:?}{unit}, learn = true }} # +- {standard_error:.2e}\n"
-            );
-        }
-        text
-    }
-
-    /// The first term with each constant.
-    fn constants(&self) -> impl Iterator<Item = &FoundTerm> {
-        let first = |k: usize| self.terms.iter().position(|t| t.constant == self.terms[k].constant) == Some(k);
-        self.terms.iter().enumerate().filter(move |(k, _)| first(*k)).map(|(_, t)| t)
-    }
-}
-
-/// A number with seven digits.
-fn number(x: f64) -> String {
-    let size = x.abs();
-    if x != 0.0 && !(1e-4..1e7).contains(&size) {
-        return format!("{x:.6e}");
-    }
-    let digits = if size >= 1.0 { 6 - (size.log10().floor() as usize).min(6) } else { 7 };
-    let text = format!("{x:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
-}
-
-fn latex_number(x: f64) -> String {
-    let text = number(x);
-    match text.split_once('e') {
-        Some((digits, power)) => format!("{digits}\\cdot 10^{{{power}}}"),
-        None => text,
-    }
-}
-
-/// A fraction of small integers within two standard errors, if the number is known well enough that this is not by chance.
-fn near(x: f64, error: f64) -> Option<Near> {
-    if !(x.is_finite() && error.is_finite()) {
-        return None;
-    }
-    let within = (2.0 * error).max(1e-9 * x.abs());
-    for bottom in 1..=12 {
-        let top = (x * f64::from(bottom)).round();
-        // Fractions with this denominator are 1 / bottom apart: one within the error is rarely there by chance.
-        let rare = within * f64::from(bottom * bottom) < 0.02;
-        if rare && top != 0.0 && top.abs() <= 24.0 && (x - top / f64::from(bottom)).abs() <= within {
-            let fraction = if bottom == 1 { format!("{top}") } else { format!("{top}/{bottom}") };
-            let off = x - top / f64::from(bottom);
-            return Some(Near { fraction, standard_errors: if error > 0.0 { off / error } else { 0.0 } });
-        }
-    }
-    None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn fractions_are_named_where_they_are_no_accident() {
-        let found = near(0.2501, 1e-4).unwrap();
-        assert!(found.fraction == "1/4" && (found.standard_errors - 1.0).abs() < 1e-9, "{found:?}");
-        assert_eq!(near(-1.5, 0.0).map(|found| found.fraction).as_deref(), Some("-3/2"));
-        assert_eq!([near(0.2531, 1e-4), near(0.26, 0.2)], [None, None]);
-    }
-
-    #[test]
-    fn numbers_are_written_without_empty_digits() {
-        assert_eq!([number(0.5), number(-9.81), number(12.0), number(100.0)], ["0.5", "-9.81", "12", "100"]);
-        assert_eq!(number(1.5e-7), "1.500000e-7");
     }
 }

@@ -34,6 +34,17 @@ pub(super) struct Taylor {
     pub gradient: [f64; MOST_COORDINATES],
 }
 
+impl PartialEq for Function {
+    /// Formulas by their texts.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Product(a), Self::Product(b)) => a == b,
+            (Self::Formula(a, _), Self::Formula(b, _)) => a == b,
+            _ => false,
+        }
+    }
+}
+
 impl Factor {
     fn value<R: Real>(&self, q: &[R]) -> R {
         match self {
@@ -172,21 +183,29 @@ impl Function {
                 Some((first, rest)) => rest.iter().fold(first.value(q), |product, factor| product * factor.value(q)),
                 None => R::one(),
             },
-            Self::Formula(_, formula) => formula.lagrangian(&[], q, &vec![R::zero(); q.len()]),
+            Self::Formula(_, formula) => {
+                let n = formula.coordinates();
+                formula.lagrangian(&[], &q[..n], &vec![R::zero(); n])
+            }
         }
     }
 
-    /// Value and gradient at `q`.
-    pub fn taylor(&self, q: &[f64]) -> Taylor {
+    /// The coordinate `i` itself.
+    pub fn coordinate(i: usize) -> Self {
+        Self::Product(vec![Factor::Power(i, 1)])
+    }
+
+    /// Value at `q` and gradient by the first `n` of its numbers; a phase may stand behind them.
+    pub fn taylor(&self, q: &[f64], n: usize) -> Taylor {
         let mut found = Taylor::default();
         if self.is_one() {
             found.value = 1.0;
             return found;
         }
-        let mut point = [Dual::lift(0.0); MOST_COORDINATES];
+        let mut point = [Dual::lift(0.0); MOST_COORDINATES + 1];
         let point = &mut point[..q.len()];
         point.iter_mut().zip(q).for_each(|(point, &q)| point.value = q);
-        for i in 0..q.len() {
+        for i in 0..n {
             point[i].tangent = 1.0;
             let at = self.value(point);
             point[i].tangent = 0.0;
@@ -206,8 +225,8 @@ impl Function {
 
     /// Coordinates that it depends on, of `n`.
     pub fn coordinates(&self, n: usize) -> Vec<usize> {
-        let q: Vec<f64> = (0..n).map(|i| 0.37 + 0.11 * i as f64).collect();
-        let slopes = self.taylor(&q).gradient;
+        let q: Vec<f64> = (0..=n).map(|i| 0.37 + 0.11 * i as f64).collect();
+        let slopes = self.taylor(&q, n).gradient;
         // Outside its domain a formula may depend on anything.
         (0..n).filter(|&i| slopes[i] != 0.0).collect()
     }
@@ -215,6 +234,22 @@ impl Function {
     /// `true` for the function 1.
     pub fn is_one(&self) -> bool {
         matches!(self, Self::Product(factors) if factors.is_empty())
+    }
+
+    /// `true` if it depends on the phase behind `n` coordinates.
+    pub fn has_phase(&self, n: usize) -> bool {
+        let has = |factor: &Factor| matches!(factor, Factor::Sine(m) | Factor::Cosine(m) if m.get(n).is_some_and(|m| *m != 0));
+        matches!(self, Self::Product(factors) if factors.iter().any(has))
+    }
+
+    /// `true` for products of powers, sines and cosines without a pole.
+    pub fn is_smooth(&self) -> bool {
+        let smooth = |factor: &Factor| match factor {
+            Factor::Power(_, k) => *k > 0,
+            Factor::Radius(..) => false,
+            Factor::Sine(_) | Factor::Cosine(_) => true,
+        };
+        matches!(self, Self::Product(factors) if factors.iter().all(smooth))
     }
 
     /// Product with another function.
@@ -272,12 +307,12 @@ mod tests {
         ];
         let q = [0.7, -1.1, 0.4];
         for function in functions {
-            let at = function.taylor(&q);
+            let at = function.taylor(&q, 3);
             for i in 0..3 {
                 let moved = |h: f64| {
                     let mut q = q;
                     q[i] += h;
-                    function.taylor(&q)
+                    function.taylor(&q, 3)
                 };
                 let (up, down) = (moved(1e-5), moved(-1e-5));
                 assert!(((up.value - down.value) / 2e-5 - at.gradient[i]).abs() < 1e-8, "{function:?}");
@@ -296,7 +331,7 @@ mod tests {
         let text = function.written(&names(), Notation::System).join("*");
         let again = Function::formula(&names(), &text).unwrap();
         let q = [0.7, -1.1, 0.4];
-        assert!((function.taylor(&q).value - again.taylor(&q).value).abs() < 1e-14, "{text}");
+        assert!((function.taylor(&q, 3).value - again.taylor(&q, 3).value).abs() < 1e-14, "{text}");
         assert_eq!(function.written(&names(), Notation::Latex)[2], "\\sin^{2}(2a)");
     }
 }

@@ -1,7 +1,10 @@
 //! Terms that a Lagrangian may have: functions of the coordinates times velocities.
 
 use super::error::FormulaError;
+use super::extent::{Drive, Extent};
+use super::families::own_function;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
+use super::quotient::Quotient;
 use crate::lagrangian::{EquationPart, Equations, Lagrangian};
 use crate::linalg::{self, dot};
 use crate::names::latex_name;
@@ -9,77 +12,10 @@ use crate::random::RngStream;
 use crate::scalar::Real;
 use crate::tape::TapeError;
 use rand::Rng;
+use std::f64::consts::TAU;
 
 /// Largest number of functions and terms.
 pub(super) const MOST_TERMS: usize = 400;
-/// Highest degree of a family.
-const MOST_DEGREE: usize = 6;
-
-/// Which functions of the coordinates a library is made of, by family and total degree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Families {
-    /// Powers of coordinates that are not angles.
-    pub polynomial: usize,
-    /// Sines and cosines of sums and differences of multiples of the angles.
-    pub trigonometric: usize,
-    /// Positive and negative powers of the distance from the origin in the coordinates that are not angles.
-    pub radial: usize,
-    /// Reciprocals of powers of every coordinate that is not an angle.
-    pub reciprocal: usize,
-}
-
-impl Default for Families {
-    fn default() -> Self {
-        Self { polynomial: 2, trigonometric: 2, radial: 0, reciprocal: 0 }
-    }
-}
-
-impl Families {
-    /// `true` without powers of distances and reciprocals.
-    pub(super) fn is_polynomial(&self) -> bool {
-        self.radial == 0 && self.reciprocal == 0
-    }
-}
-
-impl std::fmt::Display for Families {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { polynomial, trigonometric, radial, reciprocal } = *self;
-        let all = [
-            ("polynomial", polynomial),
-            ("trigonometric", trigonometric),
-            ("radial", radial),
-            ("reciprocal", reciprocal),
-        ];
-        let parts = all.iter().filter(|(_, degree)| *degree > 0).map(|(family, degree)| format!("{family}:{degree}"));
-        f.write_str(&parts.collect::<Vec<_>>().join(","))
-    }
-}
-
-impl std::str::FromStr for Families {
-    type Err = String;
-
-    /// `family:degree,..`; a family that is missing has degree 0.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut families = Self { polynomial: 0, trigonometric: 0, radial: 0, reciprocal: 0 };
-        for part in text.split(',') {
-            let (family, degree) = part.split_once(':').ok_or("expected FAMILY:DEGREE, such as polynomial:3")?;
-            let place = match family.trim() {
-                "polynomial" => &mut families.polynomial,
-                "trigonometric" => &mut families.trigonometric,
-                "radial" => &mut families.radial,
-                "reciprocal" => &mut families.reciprocal,
-                family => {
-                    let known = ["polynomial", "trigonometric", "radial", "reciprocal"];
-                    return Err(crate::names::unknown("family", family, known));
-                }
-            };
-            let degree = degree.trim().parse().ok().filter(|degree| *degree <= MOST_DEGREE);
-            *place = degree.ok_or_else(|| format!("{family}: expected a degree from 0 to {MOST_DEGREE}"))?;
-        }
-        Ok(families)
-    }
-}
-
 /// Kind of a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -100,21 +36,15 @@ pub(super) struct Term {
     pub function: usize,
 }
 
-/// Kinds of terms in a library, besides `v_i v_j f(q)` and `f(q)`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Extent {
-    pub families: Families,
-    pub gyroscopic: bool,
-    pub friction: bool,
-}
-
 /// Functions of the coordinates and the terms that they make.
 #[derive(Clone, Debug)]
 pub(super) struct Library {
     /// Names of the coordinates.
     pub names: Vec<String>,
+    /// Functions of the coordinates, and of the phase `om t` of the drive behind them.
     pub functions: Vec<Function>,
     pub terms: Vec<Term>,
+    pub drive: Option<Drive>,
     /// Terms up to this one are searched; later ones may replace several terms at the end.
     pub searched: usize,
 }
@@ -132,46 +62,16 @@ impl Library {
         if n == 0 || n > MOST_COORDINATES {
             return Err(FormulaError::Coordinates { found: n, most: MOST_COORDINATES });
         }
-        let Extent { families, gyroscopic, friction } = extent;
-        let lines: Vec<usize> = (0..n).filter(|&i| !periodic[i]).collect();
+        let Extent { families, gyroscopic, friction, drive } = extent;
         let angles: Vec<usize> = (0..n).filter(|&i| periodic[i]).collect();
-        let mut of_lines: Vec<(usize, Vec<Factor>)> = Vec::new();
-        for powers in exponents(lines.len(), families.polynomial) {
-            let factors = lines.iter().zip(&powers).filter(|(_, p)| **p > 0);
-            of_lines.push((powers.iter().sum(), factors.map(|(&i, &p)| Factor::Power(i, p as i32)).collect()));
-        }
-        if lines.len() > 1 {
-            for k in (1..=families.radial as i32).flat_map(|k| [-k, k]).filter(|k| *k < 0 || k % 2 != 0) {
-                of_lines.push((k.unsigned_abs() as usize, vec![Factor::Radius(lines.clone(), k)]));
-            }
-        }
-        for k in 1..=families.reciprocal as i32 {
-            of_lines.extend(lines.iter().map(|&i| (k as usize, vec![Factor::Power(i, -k)])));
-        }
-        let mut waves: Vec<(usize, Option<Factor>)> = vec![(0, None)];
-        for harmonics in harmonics(angles.len(), families.trigonometric as i32) {
-            let mut all = vec![0; n];
-            angles.iter().zip(&harmonics).for_each(|(&i, &m)| all[i] = m);
-            let degree = harmonics.iter().map(|m| m.unsigned_abs() as usize).sum();
-            waves.push((degree, Some(Factor::Cosine(all.clone()))));
-            waves.push((degree, Some(Factor::Sine(all))));
-        }
-        let most = families.polynomial.max(families.trigonometric).max(families.reciprocal);
-        let mut functions = Vec::new();
-        for (power, factors) in &of_lines {
-            for (degree, wave) in &waves {
-                if *degree == 0 || power + degree <= most {
-                    functions.push(Function::Product(factors.iter().cloned().chain(wave.clone()).collect()));
-                }
-            }
-        }
+        let mut functions = families.functions(periodic);
         for text in own {
             functions.push(own_function(names, text)?);
         }
         if functions.len() > MOST_TERMS {
             return Err(FormulaError::Terms { found: functions.len(), most: MOST_TERMS });
         }
-        let mut library = Self { names: names.to_vec(), functions, terms: Vec::new(), searched: 0 };
+        let mut library = Self { names: names.to_vec(), functions, terms: Vec::new(), drive, searched: 0 };
         for function in 0..library.functions.len() {
             let pairs = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
             library.terms.extend(pairs.map(|(i, j)| Term { kind: Kind::Kinetic(i, j), function }));
@@ -180,11 +80,8 @@ impl Library {
             }
             library.terms.push(Term { kind: Kind::Potential, function });
         }
-        if friction {
-            let pairs = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
-            let one = library.functions.iter().position(Function::is_one).unwrap_or(0);
-            library.terms.extend(pairs.map(|(i, j)| Term { kind: Kind::Dissipation(i, j), function: one }));
-        }
+        library.add_friction(friction);
+        library.add_drive();
         library.searched = library.terms.len();
         if library.terms.len() > MOST_TERMS {
             return Err(FormulaError::Terms { found: library.terms.len(), most: MOST_TERMS });
@@ -227,13 +124,27 @@ impl Library {
         self.names.len()
     }
 
-    /// Values and derivatives of some functions at `q`; the others keep their previous ones.
-    pub fn evaluate(&self, which: &[usize], q: &[f64], values: &mut Values) {
+    /// Number of known functions of the time: 1 with a drive.
+    fn known(&self) -> usize {
+        usize::from(self.drive.is_some())
+    }
+
+    /// `true` for a term of the drive.
+    pub fn is_driven(&self, k: usize) -> bool {
+        self.drive.is_some() && self.functions[self.terms[k].function].has_phase(self.n())
+    }
+
+    /// Values and derivatives of some functions at positions and a time; the others keep their previous ones.
+    pub fn evaluate(&self, which: &[usize], (q, t): (&[f64], f64), values: &mut Values) {
+        let mut place = [0.0; MOST_COORDINATES + 1];
+        place[..q.len()].copy_from_slice(q);
+        place[q.len()] = self.drive.as_ref().map_or(0.0, |drive| drive.frequency * t);
+        let place = &place[..q.len() + self.known()];
         if values.len() < self.functions.len() {
             values.resize(self.functions.len(), Taylor::default());
         }
         for &k in which {
-            values[k] = self.functions[k].taylor(q);
+            values[k] = self.functions[k].taylor(place, q.len());
         }
     }
 
@@ -274,12 +185,17 @@ impl Library {
         }
     }
 
-    /// The equations of motion of some terms, whose coefficients are the first of `count` parameters, with derivatives by the coefficients of
-    /// the wanted terms.
+    /// The equations of motion of some terms, whose coefficients are the first of `count` parameters and the last of which is the frequency of
+    /// the drive if there is one; with derivatives by the chosen parameters and then by the coefficients of the wanted terms.
     ///
     /// # Errors
     /// A formula that branches on its data.
-    pub fn equations(&self, terms: &[usize], count: usize, wanted: &[usize]) -> Result<Equations, TapeError> {
+    pub fn equations(
+        &self,
+        terms: &[usize],
+        count: usize,
+        (chosen, wanted): (&[usize], &[usize]),
+    ) -> Result<Equations, TapeError> {
         let record = |terms: Vec<(usize, Option<usize>)>, friction: bool| {
             EquationPart::record(&Sum { library: self, terms }, count, friction)
         };
@@ -289,7 +205,7 @@ impl Library {
         };
         let single = wanted.iter().map(|&k| record(vec![(k, None)], self.is_dissipation(k)));
         let single = single.collect::<Result<Vec<_>, _>>()?;
-        Equations::of(self.n(), count, &[own(false)?, own(true)?], (&[], &single))
+        Equations::of(self.n(), count, &[own(false)?, own(true)?], (chosen, &single))
     }
 
     /// Adds `factor` times `d/dt dL/dv - dL/dq + dD/dv` of a term at a state with an acceleration.
@@ -335,7 +251,7 @@ impl Library {
     }
 
     /// The searched terms without those that are linear combinations of others up to a total derivative or an identity, keeping simple ones:
-    /// their Euler-Lagrange equations at random states are independent. Positions are drawn from `bounds`.
+    /// their Euler-Lagrange equations at random states are independent. Positions are drawn from `bounds`, phases of the drive from the circle.
     pub fn independent(&self, bounds: &[[f64; 2]], seed: u64) -> (Vec<usize>, Quotient) {
         let (n, count) = (self.n(), self.terms.len());
         let mut rng = RngStream::Region.generator(seed);
@@ -348,7 +264,8 @@ impl Library {
             let q: Vec<f64> = bounds.iter().map(|b| draw(b[0], b[1])).collect();
             let v: Vec<f64> = (0..n).map(|_| draw(-1.0, 1.0)).collect();
             let a: Vec<f64> = (0..n).map(|_| draw(-1.0, 1.0)).collect();
-            self.evaluate(&all, &q, &mut values);
+            let t = self.drive.as_ref().map_or(0.0, |drive| draw(0.0, TAU) / drive.frequency);
+            self.evaluate(&all, (&q, t), &mut values);
             for (k, column) in columns.iter_mut().enumerate() {
                 self.add_equation(k, 1.0, &values, (&v, &a), &mut column[s * n..(s + 1) * n]);
             }
@@ -377,7 +294,12 @@ impl Library {
             Kind::Gyroscopic(i) => vec![velocity(i, 1)],
             Kind::Potential => vec![],
         };
-        let names: Vec<String> = (0..self.n()).map(name).collect();
+        let phase = self.drive.iter().map(|Drive { name, .. }| match notation {
+            Notation::System => format!("{name}*t"),
+            Notation::Latex => "\\omega t".to_string(),
+            Notation::Rust => format!("{name} * q[{}]", self.n()),
+        });
+        let names: Vec<String> = (0..self.n()).map(name).chain(phase).collect();
         factors.extend(self.functions[self.terms[k].function].written(&names, notation));
         if factors.is_empty() { "1".to_string() } else { notation.product(&factors) }
     }
@@ -422,130 +344,33 @@ struct Sum<'a> {
 }
 
 impl Lagrangian for Sum<'_> {
+    /// The time is the last one if there is a drive.
     fn coordinates(&self) -> usize {
-        self.library.n()
+        self.library.n() + self.library.known()
     }
 
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let mut place = q.to_vec();
+        if let (1, [.., t], Some(frequency)) = (self.library.known(), &mut place[..], parameters.last()) {
+            *t = *t * *frequency;
+        }
         let of = |&(k, at): &(usize, Option<usize>)| {
-            let value = self.library.value(k, q, v);
+            let value = self.library.value(k, &place, v);
             at.map_or(value, |at| parameters[at] * value)
         };
         self.terms.iter().fold(R::zero(), |sum, term| sum + of(term))
     }
 }
 
-/// A user's function, which must not depend on velocities.
-fn own_function(names: &[String], text: &str) -> Result<Function, FormulaError> {
-    let wrong = |problem: String| FormulaError::Function { text: text.to_string(), problem };
-    let function = Function::formula(names, text).map_err(|error| wrong(error.to_string()))?;
-    if function.moves() {
-        return Err(wrong("expected coordinates alone, found a velocity".to_string()));
-    }
-    Ok(function)
-}
-
-/// How removed terms are combined from the kept ones.
-#[derive(Clone, Debug)]
-pub(super) struct Quotient {
-    /// Kept terms, in the order of the library.
-    pub kept: Vec<usize>,
-    /// For every term of the library: its coefficients over the kept terms; none if it is not a combination of them.
-    pub over_kept: Vec<Option<Vec<f64>>>,
-    /// Total derivatives and identities among the terms that are searched.
-    pub removed: usize,
-}
-
-impl Quotient {
-    /// Relative remainder below which a term is a combination of others.
-    const REST: f64 = 1e-7;
-
-    fn new(library: &Library, columns: &[Vec<f64>]) -> (Vec<usize>, Self) {
-        let mut order: Vec<usize> = (0..library.searched).collect();
-        order.sort_by(|&a, &b| library.complexity(a).total_cmp(&library.complexity(b)));
-        // Orthonormal directions, and each as a combination of the kept terms.
-        let mut directions: Vec<Vec<f64>> = Vec::new();
-        let mut kept: Vec<usize> = Vec::new();
-        let mut combinations: Vec<Vec<f64>> = Vec::new();
-        let reduce = |column: &[f64], directions: &[Vec<f64>], combinations: &[Vec<f64>]| {
-            let length = dot(column, column).sqrt();
-            let mut rest = column.to_vec();
-            let mut over = vec![0.0; directions.len()];
-            for _ in 0..2 {
-                for (direction, combination) in directions.iter().zip(combinations) {
-                    let part = dot(direction, &rest);
-                    rest.iter_mut().zip(direction).for_each(|(r, d)| *r -= part * d);
-                    over.iter_mut().zip(combination).for_each(|(o, c)| *o += part * c);
-                }
-            }
-            let left = dot(&rest, &rest).sqrt();
-            (rest, over, length, left)
-        };
-        for k in order {
-            let (mut rest, over, length, left) = reduce(&columns[k], &directions, &combinations);
-            if length > 1e-12 && left > Self::REST * length {
-                rest.iter_mut().for_each(|r| *r /= left);
-                let mut combination: Vec<f64> = over.iter().map(|o| -o / left).collect();
-                combination.push(1.0 / left);
-                directions.push(rest);
-                combinations.push(combination);
-                kept.push(k);
-            }
-        }
-        let mut sorted: Vec<(usize, usize)> = kept.iter().copied().enumerate().map(|(at, k)| (k, at)).collect();
-        sorted.sort_unstable();
-        let over_kept = columns.iter().map(|column| {
-            let (_, over, length, left) = reduce(column, &directions, &combinations);
-            let full = |at: usize| over.get(at).copied().unwrap_or(0.0);
-            (left <= 1e-6 * length).then(|| sorted.iter().map(|&(_, at)| full(at)).collect())
-        });
-        let over_kept = over_kept.collect();
-        let kept: Vec<usize> = sorted.into_iter().map(|(k, _)| k).collect();
-        let removed = library.searched - kept.len();
-        (kept.clone(), Self { kept, over_kept, removed })
-    }
-}
-
-/// Exponents of so many coordinates with a sum of at most `degree`, lower sums first.
-fn exponents(count: usize, degree: usize) -> Vec<Vec<usize>> {
-    let mut all = vec![vec![]];
-    for _ in 0..count {
-        all = all
-            .into_iter()
-            .flat_map(|start: Vec<usize>| {
-                let left = degree - start.iter().sum::<usize>();
-                (0..=left).map(move |k| [start.clone(), vec![k]].concat())
-            })
-            .collect();
-    }
-    all.sort_by_key(|powers| powers.iter().sum::<usize>());
-    all
-}
-
-/// Multiples of so many angles with a sum of magnitudes from 1 to `degree`, one of each pair `m`, `-m`.
-fn harmonics(count: usize, degree: i32) -> Vec<Vec<i32>> {
-    let mut all: Vec<Vec<i32>> = vec![vec![]];
-    for _ in 0..count {
-        all = all
-            .into_iter()
-            .flat_map(|start| {
-                let left = degree - start.iter().map(|m| m.abs()).sum::<i32>();
-                (-left..=left).map(move |m| [start.clone(), vec![m]].concat())
-            })
-            .collect();
-    }
-    all.retain(|m| m.iter().find(|m| **m != 0).is_some_and(|first| *first > 0));
-    all.sort_by_key(|m| m.iter().map(|m| m.abs()).sum::<i32>());
-    all
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::extent::Friction;
+    use super::super::families::Families;
     use super::*;
 
     fn library(periodic: &[bool], gyroscopic: bool) -> Library {
         let names: Vec<String> = (1..=periodic.len()).map(|i| format!("q{i}")).collect();
-        let extent = Extent { families: Families::default(), gyroscopic, friction: false };
+        let extent = Extent { families: Families::default(), gyroscopic, friction: Friction::None, drive: None };
         Library::new(&names, periodic, extent, &[]).unwrap()
     }
 
@@ -568,12 +393,5 @@ mod tests {
         let square = quotient.over_kept[find("sin(q1)^2")].as_ref().unwrap();
         let place = kept.iter().position(|&k| k == find("cos(2*q1)")).unwrap();
         assert!((square[place] + 0.5).abs() < 1e-9 && quotient.removed > 4, "{square:?}");
-    }
-
-    #[test]
-    fn families_are_read_or_refused() {
-        let read = |text: &str| text.parse::<Families>();
-        assert_eq!(read("radial:3").unwrap(), Families { polynomial: 0, trigonometric: 0, radial: 3, reciprocal: 0 });
-        assert!(read("polynomial").is_err() && read("polynom:1").is_err() && read("polynomial:99").is_err());
     }
 }

@@ -28,29 +28,41 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod constants;
+mod drive;
+mod drive_doubts;
 mod error;
 mod exchange;
+mod extent;
+mod families;
 mod find;
 mod found;
 mod function;
+mod judged;
+mod ladder;
 mod library;
 mod motion;
 mod obstacles;
 mod prepared;
+mod quotient;
 mod regress;
+mod regular;
 mod says;
 mod search;
 mod select;
 mod units;
 mod wald;
 mod weak;
+mod written;
 
 pub use error::FormulaError;
+pub use families::Families;
+pub use find::FormulaOptions;
 #[doc(hidden)]
 pub use find::MOST_BOOTSTRAPS;
-pub use find::{FormulaOptions, formula_of_motion};
-pub use found::{FormulaSummary, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
-pub use library::Families;
+pub use found::{FoundDrive, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
+pub use ladder::formula_of_motion;
 #[doc(hidden)]
 pub use regress::MODEL_STATES;
 pub use regress::formula_of_model;
+pub use written::FormulaSummary;

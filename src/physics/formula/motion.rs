@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 pub(super) struct Model {
     pub terms: Vec<usize>,
     pub coefficients: Vec<f64>,
+    /// Angular frequency of the drive in rad/s, 0 without one.
+    pub frequency: f64,
 }
 
 /// Integrates segments with models of a library.
@@ -102,26 +104,34 @@ impl BlockSum {
 }
 
 impl Motion<'_> {
-    /// Multiple shooting with a model; the unknowns are the coefficients of the wanted terms, which the model need not all have; `None` for a
-    /// formula that cannot be recorded.
+    /// `true` if a model has terms of a drive.
+    pub fn is_driven(&self, model: &Model) -> bool {
+        model.terms.iter().any(|&k| self.library.is_driven(k))
+    }
+
+    /// Multiple shooting with a model; the unknowns are the frequency of its drive, if asked for, and the coefficients of the wanted terms, which
+    /// the model need not all have; `None` for a formula that cannot be recorded.
     fn shooting<T>(
         &self,
         model: &Model,
-        wanted: &[usize],
+        (frequency, wanted): (bool, &[usize]),
         work: impl FnOnce(&mut Problem<'_>, Vec<f64>) -> T,
     ) -> Option<T> {
         let others = wanted.iter().copied().filter(|k| !model.terms.contains(k));
         let all: Vec<usize> = model.terms.iter().copied().chain(others).collect();
         let mut values = model.coefficients.clone();
         values.resize(all.len(), 0.0);
-        let chosen: Vec<usize> = wanted.iter().filter_map(|k| all.iter().position(|known| known == k)).collect();
+        values.extend(self.library.drive.iter().map(|_| model.frequency));
+        let first: &[usize] = if frequency { &[all.len()] } else { &[] };
+        let places = wanted.iter().filter_map(|k| all.iter().position(|known| known == k));
+        let chosen: Vec<usize> = first.iter().copied().chain(places).collect();
         let x = chosen.iter().map(|&at| values[at]).collect();
-        let equations = self.library.equations(&model.terms, all.len(), wanted).ok()?;
+        let equations = self.library.equations(&model.terms, values.len(), (first, wanted)).ok()?;
         let data = self.data;
         let course = Course {
             recording: data.recording,
             equations: &equations,
-            chosen: wanted.len(),
+            chosen: chosen.len(),
             between: self.between,
             inputs: Vec::new(),
             step: data.step,
@@ -148,11 +158,20 @@ impl Motion<'_> {
         Some(work(&mut problem, x))
     }
 
-    /// Normal equations of some terms at a model, by block.
+    /// Normal equations of some terms at a model, by block, with the frequency of the drive as it is.
     pub fn blocks(&self, model: &Model, wanted: &[usize], segments: &[Segment]) -> BTreeMap<usize, BlockSum> {
-        let m = wanted.len();
+        self.blocks_of(model, (false, wanted), segments)
+    }
+
+    /// The same for all unknowns of a model: first the frequency if it has a drive, then its coefficients.
+    pub fn own_blocks(&self, model: &Model, segments: &[Segment]) -> BTreeMap<usize, BlockSum> {
+        self.blocks_of(model, (self.is_driven(model), &model.terms), segments)
+    }
+
+    fn blocks_of(&self, model: &Model, unknowns: (bool, &[usize]), segments: &[Segment]) -> BTreeMap<usize, BlockSum> {
+        let m = unknowns.1.len() + usize::from(unknowns.0);
         let mut blocks: BTreeMap<usize, BlockSum> = BTreeMap::new();
-        self.shooting(model, wanted, |problem, x| {
+        self.shooting(model, unknowns, |problem, x| {
             for part in segments.chunks(AT_A_TIME) {
                 for (segment, found) in part.iter().zip(problem.all(&x, part)) {
                     let sum = blocks.entry(self.data.block_of(segment)).or_insert_with(|| BlockSum::empty(m));
@@ -174,7 +193,7 @@ impl Motion<'_> {
 
     /// Adapts only the initial states, so that a model fits the data as well as it can; returns the sum of squares and the number of residuals.
     pub fn settle(&self, model: &Model, segments: &mut [Segment], iterations: usize) -> (f64, f64) {
-        let squares = self.shooting(model, &[], |problem, x| {
+        let squares = self.shooting(model, (false, &[]), |problem, x| {
             problem.settle(&x, segments, iterations);
             rescue(problem, &x, segments)
         });
@@ -182,13 +201,18 @@ impl Motion<'_> {
         squares.iter().fold((0.0, 0.0), |(square, count), (s, c)| (square + s, count + c))
     }
 
-    /// Fits the coefficients and the initial states.
+    /// Fits the coefficients, the frequency of the drive if there is one, and the initial states.
     pub fn fit(&self, model: &mut Model, segments: &mut [Segment], iterations: usize) {
-        let fitted = self.shooting(model, &model.terms, |problem, mut x| {
+        let driven = self.is_driven(model);
+        let fitted = self.shooting(model, (driven, &model.terms), |problem, mut x| {
             problem.fit(&mut x, segments, iterations);
             x
         });
-        model.coefficients = fitted.unwrap_or_else(|| model.coefficients.clone());
+        let Some(mut fitted) = fitted else { return };
+        if driven {
+            model.frequency = fitted.remove(0);
+        }
+        model.coefficients = fitted;
     }
 
     /// Mean size of the mass matrix of the wanted terms relative to the model's, over the initial states of segments, for every block of
@@ -204,7 +228,7 @@ impl Motion<'_> {
         let mut count: f64 = 0.0;
         let stride = segments.len().div_ceil(200).max(1);
         for segment in segments.iter().step_by(stride) {
-            self.library.evaluate(&functions, &segment.start[..n], &mut values);
+            self.library.evaluate(&functions, (&segment.start[..n], 0.0), &mut values);
             self.library.mass_matrix(&model.terms, &model.coefficients, &values, &mut mass);
             if linalg::inverse(n, &mass, &mut inverse, &mut workspace).is_err() {
                 continue;
@@ -225,17 +249,20 @@ impl Motion<'_> {
         sizes
     }
 
-    /// Fixes the common factor of every block at the model's, because the motion without forces does not determine it.
+    /// Fixes the common factor of every block at the model's, because the motion without forces does not determine it. The wanted terms are the
+    /// last unknowns of the sum.
     pub fn pin(&self, model: &Model, wanted: &[usize], segments: &[Segment], sum: &mut BlockSum) {
-        let m = wanted.len();
+        let m = sum.right.len();
+        let first = m - wanted.len();
         let sizes = self.sizes(model, wanted, segments);
         let own = model.terms.iter().zip(&model.coefficients);
-        let own = own.filter_map(|(k, c)| wanted.iter().position(|w| w == k).map(|at| sum.matrix[at * m + at] * c * c));
+        let size = |at: usize, c: f64| sum.matrix[(first + at) * m + first + at] * c * c;
+        let own = own.filter_map(|(k, c)| wanted.iter().position(|w| w == k).map(|at| size(at, *c)));
         let weight = own.fold(1.0, f64::max);
         for sizes in &sizes {
-            for i in 0..m {
-                for j in 0..m {
-                    sum.matrix[i * m + j] += weight * sizes[i] * sizes[j];
+            for i in 0..wanted.len() {
+                for j in 0..wanted.len() {
+                    sum.matrix[(first + i) * m + first + j] += weight * sizes[i] * sizes[j];
                 }
             }
         }
@@ -263,12 +290,12 @@ impl Motion<'_> {
 
     /// Residuals of every sample in units of noise, `(samples, n)`; `NaN` from where a segment cannot be followed.
     pub fn residuals(&self, model: &Model, segments: &[Segment]) -> Vec<Vec<f64>> {
-        self.shooting(model, &[], |problem, x| problem.all_residuals(&x, segments)).unwrap_or_default()
+        self.shooting(model, (false, &[]), |problem, x| problem.all_residuals(&x, segments)).unwrap_or_default()
     }
 
     /// Chooses as many integration steps between samples as keep the integrator's error below a share of the noise.
     pub fn choose_steps(&mut self, model: &Model, segments: &[Segment]) {
-        let steps = self.shooting(model, &[], |problem, x| {
+        let steps = self.shooting(model, (false, &[]), |problem, x| {
             choose_steps(problem, &x, segments);
             problem.course.substeps
         });

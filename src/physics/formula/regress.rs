@@ -1,9 +1,10 @@
 //! Finds a formula from a Lagrangian that can be evaluated, learned or given.
 
 use super::error::FormulaError;
+use super::extent::{Extent, Friction};
 use super::find::FormulaOptions;
 use super::found::{FoundFormula, Verdict};
-use super::library::{Extent, Library, Values};
+use super::library::{Library, Values};
 use super::motion::Model;
 use super::select::{Choice, Path, eliminate_backward, mean};
 use super::wald::RIDGE;
@@ -53,7 +54,8 @@ pub fn formula_of_model(
     options: &FormulaOptions,
 ) -> Result<FoundFormula, FormulaError> {
     let families = options.families.unwrap_or_default();
-    let extent = Extent { families, gyroscopic: options.gyroscopic, friction: options.friction };
+    let friction = if options.friction { Friction::Constant } else { Friction::None };
+    let extent = Extent { families, gyroscopic: options.gyroscopic, friction, drive: None };
     let library = Library::new(names, periodic, extent, &options.functions)?;
     let n = library.n();
     let mut rng = RngStream::Region.generator(options.seed);
@@ -138,6 +140,7 @@ pub fn formula_of_model(
     let of = Model {
         terms: choice.set.iter().map(|&k| kept[k]).collect(),
         coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
+        frequency: 0.0,
     };
     let residual = residual(choice);
     let probability = probabilities(&windows, choice, &path, &sigma, options);
@@ -167,7 +170,7 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
     let functions = library.functions_of(kept);
     let (mut values, mut matrix, mut right) = (Values::new(), vec![0.0; m * m], vec![0.0; m]);
     for Asked { q, mass, .. } in known {
-        library.evaluate(&functions, q, &mut values);
+        library.evaluate(&functions, (q, 0.0), &mut values);
         for (k, &(_, (i, j), f)) in kinetic.iter().enumerate() {
             // An off-diagonal element appears twice in the matrix.
             let weight = if i == j { 4.0 } else { 2.0 } / (sizes[i] * sizes[j]);

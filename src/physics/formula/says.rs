@@ -1,6 +1,6 @@
 //! Report of a formula.
 
-use super::found::{FoundFormula, FoundTerm, Rival, Verdict};
+use super::found::{FoundDrive, FoundFormula, FoundTerm, Rival, Verdict};
 use crate::findings::Findings;
 use crate::names::rounded;
 
@@ -12,6 +12,13 @@ impl FoundFormula {
         findings.gap().code(format!("L = {}", self.text(false)));
         if self.friction {
             findings.code(format!("D = {}", self.text(true)));
+        }
+        if let Some(FoundDrive { name, frequency, standard_error }) = &self.drive {
+            let period = rounded(std::f64::consts::TAU / frequency, 6);
+            let [frequency, error] = [rounded(*frequency, 7), rounded(*standard_error, 2)];
+            findings.line(format!(
+                "a periodic drive: {name} = {frequency} rad/s, standard error {error}, period {period} s"
+            ));
         }
         let headers = ["term", "constant", "coefficient", "error", "95 % range", "unit", "probability", "near"];
         findings.gap().table(&headers, self.terms.iter().map(FoundTerm::row));

@@ -2,12 +2,13 @@
 
 use super::found::Left;
 use super::function::Notation;
-use super::library::{Library, Quotient, Values};
+use super::library::{Library, Values};
 use super::motion::{BlockSum, Model, Motion, inflation, total};
+use super::quotient::Quotient;
+use super::regular::is_regular;
 use super::wald::{Equations, RIDGE, Survivors, survivors};
-use super::weak::is_regular;
 use crate::identification::Segment;
-use crate::identification::linear::{inverse_with, times};
+use crate::identification::linear::{inverse_with, part, times};
 use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
 use rand::Rng;
@@ -126,7 +127,7 @@ impl Search<'_> {
             }
             seen.push(terms.clone());
             let coefficients = found.set.iter().map(|&k| found.coefficients[k]).collect();
-            *model = Model { terms, coefficients };
+            (model.terms, model.coefficients) = (terms, coefficients);
         }
         (BTreeMap::new(), true)
     }
@@ -213,7 +214,7 @@ pub(super) fn shorten(
             let better = cost < THRESHOLD * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least);
             let terms: Vec<usize> = rest.iter().map(|&k| model.terms[k]).chain([term]).collect();
             if better && search.regular(model, (&terms, &x)) {
-                best = Some((cost, gone, Model { terms, coefficients: x }));
+                best = Some((cost, gone, Model { terms, coefficients: x, frequency: model.frequency }));
             }
         }
         let Some((_, gone, shorter)) = best.filter(|_| search.motion.data.cancellation.go_on()) else {
@@ -226,18 +227,36 @@ pub(super) fn shorten(
     }
 }
 
-/// Covariance of the coefficients with the common factors fixed; `false` if the fit has not converged.
-pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut [Segment]) -> (Vec<f64>, bool) {
-    let m = model.terms.len();
-    let mut last = (vec![f64::NAN; m * m], false);
+/// Covariance of a fit.
+pub(super) struct Covariance {
+    /// Of the coefficients with the common factors fixed, `(terms, terms)`.
+    pub coefficients: Vec<f64>,
+    /// Standard error of the frequency of the drive, if there is one.
+    pub frequency: Option<f64>,
+    /// `false` if the fit has not converged.
+    pub converged: bool,
+}
+
+/// Refits a model until that has converged.
+pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut [Segment]) -> Covariance {
+    let terms = model.terms.len();
+    let driven = search.motion.is_driven(model);
+    let m = terms + usize::from(driven);
+    let of = |whole: &[f64], converged: bool| {
+        let places: Vec<usize> = (m - terms..m).collect();
+        let frequency = driven.then(|| whole[0].max(0.0).sqrt());
+        Covariance { coefficients: part(m, whole, &places), frequency, converged }
+    };
+    let mut last = of(&vec![f64::NAN; m * m], false);
     for _ in 0..REFITS {
-        let blocks = search.motion.blocks(model, &model.terms, segments);
+        let blocks = search.motion.own_blocks(model, segments);
         let mut sum = total(&blocks, &|_| 1.0);
         search.motion.pin(model, &model.terms, segments, &mut sum);
         let Some(inverse) = inverse_with(m, &sum.matrix, RIDGE) else { return last };
         let decrement = dot(&sum.right, &times(m, &inverse, &sum.right)) / sum.inflation;
-        last = (inverse.into_iter().map(|x| x * sum.inflation).collect(), decrement < SETTLED);
-        if last.1 {
+        let whole: Vec<f64> = inverse.into_iter().map(|x| x * sum.inflation).collect();
+        last = of(&whole, decrement < SETTLED);
+        if last.converged {
             break;
         }
         tracing::debug!(decrement, "fit goes on");

@@ -78,9 +78,11 @@ impl Units {
         let mut dimension = Dimension::default();
         for base in bases {
             let power = |factor: f64, shift: f64| {
-                let q: Vec<f64> = (0..n).map(|i| 0.37 + shift + 0.11 * i as f64).collect();
+                // The last one is the phase of a drive.
+                let q: Vec<f64> = (0..=n).map(|i| 0.37 + shift + 0.11 * i as f64).collect();
                 let power = |i: usize| self.coordinates[i].0.get(base).copied().unwrap_or(0.0);
-                let scaled: Vec<f64> = (0..n).map(|i| q[i] * factor.powf(power(i))).collect();
+                let scaled: Vec<f64> =
+                    (0..=n).map(|i| if i < n { q[i] * factor.powf(power(i)) } else { q[i] }).collect();
                 (function.value(&scaled) / function.value(&q)).ln() / factor.ln()
             };
             let found = [power(1.3, 0.0), power(0.6, 0.0), power(1.3, 0.23)];

@@ -4,6 +4,7 @@
 //! coefficients of the terms.
 
 use super::library::{Kind, Library, Term, Values, blocks};
+use super::regular::is_regular;
 use super::select::mean;
 use crate::linalg::{self, Workspace};
 
@@ -35,9 +36,11 @@ pub(super) struct Windows {
     /// Integrals of `phi f`, `(windows, functions)`.
     functions: Vec<f64>,
     /// Integrals of `phi F`, `(windows, n)`; empty without forces.
-    forces: Vec<f64>,
+    pub forces: Vec<f64>,
     /// Block of every window.
     pub blocks: Vec<usize>,
+    /// Times of their centres in s; none for states.
+    pub centres: Vec<f64>,
     /// Number of functions.
     width: usize,
     /// Contributions of the terms to the mass matrix: `(i, j, function)`.
@@ -46,6 +49,8 @@ pub(super) struct Windows {
     joined: Vec<Vec<usize>>,
 }
 
+/// About how many windows are used to check the condition of mass matrices.
+const LOOKED_AT: usize = 200;
 /// Largest number of windows.
 const MOST_WINDOWS: f64 = 4000.0;
 
@@ -66,6 +71,7 @@ impl Windows {
             functions: Vec::new(),
             forces: Vec::new(),
             blocks: Vec::new(),
+            centres: Vec::new(),
             width: which.len(),
             kinetic: kinetic.collect(),
             joined: terms.iter().map(|&k| library.coordinates(k)).collect(),
@@ -92,7 +98,7 @@ impl Windows {
         let mut values = Values::new();
         for s in 0..samples {
             let (q, v) = (&stretch.q[s * n..(s + 1) * n], &stretch.v[s * n..(s + 1) * n]);
-            library.evaluate(which, q, &mut values);
+            library.evaluate(which, (q, times[s]), &mut values);
             which.iter().enumerate().for_each(|(at, &f)| functions[s * self.width + at] = values[f].value);
             let range = s * n * count..(s + 1) * n * count;
             let (momenta, pulls) = (&mut momenta[range.clone()], &mut pulls[range]);
@@ -148,6 +154,7 @@ impl Windows {
                 self.forces.extend(&force);
             }
             self.blocks.push(stretch.block);
+            self.centres.push(centre);
             centre += apart;
         }
     }
@@ -160,7 +167,7 @@ impl Windows {
         let mut values = Values::new();
         let mut single = vec![0.0; n];
         for (block, State { q, v, a, equation }) in states.iter().enumerate() {
-            library.evaluate(&which, q, &mut values);
+            library.evaluate(&which, (q, 0.0), &mut values);
             let start = windows.equations.len();
             windows.equations.resize(start + n * count, 0.0);
             for (at, &k) in terms.iter().enumerate() {
@@ -269,10 +276,10 @@ impl Windows {
         (0..self.terms).filter(|&k| kept(&self.joined[k])).collect()
     }
 
-    /// Normal equations of the errors of accelerations with the mass matrix of `coefficients`: the matrix of the terms `set`, the contribution
-    /// of known forces on the right, and how the terms change the size of the mass matrix. Windows for which `used` is false are left out.
-    pub fn normal(&self, coefficients: &[f64], set: &[usize], sigma: &[f64], used: &[bool]) -> Normal {
-        let (n, count, m) = (self.n, self.terms, set.len());
+    /// The inverse mass matrices of `coefficients` in units of `sigma`, `(windows, n, n)`, 0 where there is none, none of them far larger than
+    /// the others.
+    fn weights(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
+        let n = self.n;
         let mut weights = vec![0.0; self.len() * n * n];
         let mut sizes = Vec::with_capacity(self.len());
         // Windows that fail are NaN.
@@ -288,12 +295,37 @@ impl Windows {
         let mut sorted: Vec<f64> = sizes.iter().copied().filter(|s| *s > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
         let most = 5.0 * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+        for (weight, size) in weights.chunks_exact_mut(n * n).zip(sizes) {
+            let cut = if size > most { most / size } else { 1.0 };
+            weight.iter_mut().for_each(|w| *w *= cut);
+        }
+        weights
+    }
+
+    /// Errors of accelerations over `sigma` that terms with coefficient 1 cause, `(set, windows, n)`, then those of a unit force on each
+    /// coordinate, `(n, windows, n)`, with the mass matrix of `coefficients`.
+    pub fn columns(&self, coefficients: &[f64], set: &[usize], sigma: &[f64]) -> [Vec<Vec<f64>>; 2] {
+        let (n, count) = (self.n, self.terms);
+        let weights = self.weights(coefficients, sigma);
+        let of = |k: usize, window: usize, i: usize| {
+            let weight = &weights[(window * n + i) * n..][..n];
+            (0..n).map(|j| weight[j] * self.equations[(window * n + j) * count + k]).sum::<f64>()
+        };
+        let places = || (0..self.len() * n).map(|at| (at / n, at % n));
+        let terms = set.iter().map(|&k| places().map(|(window, i)| of(k, window, i)).collect()).collect();
+        let force = |j: usize| places().map(|(window, i)| weights[(window * n + i) * n + j]).collect();
+        [terms, (0..n).map(force).collect()]
+    }
+
+    /// Normal equations of the errors of accelerations with the mass matrix of `coefficients`: the matrix of the terms `set`, the contribution
+    /// of known forces on the right, and how the terms change the size of the mass matrix. Windows for which `used` is false are left out.
+    pub fn normal(&self, coefficients: &[f64], set: &[usize], sigma: &[f64], used: &[bool]) -> Normal {
+        let (n, count, m) = (self.n, self.terms, set.len());
+        let weights = self.weights(coefficients, sigma);
         let mut normal = Normal { matrix: vec![0.0; m * m], right: vec![0.0; m], size: vec![0.0; m] };
         let mut row = vec![0.0; m];
         for window in (0..self.len()).filter(|&w| used[w]) {
-            let weight = &mut weights[window * n * n..(window + 1) * n * n];
-            let cut = if sizes[window] > most { most / sizes[window] } else { 1.0 };
-            weight.iter_mut().for_each(|w| *w *= cut);
+            let weight = &weights[window * n * n..(window + 1) * n * n];
             for i in 0..n {
                 row.fill(0.0);
                 let mut force = 0.0;
@@ -344,34 +376,6 @@ impl Windows {
         };
         terms.iter().map(of).collect()
     }
-}
-
-/// About how many windows are used to check the condition of mass matrices.
-const LOOKED_AT: usize = 200;
-/// Largest condition number of a mass matrix in units of its diagonal: systems in textbooks stay below 100 except near singular positions.
-const MOST_CONDITION: f64 = 1e4;
-
-/// `true` if most of some symmetric matrices `(n, n)` have a condition number, rows and columns scaled to size 1, below
-/// [`MOST_CONDITION`].
-pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
-    let mut scaled = matrices.to_vec();
-    for matrix in scaled.chunks_exact_mut(n * n) {
-        // The largest element of each row of a positive definite matrix is then on the diagonal; others need not have a diagonal.
-        for _ in 0..3 {
-            let size = |i: usize| matrix[i * n..(i + 1) * n].iter().fold(0.0, |most: f64, x| most.max(x.abs())).sqrt();
-            let sizes: Vec<f64> = (0..n).map(size).collect();
-            matrix.iter_mut().enumerate().for_each(|(at, x)| *x /= sizes[at / n] * sizes[at % n]);
-        }
-    }
-    let mut values = vec![0.0; scaled.len() / n];
-    // Matrices that fail are NaN.
-    let _ = linalg::eigenvalues(n, &scaled, &mut values, &mut Workspace::new());
-    let regular = values.chunks_exact(n).filter(|values| {
-        let sizes = || values.iter().map(|x| x.abs());
-        let (least, most) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
-        values.iter().all(|x| x.is_finite()) && least * MOST_CONDITION > most
-    });
-    4 * regular.count() > 3 * (values.len() / n)
 }
 
 /// Terms that act on separate coordinates.

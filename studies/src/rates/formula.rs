@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 type Found = Result<FoundFormula, FormulaError>;
 /// Accelerations at a time, positions and velocities.
-type Law = Box<dyn Fn(f64, &[f64], &[f64]) -> Vec<f64>>;
+pub(super) type Law = Box<dyn Fn(f64, &[f64], &[f64]) -> Vec<f64>>;
 
 /// Random numbers of a system.
 pub(super) struct Draw(ChaCha8Rng);
@@ -98,7 +98,7 @@ pub(super) fn track(run: usize, times: Vec<f64>, q: Vec<f64>) -> RecordedTraject
 }
 
 /// A step of the classical method of Runge and Kutta.
-fn step(law: &Law, (q, v): (&mut Vec<f64>, &mut Vec<f64>), (t, h): (f64, f64)) {
+pub(super) fn step(law: &Law, (q, v): (&mut Vec<f64>, &mut Vec<f64>), (t, h): (f64, f64)) {
     let moved = |x: &[f64], by: &[f64], h: f64| x.iter().zip(by).map(|(x, d)| x + h * d).collect::<Vec<f64>>();
     let mut rates = vec![(v.clone(), law(t, q, v))];
     for h in [h / 2.0, h / 2.0, h] {
@@ -267,7 +267,7 @@ fn search(recording: &Recording, seed: u64) -> Found {
     formula_of_motion(recording, &FormulaOptions { bootstraps: 4, seed, threads: 2, ..FormulaOptions::default() })
 }
 
-fn is_found(found: &Found) -> bool {
+pub(super) fn is_found(found: &Found) -> bool {
     found.as_ref().is_ok_and(|found| found.verdict == Verdict::Found)
 }
 
@@ -358,7 +358,7 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
 }
 
 /// Says what was wrong.
-fn report(right: bool, case: &str, seed: u64, found: &Found) {
+pub(super) fn report(right: bool, case: &str, seed: u64, found: &Found) {
     match found {
         _ if right => {}
         Ok(found) => eprintln!("{case} {seed}: {:?} {:.3}: {}", found.verdict, found.residual, found.text(false)),

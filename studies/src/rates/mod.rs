@@ -1,7 +1,7 @@
 //! How often a verdict is wrong: every word that judges is tried on systems drawn at random whose truth is known, and above all where the
 //! right answer is "no".
 //!
-//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `constraints`, `check`, `columns`, `machines` or `readings` prints a part of it
+//! `lnn-studies rates` prints one table; `--part identify`, `formula`, `drives`, `constraints`, `check`, `columns`, `machines` or `readings` prints a part of it
 //! and `--seeds N` gives the number of systems of every case. The program fails if a rate lies outside the limits that the table states.
 
 mod check;
@@ -9,6 +9,7 @@ mod columns;
 mod constraints;
 mod convergence;
 mod determined;
+mod drives;
 mod formula;
 mod identify;
 mod machines;
@@ -58,6 +59,7 @@ fn table(rates: &[Rate]) -> String {
 enum Part {
     Identify,
     Formula,
+    Drives,
     Constraints,
     Check,
     Columns,
@@ -66,8 +68,16 @@ enum Part {
 }
 
 impl Part {
-    const ALL: [Self; 7] =
-        [Self::Identify, Self::Formula, Self::Constraints, Self::Check, Self::Columns, Self::Machines, Self::Readings];
+    const ALL: [Self; 8] = [
+        Self::Identify,
+        Self::Formula,
+        Self::Drives,
+        Self::Constraints,
+        Self::Check,
+        Self::Columns,
+        Self::Machines,
+        Self::Readings,
+    ];
 
     fn rates(self, seeds: u64) -> Outcome<Vec<Rate>> {
         match self {
@@ -76,6 +86,7 @@ impl Part {
                 Ok(parts.into_iter().map(|rates| rates(seeds)).collect::<Outcome<Vec<_>>>()?.concat())
             }
             Self::Formula => formula::rates(seeds),
+            Self::Drives => drives::rates(seeds),
             Self::Constraints => constraints::rates(seeds),
             Self::Check => check::rates(seeds),
             Self::Columns => columns::rates(seeds),

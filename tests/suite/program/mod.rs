@@ -8,6 +8,7 @@ mod constraints;
 mod conveniences;
 mod dissipation;
 mod driven;
+mod drives;
 mod events;
 mod first_minute;
 mod fit;

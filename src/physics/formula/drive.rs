@@ -1,0 +1,336 @@
+//! Frequencies of a periodic drive, in what libraries without one leave of the motion.
+//!
+//! The weak form of a library leaves a mean acceleration in every window. A drive shows in them as a spectral line: as a force on a coordinate,
+//! `cos(om t)`, or as a factor of a function of the coordinates. Its power is compared with that of the neighbouring frequencies, so that a
+//! continuous spectrum, of noise or of what the library lacks, has no line.
+
+use super::find::{WeakForm, best};
+use super::function::Function;
+use super::library::{Kind, Library};
+use super::prepared::Prepared;
+use crate::cancellation::Cancellation;
+use crate::linalg::dot;
+use crate::recording::RecordedTrajectory;
+use std::collections::BTreeSet;
+use std::f64::consts::{LN_2, PI, TAU};
+
+/// Smallest number of periods in the longest trajectory.
+pub(super) const LEAST_PERIODS: f64 = 3.0;
+/// Largest product of a frequency and the width of the test functions, which damp faster drives.
+const MOST_DAMPED: f64 = 15.0;
+/// Frequencies that are looked at within the resolution of the recording, and their largest number.
+const OVERSAMPLED: f64 = 4.0;
+const MOST_FREQUENCIES: f64 = 50_000.0;
+/// Distance from a line, in units of the resolution, of the frequencies that show the spectrum without it; and their smallest number, in the
+/// same units.
+const BESIDE: [f64; 2] = [2.0, 14.0];
+const LEAST_BESIDE: f64 = 6.0;
+/// Largest rate of false alarms, for all frequencies that are looked at together.
+const MOST_ALARMS: f64 = 1e-3;
+/// Independent frequencies for each unit of the resolution, of which a maximum is taken.
+const INDEPENDENT: f64 = 3.0;
+/// Largest number of terms whose effect is removed from the motion first.
+const MOST_REMOVED: usize = 20;
+
+/// What a library leaves of the motion.
+pub(super) struct Rest {
+    /// Times of the windows, in s.
+    times: Vec<f64>,
+    /// Everything that a drive may multiply.
+    driven: Vec<Driven>,
+    /// Lowest and highest frequency, in rad/s.
+    band: [f64; 2],
+    /// Resolution of the longest trajectory, and of the whole recording.
+    resolution: [f64; 2],
+}
+
+/// The effect on accelerations of what a drive multiplies, for a factor of 1, by window: its square, its product with the errors that are left,
+/// and with each of the orthonormal effects of other terms, which are not in the errors.
+struct Driven {
+    squares: Vec<f64>,
+    products: Vec<f64>,
+    others: Vec<Vec<f64>>,
+}
+
+impl Driven {
+    /// From effects and errors, `(windows, n)`.
+    fn new(effect: &[f64], errors: &[f64], others: &[Vec<f64>], n: usize) -> Self {
+        let by = |other: &[f64]| effect.chunks_exact(n).zip(other.chunks_exact(n)).map(|(a, b)| dot(a, b)).collect();
+        let others = others.iter().map(|other| by(other)).collect();
+        Self { squares: by(effect), products: by(errors), others }
+    }
+
+    /// Reduction of the sum of squares by a drive with these sines and cosines, all other terms refitted.
+    fn power(&self, sines: &[f64], cosines: &[f64]) -> f64 {
+        let sum =
+            |a: &[f64], b: &[f64]| self.squares.iter().zip(a.iter().zip(b)).map(|(x, (a, b))| x * a * b).sum::<f64>();
+        let [whole_cc, mut cs, whole_ss] = [sum(cosines, cosines), sum(cosines, sines), sum(sines, sines)];
+        let [ce, se] = [dot(&self.products, cosines), dot(&self.products, sines)];
+        let (mut cc, mut ss) = (whole_cc, whole_ss);
+        for other in &self.others {
+            let [c, s] = [dot(other, cosines), dot(other, sines)];
+            cc -= c * c;
+            cs -= c * s;
+            ss -= s * s;
+        }
+        let determinant = cc * ss - cs * cs;
+        // Near a frequency of 0 the sine and the cosine are one function; others may be both of them.
+        if determinant <= 1e-9 * whole_cc * whole_ss {
+            return 0.0;
+        }
+        (ss * ce * ce - 2.0 * cs * ce * se + cc * se * se) / determinant
+    }
+}
+
+/// A line of the spectrum.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    /// Its angular frequency, in rad/s.
+    pub frequency: f64,
+    /// Rate of false alarms, for all frequencies together.
+    pub alarms: f64,
+}
+
+/// Time from the first to the last sample of a trajectory.
+fn span(track: &RecordedTrajectory) -> f64 {
+    track.times.last().zip(track.times.first()).map_or(0.0, |(last, first)| last - first)
+}
+
+/// Time from the first to the last sample of the longest trajectory.
+pub(super) fn longest(data: &Prepared<'_>) -> f64 {
+    data.recording.tracks.iter().map(span).fold(0.0, f64::max)
+}
+
+impl Rest {
+    /// What is left of the motion in the windows that are not held out, with the mass matrix of the best choice of terms, which a drive may have
+    /// led astray, and with one of unit masses.
+    pub fn of(weak: &WeakForm, data: &Prepared<'_>, held: &BTreeSet<usize>) -> Vec<Self> {
+        let units = weak.windows.unit_mass(&weak.library, &weak.quotient.kept, &data.speeds);
+        let masses = [Some(&units), best(&weak.path).map(|choice| &choice.coefficients)];
+        masses.into_iter().flatten().map(|mass| Self::with_mass(weak, mass, data, held)).collect()
+    }
+
+    fn with_mass(weak: &WeakForm, coefficients: &[f64], data: &Prepared<'_>, held: &BTreeSet<usize>) -> Self {
+        let WeakForm { library, quotient, windows, path } = weak;
+        let set: Vec<usize> = (0..coefficients.len()).filter(|&at| coefficients[at] != 0.0).collect();
+        let kept = |at: &usize| quotient.kept[*at];
+        let still = |at: &usize| library.kinetic(kept(at)).is_none();
+        let mut removed: Vec<usize> = path.order.iter().copied().filter(still).take(MOST_REMOVED).collect();
+        removed.extend(set.iter().filter(|at| still(at) && !path.order.contains(at)));
+        let shaken: Vec<usize> = library
+            .driven()
+            .iter()
+            .skip(library.n())
+            .filter_map(|f| (0..quotient.kept.len()).find(|at| is_potential(library, kept(at), f)))
+            .collect();
+        let of = |set: &[usize]| windows.columns(coefficients, set, &data.sigma);
+        let [own, units] = of(&set);
+        let mut errors = vec![0.0; windows.len() * data.n];
+        own.iter().zip(&set).for_each(|(column, &at)| add(&mut errors, coefficients[at], column));
+        for (j, unit) in units.iter().enumerate().filter(|_| windows.driven()) {
+            let of = |at: usize| windows.forces[at / data.n * data.n + j];
+            errors.iter_mut().zip(unit).enumerate().for_each(|(at, (e, u))| *e -= of(at) * u);
+        }
+        let learned: Vec<usize> = (0..windows.len()).filter(|&w| !held.contains(&windows.blocks[w])).collect();
+        let some = |column: &[f64]| -> Vec<f64> {
+            learned.iter().flat_map(|w| &column[w * data.n..(w + 1) * data.n]).copied().collect()
+        };
+        let mut errors = some(&errors);
+        let others = remove(&mut errors, of(&removed)[0].iter().map(|column| some(column)));
+        let effects = of(&shaken);
+        let effects = units.iter().chain(&effects[0]).map(|effect| some(effect));
+        let driven = effects.map(|effect| Driven::new(&effect, &errors, &others, data.n)).collect();
+        let times: Vec<f64> = learned.iter().map(|&w| windows.centres[w]).collect();
+        let ends = [times.iter().copied().fold(f64::INFINITY, f64::min), times.iter().copied().fold(0.0, f64::max)];
+        let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+        let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
+        let band = [TAU * LEAST_PERIODS / longest, (MOST_DAMPED / data.width().0).min(PI / apart)];
+        let resolution = [TAU / longest, TAU / (ends[1] - ends[0]).max(longest)];
+        Self { times, driven, band, resolution }
+    }
+
+    /// The lines of several, the most significant first, those that are one within the resolution once.
+    pub fn lines(rests: &[Self], stop: &Cancellation) -> Vec<Line> {
+        let mut lines: Vec<Line> = rests.iter().filter_map(|rest| rest.line(stop)).collect();
+        lines.sort_by(|a, b| a.alarms.total_cmp(&b.alarms));
+        let width = rests.first().map_or(0.0, |rest| rest.resolution[0]);
+        lines.dedup_by(|a, b| (a.frequency - b.frequency).abs() < width / 2.0);
+        lines
+    }
+
+    /// The most significant line; `None` if none stands out.
+    fn line(&self, stop: &Cancellation) -> Option<Line> {
+        let [low, high] = self.band;
+        let step = self.resolution[1] / OVERSAMPLED;
+        let count = (high - low) / step;
+        if !(2.0..MOST_FREQUENCIES).contains(&count) {
+            return None;
+        }
+        let grid: Vec<f64> = (0..=count as usize).map(|k| low + k as f64 * step).collect();
+        let powers: Vec<Vec<f64>> = grid.iter().take_while(|_| stop.go_on()).map(|om| self.powers(*om)).collect();
+        if powers.len() < grid.len() {
+            return None;
+        }
+        let tests = INDEPENDENT * (high - low) / self.resolution[1] * self.driven.len() as f64;
+        let of = |k: usize| {
+            let own: Vec<f64> = powers.iter().map(|powers| powers[k]).collect();
+            let peak = (0..own.len()).max_by(|&a, &b| own[a].total_cmp(&own[b]))?;
+            let alarms = tests * self.chance(&grid, &own, peak)?;
+            tracing::debug!(k, frequency = grid[peak], alarms, "line");
+            Some(Line { frequency: self.refined(k, [grid[peak] - step, grid[peak] + step]), alarms })
+        };
+        let lines = (0..self.driven.len()).filter_map(of);
+        lines.min_by(|a, b| a.alarms.total_cmp(&b.alarms)).filter(|line| line.alarms < MOST_ALARMS)
+    }
+
+    /// Reduction of the sum of squares by a drive of each kind at a frequency.
+    fn powers(&self, frequency: f64) -> Vec<f64> {
+        let (sines, cosines): (Vec<f64>, Vec<f64>) = self.times.iter().map(|t| (frequency * t).sin_cos()).unzip();
+        self.driven.iter().map(|driven| driven.power(&sines, &cosines)).collect()
+    }
+
+    /// Probability of a power as large as that at a peak, from the median of those beside it: of `k` of them, `(1 + z/k)^-k` for a power of `z`
+    /// times their mean, where all are exponentially distributed. `None` if there are too few.
+    fn chance(&self, grid: &[f64], powers: &[f64], peak: usize) -> Option<f64> {
+        let [from, to] = BESIDE.map(|units| units * self.resolution[0]);
+        let is_beside = |om: &f64| (from..to).contains(&(om - grid[peak]).abs());
+        let mut beside: Vec<f64> = grid.iter().zip(powers).filter(|(om, _)| is_beside(om)).map(|(_, p)| *p).collect();
+        beside.sort_by(f64::total_cmp);
+        let count = beside.len() as f64 * (grid[1] - grid[0]) / self.resolution[0];
+        let mean = beside.get(beside.len() / 2).filter(|_| count >= LEAST_BESIDE)? / LN_2;
+        Some((-count * (powers[peak] / mean / count).ln_1p()).exp())
+    }
+
+    /// The frequency of the largest power between two.
+    fn refined(&self, k: usize, [mut low, mut high]: [f64; 2]) -> f64 {
+        let power = |om: f64| self.powers(om)[k];
+        for _ in 0..12 {
+            let [a, b] = [low + 0.382 * (high - low), low + 0.618 * (high - low)];
+            if power(a) > power(b) { high = b } else { low = a }
+        }
+        (low + high) / 2.0
+    }
+}
+
+/// `true` for the function `f` as a term of `L`.
+fn is_potential(library: &Library, k: usize, f: &Function) -> bool {
+    library.terms[k].kind == Kind::Potential && library.functions[library.terms[k].function] == *f
+}
+
+fn add(to: &mut [f64], factor: f64, column: &[f64]) {
+    to.iter_mut().zip(column).for_each(|(to, x)| *to += factor * x);
+}
+
+/// Removes from a column what others explain; returns orthonormal directions of these.
+fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut directions: Vec<Vec<f64>> = Vec::new();
+    for mut column in columns {
+        let before = dot(&column, &column);
+        for _ in 0..2 {
+            for direction in &directions {
+                let own = dot(direction, &column);
+                add(&mut column, -own, direction);
+            }
+        }
+        let size = dot(&column, &column);
+        if size > 1e-16 * before {
+            column.iter_mut().for_each(|x| *x /= size.sqrt());
+            let own = dot(&column, from);
+            add(from, -own, &column);
+            directions.push(column);
+        }
+    }
+    directions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::RngStream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Errors of 400 windows, 0.25 s apart, of one coordinate that a force and a factor of a function may drive.
+    fn rest(seed: u64, mut error: impl FnMut(f64, f64) -> f64) -> Rest {
+        let mut rng = RngStream::Trajectories.generator(seed);
+        let mut draw = || <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
+        let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
+        let function: Vec<f64> = times.iter().map(|t| (0.7 * t + (0.31 * t).sin()).cos()).collect();
+        let errors: Vec<f64> = times.iter().map(|t| error(*t, draw())).collect();
+        let (span, force) = (100.0, vec![1.0; times.len()]);
+        let resolution = [TAU / span; 2];
+        let driven = [force, function].map(|effect| Driven::new(&effect, &errors, &[], 1)).into();
+        Rest { times, driven, band: [3.0 * TAU / span, 10.0], resolution }
+    }
+
+    fn line(rest: &Rest) -> Option<Line> {
+        rest.line(&Cancellation::default())
+    }
+
+    #[test]
+    fn a_line_is_found_at_its_frequency() {
+        for seed in 0..20 {
+            let found = line(&rest(seed, |t, noise| 0.6 * (2.3 * t + 0.4).cos() + noise)).unwrap();
+            // The standard error is sqrt(24 / 400) / 0.6 / 100.
+            assert!((found.frequency - 2.3).abs() < 4.0 * 4.1e-3, "{seed} {found:?}");
+            let shaken = |t: f64| (0.7 * t + (0.31 * t).sin()).cos() * (5.1 * t + 1.0).sin();
+            let found = line(&rest(seed, |t, noise| shaken(t) + noise)).unwrap();
+            assert!((found.frequency - 5.1).abs() < 0.02, "{seed} {found:?}");
+        }
+    }
+
+    #[test]
+    fn continuous_spectra_have_no_line() {
+        let seeds = 200;
+        let alarms = |make: &dyn Fn(u64) -> Rest| (0..seeds).filter(|&seed| line(&make(seed)).is_some()).count();
+        assert!(alarms(&|seed| rest(seed, |_, noise| noise)) <= 2);
+        // Correlated over 1 s.
+        let red = |seed| {
+            let mut last = 0.0;
+            rest(seed, move |_, noise| {
+                last = 0.78 * last + noise;
+                last
+            })
+        };
+        assert!(alarms(&red) <= 2);
+        // A sign that changes at random.
+        let jumps = |seed| {
+            let mut sign = 1.0;
+            rest(seed, move |_, noise| {
+                sign *= if noise > 1.0 { -1.0 } else { 1.0 };
+                sign + 0.1 * noise
+            })
+        };
+        assert!(alarms(&jumps) <= 2);
+    }
+
+    #[test]
+    fn a_band_without_neighbours_has_no_line() {
+        let few = |high: f64| Rest { band: [1.0, high], ..rest(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
+        assert!(line(&few(1.0 + 5.0 * TAU / 100.0)).is_none() && line(&few(10.0)).is_some());
+    }
+
+    #[test]
+    fn what_others_explain_is_removed() {
+        let wave = |om: f64| (0..50).map(|k| (om * f64::from(k)).cos()).collect::<Vec<f64>>();
+        let (a, b) = (wave(0.3), wave(0.8));
+        let mut left: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
+        // The third column has no part of its own.
+        let sum = a.iter().zip(&b).map(|(a, b)| a + b).collect();
+        let directions = remove(&mut left, [a, b, sum].into_iter());
+        assert!(directions.len() == 2 && left.iter().all(|x| x.abs() < 1e-12), "{left:?}");
+    }
+
+    #[test]
+    fn a_line_that_another_term_hides_is_found() {
+        // A term holds the drive and an oscillation; without it an equal part of each is left.
+        let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
+        let wave = |om: f64, size: f64| times.iter().map(|t| size * (om * t).cos()).collect::<Vec<f64>>();
+        let (drive, other) = (wave(1.3, 1.0), wave(1.9, 1.2));
+        let term: Vec<f64> = drive.iter().zip(&other).map(|(a, b)| a + b).collect();
+        let mut errors = drive.clone();
+        let others = remove(&mut errors, [term].into_iter());
+        let driven = vec![Driven::new(&vec![1.0; times.len()], &errors, &others, 1)];
+        let rest = Rest { times, driven, band: [0.2, 10.0], resolution: [TAU / 100.0; 2] };
+        assert!((line(&rest).unwrap().frequency - 1.3).abs() < 2e-3);
+    }
+}
