@@ -269,20 +269,20 @@ mod tests {
     #[test]
     fn a_line_is_found_at_its_frequency() {
         for seed in 0..20 {
-            let found = line(&rest(seed, |t, noise| 0.6 * (2.3 * t + 0.4).cos() + noise)).unwrap();
-            // The standard error is sqrt(24 / 400) / 0.6 / 100.
-            assert!((found.frequency - 2.3).abs() < 4.0 * 4.1e-3, "{seed} {found:?}");
+            let found = line(&rest(seed, |t, noise| (2.3 * t + 0.4).cos() + noise)).unwrap();
+            // The standard error is sqrt(24 / 400) / 100.
+            assert!((found.frequency - 2.3).abs() < 4.0 * 2.5e-3, "{seed} {found:?}");
             let shaken = |t: f64| (0.7 * t + (0.31 * t).sin()).cos() * (5.1 * t + 1.0).sin();
-            let found = line(&rest(seed, |t, noise| shaken(t) + noise)).unwrap();
+            let found = line(&rest(seed, |t, noise| 2.0 * shaken(t) + noise)).unwrap();
             assert!((found.frequency - 5.1).abs() < 0.02, "{seed} {found:?}");
         }
     }
 
     #[test]
     fn continuous_spectra_have_no_line() {
-        let seeds = 200;
+        let seeds = 60;
         let alarms = |make: &dyn Fn(u64) -> Rest| (0..seeds).filter(|&seed| line(&make(seed)).is_some()).count();
-        assert!(alarms(&|seed| rest(seed, |_, noise| noise)) <= 2);
+        assert!(alarms(&|seed| rest(seed, |_, noise| noise)) <= 1);
         // Correlated over 1 s.
         let red = |seed| {
             let mut last = 0.0;
@@ -291,7 +291,7 @@ mod tests {
                 last
             })
         };
-        assert!(alarms(&red) <= 2);
+        assert!(alarms(&red) <= 1);
         // A sign that changes at random.
         let jumps = |seed| {
             let mut sign = 1.0;
@@ -300,7 +300,7 @@ mod tests {
                 sign + 0.1 * noise
             })
         };
-        assert!(alarms(&jumps) <= 2);
+        assert!(alarms(&jumps) <= 1);
     }
 
     #[test]
