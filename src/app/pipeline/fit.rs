@@ -357,6 +357,8 @@ fn formula(
     }
     let options = FormulaOptions {
         friction: network.architecture().has_friction(),
+        // The network does not know the time.
+        drive: false,
         noise: config.noise.clone(),
         units: prepared.reading.coordinate_units(),
         seed: config.training.seed,
