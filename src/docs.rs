@@ -41,6 +41,7 @@ macro_rules! page {
     ($file:literal) => {
         concat!(
             "[commands]: crate::docs::commands\n",
+            "[drives]: crate::docs::formula#periodic-drives\n",
             "[many-machines]: crate::docs::many_machines\n",
             "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[inverse]: crate::docs::commands#forces-from-accelerations\n",

@@ -421,26 +421,30 @@ fn friction_that_grows_with_the_load_is_identified() {
     let given: String = truth.iter().map(|(name, value)| format!(" --param {name}={value}")).collect();
     let options = format!("--state 0,0 --t-end 5 --dt 0.01 --rtol 1e-11 --atol 1e-12 --force {torque}{given}");
     let (_, motion) = motion((&system, &out), &options);
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut csv = "t,theta,u\n".to_string();
-    for (t, theta) in motion[0].iter().zip(&motion[1]) {
-        let noise: f64 = StandardNormal.sample(&mut rng);
-        writeln!(csv, "{t},{},{}", theta + 1e-4 * noise, drive(*t)).unwrap();
-    }
-    let data = folder.file("data.csv", csv);
-    let identified = |system: &str| -> serde_json::Value {
-        let run = lnn(&["identify", &data, "--system", system, "--json"]);
+    let identified = |system: &str, seed: u64| -> serde_json::Value {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut csv = "t,theta,u\n".to_string();
+        for (t, theta) in motion[0].iter().zip(&motion[1]) {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            writeln!(csv, "{t},{},{}", theta + 1e-4 * noise, drive(*t)).unwrap();
+        }
+        let run = lnn(&["identify", &folder.file("data.csv", csv), "--system", system, "--json"]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         serde_json::from_str(&run.stdout).unwrap()
     };
-    let found = identified(&system);
-    assert_eq!(found["explained"], true, "{found}");
-    for (name, truth) in truth {
-        let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
-        assert!((value - truth).abs() < 4.0 * error && error < 0.01 * truth, "{name} {value} {error}");
+    let mut explained = 0;
+    for seed in 0..3 {
+        let found = identified(&system, seed);
+        explained += u8::from(found["explained"] == true);
+        for (name, truth) in truth {
+            let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+            assert!((value - truth).abs() < 4.0 * error && error < 0.01 * truth, "{seed} {name} {value} {error}");
+        }
     }
+    // A right model is refused once in a hundred times.
+    assert!(explained >= 2, "{explained} of 3");
     // Without the load the same motion is not explained.
     let unloaded = GEAR.replace(" + mu*abs(u)", "").replace("mu = { default = 0.05, learn = true }", "");
-    let found = identified(&folder.file("unloaded.toml", unloaded));
+    let found = identified(&folder.file("unloaded.toml", unloaded), 0);
     assert_eq!(found["explained"], false, "{found}");
 }
