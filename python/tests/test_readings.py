@@ -167,7 +167,12 @@ def test_constants_of_a_known_form_are_identified(swung):
     assert system.acceleration([0.3], [0.0]) == lnn.System("n-pendulum", n=1, l=length.value).acceleration([0.3], [0.0])
     again = pickle.loads(pickle.dumps(found))
     assert again.constants == found.constants and again.system().parameters == system.parameters
-    assert lnn.identify(swung, form, constants=["l"], dt=0.02, threads=1).constants == found.constants
+    again = lnn.identify(swung, form, constants=["l"], dt=0.02, threads=1, each=True)
+    assert again.constants == found.constants and found.each is None
+    # Both swings alone say the same.
+    (scatter,) = again.each.scatter
+    assert scatter.symbol == "l" and scatter.count == 2 and not scatter.differs and abs(scatter.mean - 0.7) < 1e-3
+    assert [alone.explained for alone in again.each.trajectories] == [True, True] and "l" in again.each.trajectories[0].constants
 
 
 def test_what_motion_leaves_open_is_said_with_its_cure(swung):
