@@ -21,7 +21,7 @@ const MISSED: f64 = 0.03;
 const OF_SPREAD: f64 = 0.35;
 const WITHOUT: f64 = 2.0;
 /// Correlation with a velocity from which another quantity is taken for a measurement of it.
-const MEASURED: f64 = 0.95;
+const MEASURED: f64 = 0.995;
 /// Windows of smoothing in a block of samples; every other block is fitted.
 const WINDOWS: usize = 8;
 /// Ridge, over the largest entry of the normal matrix.
