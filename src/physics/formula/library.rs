@@ -352,7 +352,7 @@ impl Lagrangian for Sum<'_> {
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let mut place = q.to_vec();
         if let (1, [.., t], Some(frequency)) = (self.library.known(), &mut place[..], parameters.last()) {
-            *t = *t * *frequency;
+            *t *= *frequency;
         }
         let of = |&(k, at): &(usize, Option<usize>)| {
             let value = self.library.value(k, &place, v);

@@ -388,7 +388,8 @@ impl Kept {
         if !self.residuals.is_empty() {
             visit(self.first, &self.residuals, &self.slopes);
             self.first += self.residuals.len();
-            (self.residuals.clear(), self.slopes.clear());
+            self.residuals.clear();
+            self.slopes.clear();
         }
     }
 }
