@@ -23,8 +23,8 @@ _WHERE = {
     **dict.fromkeys(["check", "find_constraints", "formula", "identify"], "_readings"),
     **dict.fromkeys(["compare", "shadow"], "_views"),
     **dict.fromkeys(["Checked", "Comparison", "Shadow", "Surface", "Swept", "View"], "_results"),
-    **dict.fromkeys(["Alone", "Bodies", "Certificate", "Combination", "Constraint", "Constraints", "Each", "Formula", "Geometry"], "_results"),
-    **dict.fromkeys(["Identified", "IdentifiedConstant", "InverseDynamics", "Learned", "Linearization", "Outlier", "OwnConstraints"], "_results"),
+    **dict.fromkeys(["Bodies", "ByTrajectory", "Certificate", "Combination", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
+    **dict.fromkeys(["Identified", "IdentifiedConstant", "InverseDynamics", "Learned", "Linearization", "OfTrajectory", "Outlier", "OwnConstraints"], "_results"),
     **dict.fromkeys(["Event", "PeriodicDrive", "Residual", "Scatter", "SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from ._mechanics import Model, System, systems
     from ._readings import check, find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
-    from ._results import Alone, Bodies, Certificate, Checked, Combination, Comparison, Constraint, Constraints, Each, Event, Formula, Geometry, Identified
-    from ._results import IdentifiedConstant, InverseDynamics, Learned, Linearization, Outlier, OwnConstraints, PeriodicDrive, Residual, Scatter
-    from ._results import SensorConstant, Symmetries, Trajectory
+    from ._results import Bodies, ByTrajectory, Certificate, Checked, Combination, Comparison, Constraint, Constraints, Event, Formula, Geometry, Identified
+    from ._results import IdentifiedConstant, InverseDynamics, Learned, Linearization, OfTrajectory, Outlier, OwnConstraints, PeriodicDrive, Residual
+    from ._results import Scatter, SensorConstant, Symmetries, Trajectory
     from ._results import Shadow, Surface, Swept, Undetermined, View
     from ._views import compare, shadow
     from .reader import Terms

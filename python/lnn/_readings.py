@@ -11,7 +11,7 @@ from . import _lnn
 from ._arrays import as_json, doubles_list, names, read_result, real, thread_count, whole
 from ._recorded import errors_beside, inputs_beside, measured_columns, recorded
 from ._mechanics import System
-from ._results import Alone, Bodies, Checked, Combination, Constraint, Constraints, Each, Formula, Identified, IdentifiedConstant, Outlier
+from ._results import Bodies, ByTrajectory, Checked, Combination, Constraint, Constraints, Formula, Identified, IdentifiedConstant, OfTrajectory, Outlier
 from ._results import PeriodicDrive, Residual, Scatter, SensorConstant, Undetermined
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def identify(
     between: str | None = None,
     segment: float | None = None,
     robust: bool = False,
-    each: bool = False,
+    by_trajectory: bool = False,
     threads: int | None = None,
 ) -> Identified:
     """Finds the constants of a system whose form is known, from recorded motion, without a network.
@@ -219,7 +219,7 @@ def identify(
         Length of the segments that are followed in s; what makes the constants best known by default.
     robust : bool
         Whether residuals beyond three standard deviations count linearly, so that outliers move little.
-    each : bool
+    by_trajectory : bool
         Whether every trajectory is identified alone, too, and the constants are compared; 64 trajectories at most.
     threads : int, optional
         Threads; the result does not depend on them.
@@ -251,7 +251,7 @@ def identify(
     choices: dict[str, object] = {key: names(key, given) for key, given in named.items()}
     choices["noise"] = None if noise is None else doubles_list("noise", noise, positive=True)
     choices["segment"] = None if segment is None else real("segment", segment, positive=True)
-    choices |= {"targets": targets, "between": between, "robust": bool(robust), "each": bool(each), "threads": thread_count(threads), "errors": errors, "inputs": measured}
+    choices |= {"targets": targets, "between": between, "robust": bool(robust), "by_trajectory": bool(by_trajectory), "threads": thread_count(threads), "errors": errors, "inputs": measured}
     found = read_result(_lnn.identify(motion, system._subject, as_json(choices)))
     found["constants"] = {symbol: IdentifiedConstant(**constant) for symbol, constant in found["constants"].items()}
     found["obstacles"] = tuple(found["obstacles"])
@@ -262,12 +262,18 @@ def identify(
     found["combinations"] = tuple(Combination(**known) for known in found["combinations"])
     found["bodies"] = Bodies(**{**found["bodies"], "moved": tuple(found["bodies"]["moved"])}) if found["bodies"] else None
     found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
-    if found["each"]:
-        alone = [{**one, "constants": {c["symbol"]: IdentifiedConstant(**c) for c in one["constants"]}} for one in found["each"]["trajectories"]]
-        found["each"] = Each(tuple(Alone(**one) for one in alone), tuple(Scatter(**one) for one in found["each"]["scatter"]))
+    if found["by_trajectory"]:
+        found["by_trajectory"] = _by_trajectory(**found["by_trajectory"])
     found["force_noise"] = tuple(found["force_noise"])
     found["outliers"] = tuple(Outlier(**outlier) for outlier in found["outliers"])
     return Identified(**found, _form=system)
+
+
+def _by_trajectory(trajectories: list[dict[str, Any]], scatter: list[dict[str, Any]]) -> ByTrajectory:
+    def alone(constants: list[dict[str, Any]], **more: Any) -> OfTrajectory:
+        return OfTrajectory(constants={constant["symbol"]: IdentifiedConstant(**constant) for constant in constants}, **more)
+
+    return ByTrajectory(tuple(alone(**one) for one in trajectories), tuple(Scatter(**one) for one in scatter))
 
 
 def _undetermined(constants: list[str], directions: object, known: list[dict[str, Any]], **more: Any) -> Undetermined:

@@ -615,7 +615,7 @@ class Bodies:
 
 
 @dataclass(frozen=True)
-class Alone:
+class OfTrajectory:
     """What one trajectory alone says of the constants.
 
     Attributes
@@ -662,16 +662,16 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Each:
+class ByTrajectory:
     """The constants by every trajectory alone, and their scatter.
 
     Attributes
     ----------
-    trajectories : tuple of Alone
+    trajectories : tuple of OfTrajectory
     scatter : tuple of Scatter
     """
 
-    trajectories: tuple[Alone, ...]
+    trajectories: tuple[OfTrajectory, ...]
     scatter: tuple[Scatter, ...]
 
 
@@ -766,7 +766,7 @@ class Identified(_Shown):
         How known forces were taken between the samples.
     robust : bool
         Whether residuals beyond three standard deviations counted linearly.
-    each : Each or None
+    by_trajectory : ByTrajectory or None
         The constants by every trajectory alone, if that was asked for.
     """
 
@@ -793,7 +793,7 @@ class Identified(_Shown):
     substeps: int
     between: str | None
     robust: bool
-    each: Each | None
+    by_trajectory: ByTrajectory | None
     _form: System = field(repr=False)
     _text: str = field(repr=False)
     _html: str = field(repr=False)

@@ -120,12 +120,7 @@ impl Source {
                 if found.columns.coords.is_empty() {
                     found = guess(&files, &found.columns).map_err(refused)?;
                 }
-                // Another file may lack what nobody asked for.
-                let loaded = read_recording(&files, &found.columns).or_else(|_| {
-                    found.columns.input.clear();
-                    read_recording(&files, &found.columns)
-                });
-                let loaded = loaded.map_err(refused)?;
+                let loaded = found.read(&files).map_err(refused)?;
                 let names: Vec<_> = files.iter().map(|file| quoted(&file.display().to_string())).collect();
                 let data = if let [one] = names.as_slice() { one.clone() } else { format!("[{}]", names.join(", ")) };
                 Ok((loaded, arguments(&data, &found.columns), found.table))

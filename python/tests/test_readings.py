@@ -167,12 +167,12 @@ def test_constants_of_a_known_form_are_identified(swung):
     assert system.acceleration([0.3], [0.0]) == lnn.System("n-pendulum", n=1, l=length.value).acceleration([0.3], [0.0])
     again = pickle.loads(pickle.dumps(found))
     assert again.constants == found.constants and again.system().parameters == system.parameters
-    again = lnn.identify(swung, form, constants=["l"], dt=0.02, threads=1, each=True)
-    assert again.constants == found.constants and found.each is None
+    again = lnn.identify(swung, form, constants=["l"], dt=0.02, threads=1, by_trajectory=True)
+    assert again.constants == found.constants and found.by_trajectory is None
     # Both swings alone say the same.
-    (scatter,) = again.each.scatter
+    (scatter,) = again.by_trajectory.scatter
     assert scatter.symbol == "l" and scatter.count == 2 and not scatter.differs and abs(scatter.mean - 0.7) < 1e-3
-    assert [alone.explained for alone in again.each.trajectories] == [True, True] and "l" in again.each.trajectories[0].constants
+    assert [alone.explained for alone in again.by_trajectory.trajectories] == [True, True] and "l" in again.by_trajectory.trajectories[0].constants
 
 
 def test_what_motion_leaves_open_is_said_with_its_cure(swung):

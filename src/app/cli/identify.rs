@@ -59,7 +59,7 @@ pub struct Args {
     robust: bool,
     /// Identify every trajectory alone, too, and compare the constants.
     #[arg(long)]
-    each: bool,
+    by_trajectory: bool,
     /// Threads; the result does not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
@@ -134,7 +134,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         between: args.between,
         segment: args.segment,
         robust: args.robust,
-        each: args.each,
+        by_trajectory: args.by_trajectory,
         threads: threads(args.threads),
         cancellation: search()?,
     };

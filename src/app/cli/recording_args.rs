@@ -101,12 +101,10 @@ impl RecordingArgs {
             if self.coords.is_empty() {
                 guessed = guess(files, &guessed.columns)?;
             }
-            // Another file may lack what nobody asked for.
-            if beside && let Ok(reading) = read_recording(files, &guessed.columns) {
-                return Ok(reading);
+            if !beside {
+                guessed.columns.input.clear();
             }
-            guessed.columns.input.clear();
-            read_recording(files, &guessed.columns)
+            guessed.read(files)
         });
         match read {
             Ok(reading) => Ok((reading, guessed)),

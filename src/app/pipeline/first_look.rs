@@ -44,7 +44,7 @@ pub struct FirstLook {
     pub guessed: Vec<ColumnGuess>,
     /// The survey.
     #[serde(flatten)]
-    pub(crate) survey: Survey,
+    pub survey: Survey,
     /// Why no fit can learn from the data, if none can.
     pub obstacle: Option<String>,
     /// Samples in which constraints and a formula were looked for.
@@ -145,11 +145,6 @@ impl FirstLook {
             laws.push(format!("laws were looked for in {} of the {} samples", self.searched, self.survey.samples));
         }
         laws
-    }
-
-    /// `true` if the velocities follow from the positions and other columns: see [`lnn check`](crate::docs::commands#lnn-check).
-    pub fn is_first_order(&self) -> bool {
-        self.survey.first_order.is_some()
     }
 
     /// `true` if a formula is to be looked for with friction: it has terms of friction, or none was found in time.

@@ -44,6 +44,6 @@ pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};
 #[doc(hidden)]
-pub use survey::{Survey, SurveyOptions, survey};
+pub use survey::{FirstOrder, Survey, SurveyOptions, survey};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub use units::factor;

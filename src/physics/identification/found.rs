@@ -1,7 +1,7 @@
 //! What was identified.
 
+use super::by_trajectory::ByTrajectory;
 use super::descent::NEAR;
-use super::each::Each;
 use super::follow::Segment;
 use super::{Between, Verdict};
 use crate::recording::{LoadedRecording, Recording};
@@ -242,7 +242,7 @@ pub struct Identified {
     /// Interpolation of known forces between the samples; none without forces.
     pub between: Option<Between>,
     /// The constants by every trajectory alone, if that was asked for.
-    pub each: Option<Each>,
+    pub by_trajectory: Option<ByTrajectory>,
     /// What was fitted, stretch by stretch, for pictures.
     #[serde(skip)]
     pub paths: Vec<ResidualPath>,

@@ -1,6 +1,7 @@
 //! Small dense linear algebra of normal equations and mass matrices: symmetric matrices `(n, n)`, row-major.
 
-use crate::linalg::{self, Workspace, dot};
+use crate::linalg::{self, Workspace, dot, gemm};
+use crate::scalar::{MatMut, MatRef};
 
 /// Share of the diagonal that is added: directions that the data do not determine get the smallest solution.
 const RIDGE: f64 = 1e-11;
@@ -53,6 +54,59 @@ pub(crate) fn part(n: usize, matrix: &[f64], indices: &[usize]) -> Vec<f64> {
     indices.iter().flat_map(|&i| indices.iter().map(move |&j| matrix[i * n + j])).collect()
 }
 
+/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate: a torque depends on the links that its joint carries, few of many in a
+/// tree, so that a block has few columns.
+pub(super) struct Products {
+    m: usize,
+    /// Rows of each coordinate, `(rows, m)`.
+    rows: Vec<Vec<f64>>,
+    packed: Vec<f64>,
+    product: Vec<f64>,
+}
+
+impl Products {
+    /// Rows of a block.
+    const BLOCK: usize = 64;
+
+    /// Of rows of `n` coordinates, `m` numbers each.
+    pub fn new(n: usize, m: usize) -> Self {
+        Self { m, rows: vec![Vec::new(); n], packed: Vec::new(), product: Vec::new() }
+    }
+
+    /// Adds a row of a coordinate, times a factor.
+    pub fn add(&mut self, coordinate: usize, row: &[f64], factor: f64, sum: &mut [f64]) {
+        let rows = &mut self.rows[coordinate];
+        rows.extend(row.iter().map(|x| factor * x));
+        if rows.len() >= Self::BLOCK * self.m {
+            self.multiply(coordinate, sum);
+        }
+    }
+
+    /// Adds what is left.
+    pub fn finish(&mut self, sum: &mut [f64]) {
+        (0..self.rows.len()).for_each(|coordinate| self.multiply(coordinate, sum));
+    }
+
+    /// Adds the products of the rows of a coordinate to the sum, `(m, m)`.
+    fn multiply(&mut self, coordinate: usize, sum: &mut [f64]) {
+        let m = self.m;
+        let rows = std::mem::take(&mut self.rows[coordinate]);
+        let count = rows.len() / m.max(1);
+        let held: Vec<usize> = (0..m).filter(|k| rows.iter().skip(*k).step_by(m).any(|x| *x != 0.0)).collect();
+        self.packed.clear();
+        self.packed.extend(rows.chunks_exact(m.max(1)).flat_map(|row| held.iter().map(|&k| row[k])));
+        self.product.resize(held.len() * held.len(), 0.0);
+        let packed = MatRef::new(&self.packed, count, held.len());
+        gemm(MatMut::new(&mut self.product, held.len(), held.len()), false, 1.0, packed.t(), packed);
+        for (&i, products) in held.iter().zip(self.product.chunks_exact(held.len().max(1))) {
+            let line = &mut sum[i * m..(i + 1) * m];
+            held.iter().zip(products).for_each(|(&j, product)| line[j] += product);
+        }
+        self.rows[coordinate] = rows;
+        self.rows[coordinate].clear();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,5 +137,18 @@ mod tests {
         let inverse = inverse(2, &[1.0, 1.0, 1.0, 1.0]).unwrap();
         let x = times(2, &inverse, &[2.0, 2.0]);
         assert!((x[0] + x[1] - 2.0).abs() < 1e-3, "{x:?}");
+    }
+    #[test]
+    fn products_of_rows_are_summed_over_the_columns_that_they_have() {
+        // The second coordinate has two columns of five; more rows than a block.
+        let (m, mut products, mut sum, mut expected) = (5, Products::new(2, 5), vec![0.0; 25], vec![0.0; 25]);
+        for k in 0..150usize {
+            let number = |i: usize| f64::from(u8::from(k % 2 == 0 || i > 2)) * ((k * 7 + i * 3) % 11) as f64;
+            let row: Vec<f64> = (0..m).map(number).collect();
+            products.add(k % 2, &row, 0.5, &mut sum);
+            (0..25).for_each(|at| expected[at] += 0.25 * row[at / m] * row[at % m]);
+        }
+        products.finish(&mut sum);
+        assert!(sum.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9), "{sum:?} {expected:?}");
     }
 }

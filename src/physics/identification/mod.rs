@@ -29,6 +29,7 @@ mod averages;
 mod bodies;
 mod bootstrap;
 mod by_forces;
+mod by_trajectory;
 mod choices;
 mod closed;
 #[cfg(test)]
@@ -37,7 +38,6 @@ mod covariance;
 mod cure;
 mod descent;
 mod determined;
-mod each;
 mod error;
 mod first_fit;
 mod follow;
@@ -63,7 +63,7 @@ mod unknowns;
 mod verdict;
 mod ways;
 
-pub use each::{Alone, Each, Scatter};
+pub use by_trajectory::{ByTrajectory, OfTrajectory, Scatter};
 pub use error::IdentifyError;
 pub(crate) use follow::{Course, Segment};
 pub use found::{
@@ -117,7 +117,7 @@ pub struct IdentifyOptions {
     pub robust: bool,
     /// Every trajectory is identified alone, too, and the constants are compared; 64 trajectories at most.
     #[serde(default)]
-    pub each: bool,
+    pub by_trajectory: bool,
     /// Threads; 0 for one. The result does not depend on their number.
     pub threads: usize,
     /// Cancels the search, and receives reports of its progress.

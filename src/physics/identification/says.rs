@@ -33,8 +33,8 @@ impl Identified {
         }
         findings.line(self.extent());
         self.say_outliers(&mut findings);
-        if let Some(each) = &self.each {
-            each.say(&mut findings);
+        if let Some(by_trajectory) = &self.by_trajectory {
+            by_trajectory.say(&mut findings);
         }
         findings
     }

@@ -4,10 +4,9 @@ use super::averages::Averages;
 use super::closed::FreePart;
 use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
+use super::linear::Products;
 use super::solve::{Normal, Problem};
-use crate::linalg::gemm;
 use crate::recording::smooth::Smoothed;
-use crate::scalar::{MatMut, MatRef};
 use std::ops::Range;
 
 /// Largest number of states.
@@ -391,56 +390,5 @@ impl Kept {
             self.residuals.clear();
             self.slopes.clear();
         }
-    }
-}
-
-/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate: a torque depends on the links that its joint carries, few of many in a
-/// tree, so that a block has few columns.
-struct Products {
-    m: usize,
-    /// Rows of each coordinate, `(rows, m)`.
-    rows: Vec<Vec<f64>>,
-    packed: Vec<f64>,
-    product: Vec<f64>,
-}
-
-impl Products {
-    /// Rows of a block.
-    const BLOCK: usize = 64;
-
-    fn new(n: usize, m: usize) -> Self {
-        Self { m, rows: vec![Vec::new(); n], packed: Vec::new(), product: Vec::new() }
-    }
-
-    /// Adds a row of a coordinate, times a factor.
-    fn add(&mut self, coordinate: usize, row: &[f64], factor: f64, sum: &mut [f64]) {
-        let rows = &mut self.rows[coordinate];
-        rows.extend(row.iter().map(|x| factor * x));
-        if rows.len() >= Self::BLOCK * self.m {
-            self.multiply(coordinate, sum);
-        }
-    }
-
-    fn finish(&mut self, sum: &mut [f64]) {
-        (0..self.rows.len()).for_each(|coordinate| self.multiply(coordinate, sum));
-    }
-
-    /// Adds the products of the rows of a coordinate to the sum, `(m, m)`.
-    fn multiply(&mut self, coordinate: usize, sum: &mut [f64]) {
-        let m = self.m;
-        let rows = std::mem::take(&mut self.rows[coordinate]);
-        let count = rows.len() / m.max(1);
-        let held: Vec<usize> = (0..m).filter(|k| rows.iter().skip(*k).step_by(m).any(|x| *x != 0.0)).collect();
-        self.packed.clear();
-        self.packed.extend(rows.chunks_exact(m.max(1)).flat_map(|row| held.iter().map(|&k| row[k])));
-        self.product.resize(held.len() * held.len(), 0.0);
-        let packed = MatRef::new(&self.packed, count, held.len());
-        gemm(MatMut::new(&mut self.product, held.len(), held.len()), false, 1.0, packed.t(), packed);
-        for (&i, products) in held.iter().zip(self.product.chunks_exact(held.len().max(1))) {
-            let line = &mut sum[i * m..(i + 1) * m];
-            held.iter().zip(products).for_each(|(&j, product)| line[j] += product);
-        }
-        self.rows[coordinate] = rows;
-        self.rows[coordinate].clear();
     }
 }

@@ -1,9 +1,9 @@
 //! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
 
+use super::by_trajectory::by_trajectory;
 use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
 use super::descent::NEAR;
-use super::each::each;
 use super::first_fit::first_fit;
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
@@ -125,8 +125,8 @@ pub fn identify(
         Some((instance, options)) => together(&instance, recording, &options)?,
         None => together(instance, recording, options)?,
     };
-    if options.each {
-        found.each = Some(each(instance, recording, options, &found)?);
+    if options.by_trajectory {
+        found.by_trajectory = Some(by_trajectory(instance, recording, options, &found)?);
     }
     Ok(found)
 }

@@ -27,7 +27,7 @@ fn look(reading: &LoadedRecording) -> Said {
             formula: look.formula.is_some(),
             constraint: look.constraints.as_ref().is_some_and(|found| found.count > 0),
             nothing_accelerates: look.next == NextStep::Record,
-            first_order: look.is_first_order(),
+            first_order: look.survey.first_order.is_some(),
         },
     )
 }

@@ -355,9 +355,9 @@ fn differ(seeds: u64, (memory, factor): (f64, f64)) -> Outcome<usize> {
             recording.tracks.extend(form.free(values, 1, &mut rng)?.tracks);
         }
         add(&mut recording, (SIZE, memory), &mut rng);
-        let options = IdentifyOptions { each: true, ..IdentifyOptions::default() };
-        let each = identify(&form.system(true, &[])?, &recording, &options)?.each.ok_or("no scatter")?;
-        said += usize::from(each.scatter.iter().any(|scatter| scatter.differs));
+        let options = IdentifyOptions { by_trajectory: true, ..IdentifyOptions::default() };
+        let found = identify(&form.system(true, &[])?, &recording, &options)?;
+        said += usize::from(found.by_trajectory.ok_or("no scatter")?.scatter.iter().any(|scatter| scatter.differs));
     }
     Ok(said)
 }

@@ -58,6 +58,17 @@ fn motion((system, out): (&str, &str), options: &str) -> (Run, Vec<Vec<f64>>) {
     (run, found)
 }
 
+/// Times and first coordinates of a motion as a CSV, with noise of a size and a seed, and with more columns.
+fn noisy(header: &str, motion: &[Vec<f64>], (size, seed): (f64, u64), more: impl Fn(f64) -> String) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut csv = format!("{header}\n");
+    for (t, q) in motion[0].iter().zip(&motion[1]) {
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        writeln!(csv, "{t},{}{}", q + size * noise, more(*t)).unwrap();
+    }
+    csv
+}
+
 #[test]
 fn a_driven_spring_moves_as_its_closed_form() {
     let folder = Folder::new();
@@ -115,13 +126,7 @@ fn the_drive_of_a_pendulum_is_identified() {
     for seed in 0..seeds {
         let options = "--param F=1.5 --param om=2.2 --param phi=0.5 --t-end 20 --dt 0.02 --rtol 1e-11 --atol 1e-12";
         let (_, motion) = motion((&system, &out), &format!("{options} --state 0.{},0", 4 + seed));
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut csv = "t,theta\n".to_string();
-        for (t, theta) in motion[0].iter().zip(&motion[1]) {
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            writeln!(csv, "{t},{}", theta + 1e-2 * noise).unwrap();
-        }
-        let data = folder.file("data.csv", csv);
+        let data = folder.file("data.csv", noisy("t,theta", &motion, (1e-2, seed), |_| String::new()));
         let run = lnn(&["identify", &data, "--system", &system, "--json"]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
@@ -180,13 +185,7 @@ fn a_lagrangian_in_time_is_rolled_out_and_identified() {
         let wanted = -((9.81 - 0.06 * 6.6 * 6.6 * (6.6 * t).cos()) * theta.sin() + 2.0 * 0.03 * v[k]) / rod;
         assert!((a - wanted).abs() < 1e-3, "{t}: {a} {wanted}");
     }
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut csv = "t,theta\n".to_string();
-    for (t, theta) in reference[0].iter().zip(&reference[1]) {
-        let noise: f64 = StandardNormal.sample(&mut rng);
-        writeln!(csv, "{t},{}", theta + 1e-3 * noise).unwrap();
-    }
-    let data = folder.file("data.csv", csv);
+    let data = folder.file("data.csv", noisy("t,theta", &reference, (1e-3, 3), |_| String::new()));
     let run = lnn(&["identify", &data, "--system", &system, "--json"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
@@ -251,12 +250,7 @@ fn inputs_of_forces_are_read_from_recordings() {
     assert!(!run.stderr.contains("theta_force"), "{}", run.stderr);
     let (mut within, mut explained, seeds) = (0, 0, 6);
     for seed in 0..seeds {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut csv = "t,theta,u\n".to_string();
-        for (t, theta) in truth[0].iter().zip(&truth[1]) {
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            writeln!(csv, "{t},{},{}", theta + 1e-3 * noise, voltage(*t)).unwrap();
-        }
+        let csv = noisy("t,theta,u", &truth, (1e-3, seed), |t| format!(",{}", voltage(t)));
         let run = lnn(&["identify", &folder.file("log.csv", csv), "--system", &system, "--json"]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
@@ -305,13 +299,7 @@ fn a_frequency_is_found_in_a_long_recording() {
     let (system, out) = (folder.file("pendulum.toml", PENDULUM), text(&folder.path("motion.csv")));
     let options = "--param F=0.3 --param om=2.2 --param phi=0.5 --t-end 150 --dt 0.1 --rtol 1e-11 --atol 1e-12";
     let (_, motion) = motion((&system, &out), &format!("{options} --state 0.4,0"));
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut csv = "t,theta\n".to_string();
-    for (t, theta) in motion[0].iter().zip(&motion[1]) {
-        let noise: f64 = StandardNormal.sample(&mut rng);
-        writeln!(csv, "{t},{}", theta + 3e-3 * noise).unwrap();
-    }
-    let data = folder.file("data.csv", csv);
+    let data = folder.file("data.csv", noisy("t,theta", &motion, (3e-3, 5), |_| String::new()));
     let identified = |start: &str| {
         let run = lnn(&["identify", &data, "--system", &system, "--json", "--param", "F=0.36", "--param", start]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
@@ -422,13 +410,8 @@ fn friction_that_grows_with_the_load_is_identified() {
     let options = format!("--state 0,0 --t-end 5 --dt 0.01 --rtol 1e-11 --atol 1e-12 --force {torque}{given}");
     let (_, motion) = motion((&system, &out), &options);
     let identified = |system: &str, seed: u64| -> serde_json::Value {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut csv = "t,theta,u\n".to_string();
-        for (t, theta) in motion[0].iter().zip(&motion[1]) {
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            writeln!(csv, "{t},{},{}", theta + 1e-4 * noise, drive(*t)).unwrap();
-        }
-        let run = lnn(&["identify", &folder.file("data.csv", csv), "--system", system, "--json"]);
+        let data = folder.file("data.csv", noisy("t,theta,u", &motion, (1e-4, seed), |t| format!(",{}", drive(t))));
+        let run = lnn(&["identify", &data, "--system", system, "--json"]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         serde_json::from_str(&run.stdout).unwrap()
     };

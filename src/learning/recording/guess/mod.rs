@@ -8,7 +8,7 @@ mod roles;
 mod time;
 
 use crate::recording::read::RawTable;
-use crate::recording::{Columns, ColumnsError, DataError};
+use crate::recording::{Columns, ColumnsError, DataError, LoadedRecording, read_recording};
 use serde::Serialize;
 use std::path::Path;
 
@@ -31,6 +31,19 @@ pub struct Guess {
     pub columns: Columns,
     /// One entry for every column, in the order of the file.
     pub table: Vec<ColumnGuess>,
+}
+
+impl Guess {
+    /// Reads files as they are guessed. Nobody asked for inputs: where a file lacks one, all are left out.
+    ///
+    /// # Errors
+    /// As of [`read_recording`].
+    pub fn read<P: AsRef<Path>>(&mut self, files: &[P]) -> Result<LoadedRecording, DataError> {
+        read_recording(files, &self.columns).or_else(|_| {
+            self.columns.input.clear();
+            read_recording(files, &self.columns)
+        })
+    }
 }
 
 /// Guesses the meaning of the columns of the first of some files, as far as `given` does not say it.

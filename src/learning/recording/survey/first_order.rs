@@ -1,11 +1,9 @@
 //! Whether velocities follow from positions and other measured quantities, as of tanks and circuits: such motion is of first order, and no
 //! Lagrangian with a kinetic energy describes it.
 
-use super::plan;
 use crate::linalg::{Workspace, dot, solve_symmetric};
 use crate::names::percent;
-use crate::recording::smooth::{SmoothError, SmoothOptions};
-use crate::recording::{LoadedRecording, RecordedTrajectory, deviation, rms};
+use crate::recording::{LoadedRecording, RecordedTrajectory, Smoothing, deviation, rms};
 use serde::Serialize;
 
 /// Degree of the polynomials, and the number of their terms at most; with more, the degree is lower.
@@ -22,6 +20,8 @@ const OF_SPREAD: f64 = 0.35;
 const WITHOUT: f64 = 2.0;
 /// Correlation with a velocity from which another quantity is taken for a measurement of it.
 const MEASURED: f64 = 0.995;
+/// Largest number of samples that are used, evenly spaced.
+const MOST_SAMPLES: usize = 20_000;
 /// Windows of smoothing in a block of samples; every other block is fitted.
 const WINDOWS: usize = 8;
 /// Ridge, over the largest entry of the normal matrix.
@@ -38,11 +38,11 @@ struct States {
 }
 
 impl States {
-    fn of(reading: &LoadedRecording, inputs: usize) -> Result<Self, SmoothError> {
+    fn of(reading: &LoadedRecording, inputs: usize, smoothing: &Smoothing) -> Self {
         let (recording, n) = (&reading.recording, reading.recording.n());
-        let smoothing = plan(recording, &SmoothOptions::default())?.0;
         let columns = |count: usize| vec![Vec::new(); count];
-        let block = WINDOWS * smoothing.window();
+        let stride = recording.samples().div_ceil(MOST_SAMPLES).max(1);
+        let block = (WINDOWS * smoothing.window()).div_ceil(stride);
         let mut states = Self { known: columns(n + inputs), velocities: columns(n), errors: columns(n), block };
         for (track, beside) in recording.tracks.iter().zip(&reading.inputs) {
             let Ok(smoothed) = smoothing.apply(track) else { continue };
@@ -52,7 +52,7 @@ impl States {
                 smoothing.apply(&RecordedTrajectory { q, v: Vec::new(), ..track.clone() }).ok()
             };
             let Some(others) = (0..inputs).map(input).collect::<Option<Vec<_>>>() else { continue };
-            for row in smoothed.interior().filter(|row| smoothed.is_full(*row)) {
+            for row in smoothed.interior().step_by(stride).filter(|row| smoothed.is_full(*row)) {
                 let known = smoothed.q[row * n..][..n].iter().chain(others.iter().map(|other| &other.q[row * n]));
                 states.known.iter_mut().zip(known).for_each(|(column, x)| column.push(*x));
                 for i in 0..n {
@@ -67,7 +67,7 @@ impl States {
             let spread = deviation(column.iter());
             column.iter_mut().for_each(|x| *x = if spread > 0.0 { (*x - mean) / spread } else { 0.0 });
         }
-        Ok(states)
+        states
     }
 
     fn len(&self) -> usize {
@@ -137,31 +137,27 @@ impl FirstOrder {
     /// Whether the velocities follow, to within their errors, from the positions and the inputs of a recording, and not from the positions alone.
     ///
     /// A polynomial of both is fitted to one half of the motion and tried on the other half. Motion that repeats itself under one tone looks alike.
-    ///
-    /// # Errors
-    /// [`SmoothError`] for trajectories too short for any window.
-    pub(crate) fn of(reading: &LoadedRecording) -> Result<Option<Self>, SmoothError> {
+    pub(super) fn of(reading: &LoadedRecording, smoothing: &Smoothing) -> Option<Self> {
         let (recording, n, inputs) = (&reading.recording, reading.recording.n(), &reading.columns.input);
         if inputs.is_empty() || reading.inputs.len() != recording.tracks.len() || recording.is_driven() {
-            return Ok(None);
+            return None;
         }
-        let states = States::of(reading, inputs.len())?;
+        let states = States::of(reading, inputs.len(), smoothing);
         let positions: Vec<usize> = (0..n).collect();
         let others: Vec<usize> = (n..n + inputs.len()).filter(|&k| states.is_other(k)).collect();
         let all = [positions.as_slice(), &others].concat();
         let (mut matter, mut residual) = (false, 0f64);
         for (velocity, error) in states.velocities.iter().zip(&states.errors) {
             let (error, spread) = (rms(error.iter().copied()), deviation(velocity.iter()));
-            let with_and_without = states.residual(velocity, &all).zip(states.residual(velocity, &positions));
-            let Some((with, without)) = with_and_without else { return Ok(None) };
+            let (with, without) = (states.residual(velocity, &all)?, states.residual(velocity, &positions)?);
             if with > (AT_ERROR * error).max(MISSED * spread).min(OF_SPREAD * spread) {
-                return Ok(None);
+                return None;
             }
             matter |= without > WITHOUT * with;
             residual = residual.max(with / spread);
         }
         let from = others.iter().map(|k| inputs[k - n].clone()).collect();
-        Ok(matter.then_some(Self { from, residual }))
+        matter.then_some(Self { from, residual })
     }
 
     /// The warning.
@@ -179,7 +175,7 @@ impl FirstOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{Columns, Recording};
+    use crate::recording::{Columns, Recording, SmoothOptions};
 
     /// Two tanks, the first with a pump: `h1' = -c sqrt(h1) + u`, `h2' = c (sqrt(h1) - sqrt(h2))`.
     fn tanks(_: f64, h: &[f64; 4], u: f64) -> [f64; 4] {
@@ -214,16 +210,20 @@ mod tests {
         LoadedRecording { inputs, columns, ..LoadedRecording::from(recording) }
     }
 
+    fn first_order(reading: &LoadedRecording) -> Option<FirstOrder> {
+        FirstOrder::of(reading, &Smoothing::choose(&reading.recording, &SmoothOptions::default()).unwrap())
+    }
+
     #[test]
     fn tanks_are_of_first_order_and_masses_on_springs_are_not() {
         for noise in [1e-4, 1e-3, 1e-2] {
-            let found = |rate, start| FirstOrder::of(&recorded(rate, start, noise)).unwrap();
+            let found = |rate, start| first_order(&recorded(rate, start, noise));
             let tanks = found(tanks, [3.0, 2.0, 0.0, 0.0]);
             assert!(tanks.as_ref().is_some_and(|found| found.from == ["u"]), "{noise} {tanks:?}");
             assert_eq!(found(masses, [0.0; 4]), None, "{noise}");
         }
         // Without the other quantity nothing can be said.
         let unknown = LoadedRecording::from(recorded(tanks, [3.0, 2.0, 0.0, 0.0], 1e-3).recording);
-        assert_eq!(FirstOrder::of(&unknown).unwrap(), None);
+        assert_eq!(first_order(&unknown), None);
     }
 }

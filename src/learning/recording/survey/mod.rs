@@ -184,7 +184,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         accelerates: (0..n).any(|i| !is_uniform(recording, i, &alone)),
         motionless: Vec::new(),
         copies: Vec::new(),
-        first_order: FirstOrder::of(reading)?,
+        first_order: FirstOrder::of(reading, &alone),
         warnings: Vec::new(),
     };
     let still = stillness(recording, &alone);

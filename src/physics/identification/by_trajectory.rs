@@ -17,7 +17,7 @@ const MOST: usize = 64;
 
 /// What one trajectory alone says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Alone {
+pub struct OfTrajectory {
     /// Its name.
     pub trajectory: String,
     /// The constants; none of a trajectory from which they cannot be identified.
@@ -47,9 +47,9 @@ pub struct Scatter {
 
 /// The constants by trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Each {
+pub struct ByTrajectory {
     /// Every trajectory.
-    pub trajectories: Vec<Alone>,
+    pub trajectories: Vec<OfTrajectory>,
     /// The scatter of every constant.
     pub scatter: Vec<Scatter>,
 }
@@ -58,16 +58,16 @@ pub struct Each {
 ///
 /// # Errors
 /// More than 64 trajectories, a search that is cancelled.
-pub(super) fn each(
+pub(super) fn by_trajectory(
     instance: &SystemInstance<f64>,
     recording: &Recording,
     options: &IdentifyOptions,
     found: &Identified,
-) -> Result<Each, IdentifyError> {
+) -> Result<ByTrajectory, IdentifyError> {
     let count = recording.tracks.len();
     if count > MOST {
         let expected = format!("at most {MOST} trajectories");
-        return Err(IdentifyError::Option { what: "each", expected, found: count.to_string() });
+        return Err(IdentifyError::Option { what: "by_trajectory", expected, found: count.to_string() });
     }
     let mut instance = instance.clone();
     for (parameter, value) in instance.system.parameters.iter().zip(&mut instance.parameters) {
@@ -81,21 +81,21 @@ pub(super) fn each(
             errors: of(&options.errors, at),
             missing: of(&options.missing, at),
             inputs: of(&options.inputs, at),
-            each: false,
+            by_trajectory: false,
             ..options.clone()
         };
         let trajectory = recording.tracks[at].name.clone();
         trajectories.push(match identify(&instance, &one, &options) {
             Ok(Identified { constants, explained, verdict, .. }) => {
-                Alone { trajectory, constants, says: verdict.to_string(), explained }
+                OfTrajectory { trajectory, constants, says: verdict.to_string(), explained }
             }
             Err(IdentifyError::Cancelled(Cancelled)) => return Err(IdentifyError::Cancelled(Cancelled)),
-            Err(error) => Alone { trajectory, constants: Vec::new(), says: error.to_string(), explained: false },
+            Err(error) => OfTrajectory { trajectory, constants: Vec::new(), says: error.to_string(), explained: false },
         });
     }
     let symbols: Vec<&String> = found.constants.iter().map(|constant| &constant.symbol).collect();
     let scatter = symbols.iter().filter_map(|symbol| scatter(symbol, &trajectories, (symbols.len(), found.samples)));
-    Ok(Each { scatter: scatter.collect(), trajectories })
+    Ok(ByTrajectory { scatter: scatter.collect(), trajectories })
 }
 
 /// What belongs to one trajectory, of a list that is empty or has an entry for each.
@@ -104,7 +104,7 @@ fn of<T: Clone>(all: &[T], at: usize) -> Vec<T> {
 }
 
 /// The scatter of one of so many constants; `None` if fewer than two trajectories determine it.
-fn scatter(symbol: &str, trajectories: &[Alone], (constants, samples): (usize, usize)) -> Option<Scatter> {
+fn scatter(symbol: &str, trajectories: &[OfTrajectory], (constants, samples): (usize, usize)) -> Option<Scatter> {
     let own = trajectories.iter().flat_map(|alone| &alone.constants).filter(|constant| constant.symbol == symbol);
     let known: Vec<(f64, f64)> = own
         .filter_map(|constant| Some((constant.value, constant.standard_error.filter(|error| *error > 0.0)?)))
@@ -121,16 +121,16 @@ fn scatter(symbol: &str, trajectories: &[Alone], (constants, samples): (usize, u
     Some(Scatter { symbol: symbol.to_string(), mean, count: known.len(), ratio: square.sqrt(), probability, differs })
 }
 
-impl Each {
+impl ByTrajectory {
     /// The table log by log, and the constants that differ.
     pub(super) fn say(&self, findings: &mut Findings) {
         let symbols: Vec<&str> = self.scatter.iter().map(|scatter| scatter.symbol.as_str()).collect();
-        let cell = |alone: &Alone, symbol: &str| {
+        let cell = |alone: &OfTrajectory, symbol: &str| {
             let own = alone.constants.iter().find(|constant| constant.symbol == symbol);
             let [value, error] = own.map_or(["-".into(), "-".into()], |own| with_error(own.value, own.standard_error));
             format!("{value} ({error})")
         };
-        let row = |alone: &Alone| {
+        let row = |alone: &OfTrajectory| {
             let cells = symbols.iter().map(|symbol| cell(alone, symbol));
             std::iter::once(alone.trajectory.clone()).chain(cells).chain([alone.says.clone()]).collect::<Vec<_>>()
         };
@@ -164,8 +164,8 @@ mod tests {
             let mut recording =
                 recorded(&oscillator(4.0), &[&[1.0, 0.3], &[0.2, 1.9], &[-0.8, 1.0]], (8.0, 0.02), &[2e-3], 1);
             recording.tracks.extend(recorded(&oscillator(last), &[&[0.9, -0.7]], (8.0, 0.02), &[2e-3], 2).tracks);
-            let options = IdentifyOptions { each: true, ..IdentifyOptions::default() };
-            identify(&oscillator(3.5), &recording, &options).unwrap().each.unwrap()
+            let options = IdentifyOptions { by_trajectory: true, ..IdentifyOptions::default() };
+            identify(&oscillator(3.5), &recording, &options).unwrap().by_trajectory.unwrap()
         };
         let (alike, unlike) = (each(4.0), each(4.04));
         assert!(!alike.scatter[0].differs && alike.scatter[0].ratio < 2.0, "{alike:?}");
