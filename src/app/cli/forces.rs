@@ -1,23 +1,25 @@
-//! Forces from outside, as arguments: constants and recorded columns.
+//! Forces from outside, as arguments: constants, formulas of the time, and recorded columns.
 
 use crate::cli::number::finite;
 use crate::cli::recording_args::unit;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, output, states};
+use crate::lagrangian::NamedFormula;
 use crate::names::unknown;
 use crate::network::file::Header;
 use crate::pipeline::usual_force;
 use crate::recording::factor;
-use crate::rollout::{Between, SampledForce};
+use crate::rollout::{Between, Force, SampledForce};
 use crate::storage::read_regular;
 use clap::builder::PossibleValue;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct ForceArgs {
-    /// External generalized forces that drive the motion: a constant NAME=VALUE (N, N m), or a CSV with a column of time and
-    /// columns of forces, joined as --between says; may be repeated, one CSV at most. NAME is the column of the data that
+    /// External generalized forces that drive the motion: NAME=VALUE, a constant (N, N m) or a formula of the time t such as
+    /// 0.3*cos(1.2*t), or a CSV with a column of time and columns of forces, joined as --between says; may be repeated, one CSV at most. NAME is the column of the data that
     /// the model was fitted to, or COORDINATE_force. Forces that are not named are 0. Inputs of a system file are given in the same way, by
     /// their names, all of them.
     #[arg(long, value_name = "FILE.csv|NAME=VALUE", allow_hyphen_values = true)]
@@ -45,6 +47,56 @@ impl clap::ValueEnum for Between {
             Self::BandLimited => "Without frequencies above half the rate of the samples",
         };
         Some(PossibleValue::new(self.name()).help(help))
+    }
+}
+
+/// Forces from outside and inputs as they are known.
+#[derive(Clone)]
+pub struct KnownForce {
+    /// Recorded and constant ones; 0 where there is a formula.
+    sampled: SampledForce<f64>,
+    /// Formulas of the time, by component.
+    formulas: Vec<(usize, NamedFormula)>,
+}
+
+impl KnownForce {
+    /// Some of the components, in order.
+    pub fn components(&self, of: Range<usize>) -> Self {
+        let own = self.formulas.iter().filter(|(i, _)| of.contains(i));
+        let formulas = own.map(|(i, formula)| (i - of.start, formula.clone())).collect();
+        Self { sampled: self.sampled.components(of), formulas }
+    }
+
+    /// `true` if all are 0 at all times.
+    pub fn is_zero(&self) -> bool {
+        self.formulas.is_empty() && self.sampled.is_zero()
+    }
+
+    /// The components at a time.
+    pub fn at(&self, t: f64, force: &mut [f64]) {
+        self.sampled.at(t, force);
+        for (i, formula) in &self.formulas {
+            force[*i] = formula.value(&[t][..formula.names.len()]);
+        }
+    }
+}
+
+impl Force<f64> for KnownForce {
+    fn force(&self, t: f64, _: &[f64], _: &[f64], force: &mut [f64]) {
+        self.at(t, force);
+    }
+
+    fn breaks(&self) -> &[f64] {
+        self.sampled.breaks()
+    }
+}
+
+/// A formula of the time and of nothing else.
+fn of_time(text: &str) -> Result<NamedFormula, String> {
+    let formula: NamedFormula = text.parse().map_err(|error| format!("{error}"))?;
+    match formula.names.iter().find(|name| *name != "t") {
+        Some(name) => Err(unknown("name", name, ["t"])),
+        None => Ok(formula),
     }
 }
 
@@ -81,7 +133,7 @@ impl ForceArgs {
         known: &[String],
         from: f64,
         to: f64,
-    ) -> Result<Option<SampledForce<f64>>, CliError> {
+    ) -> Result<Option<KnownForce>, CliError> {
         let inputs = &known[coordinates.len()..];
         if self.force.is_empty() {
             return match inputs.first() {
@@ -90,6 +142,7 @@ impl ForceArgs {
             };
         }
         let mut constants: Vec<Option<f64>> = vec![None; known.len()];
+        let mut formulas: Vec<(usize, NamedFormula)> = Vec::new();
         let mut file: Option<PathBuf> = None;
         for given in &self.force {
             match given.split_once('=') {
@@ -102,9 +155,14 @@ impl ForceArgs {
                         let problem = unknown("force", name, known.iter().map(String::as_str));
                         return Err(CliError::usage(format_args!("--force: {problem}")));
                     };
-                    let value = finite(value).map_err(|problem| {
-                        CliError::usage(format_args!("--force {name}: {problem}, found {value:?}"))
-                    })?;
+                    let value = match finite(value) {
+                        Ok(value) => value,
+                        Err(problem) => {
+                            let wrong = |fault| format!("--force {name}: {problem} or a formula of t: {fault}");
+                            formulas.push((i, of_time(value).map_err(|fault| CliError::usage(wrong(fault)))?));
+                            0.0
+                        }
+                    };
                     if constants[i].replace(value).is_some() {
                         return Err(CliError::usage(format_args!("--force: {name} is given twice")));
                     }
@@ -117,8 +175,8 @@ impl ForceArgs {
                 }
             }
         }
-        match file {
-            Some(path) => self.with_columns(&path, (coordinates, known), &constants, (from, to)).map(Some),
+        let sampled = match file {
+            Some(path) => self.with_columns(&path, (coordinates, known), &constants, (from, to)),
             None if self.force_time.is_some() || !self.force_units.is_empty() || self.between.is_some() => {
                 Err(CliError::usage("--force-time, --force-units and --between need a CSV of forces"))
             }
@@ -127,9 +185,10 @@ impl ForceArgs {
                     return Err(missing(&inputs[k]));
                 }
                 let values = constants.iter().map(|force| force.unwrap_or(0.0)).collect();
-                SampledForce::constant(values).map(Some).map_err(CliError::data)
+                SampledForce::constant(values).map_err(CliError::data)
             }
-        }
+        };
+        Ok(Some(KnownForce { sampled: sampled?, formulas }))
     }
 
     /// The columns of a file, constants beside them.

@@ -1,12 +1,13 @@
 //! MotionSource of a roll-out: a trained model, or a system.
 
+use crate::cli::forces::KnownForce;
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::source::Source;
 use crate::cli::system_arg::{self, learned_system};
 use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::report::with_unit;
-use crate::rollout::{Domain, Event, SampledForce};
+use crate::rollout::{Domain, Event};
 use std::path::{Path, PathBuf};
 
 /// A source of motion with what is known about it.
@@ -24,7 +25,7 @@ pub struct MotionSource {
     /// Names of the external forces, one per coordinate, and then of inputs.
     pub forces: Vec<String>,
     /// Values of inputs, if there are any.
-    inputs: Option<SampledForce<f64>>,
+    inputs: Option<KnownForce>,
     /// A system that it is.
     pub instance: Option<SystemInstance<f64>>,
     /// The states a model was trained on.
@@ -86,7 +87,7 @@ impl MotionSource {
     ///
     /// # Errors
     /// A usage error for constraints that leave no motion.
-    pub fn take_inputs(&mut self, given: Option<SampledForce<f64>>) -> Result<Option<SampledForce<f64>>, CliError> {
+    pub fn take_inputs(&mut self, given: Option<KnownForce>) -> Result<Option<KnownForce>, CliError> {
         let n = self.columns.len() / 2;
         let (Some(given), true) = (given.clone(), self.forces.len() > n) else { return Ok(given) };
         let inputs = given.components(n..self.forces.len());

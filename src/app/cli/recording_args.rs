@@ -24,7 +24,8 @@ pub struct RecordingArgs {
     /// Columns of measured accelerations, one per coordinate.
     #[arg(long, value_name = "a1,a2", value_delimiter = ',')]
     pub acceleration: Vec<String>,
-    /// Columns of known external generalized forces, one per coordinate.
+    /// Columns of known external generalized forces, one per coordinate; =FORMULA is a formula of the time t and of other columns, such as
+    /// '=0.3*cos(1.2*t)'.
     #[arg(long, value_name = "f1,f2", value_delimiter = ',')]
     pub force: Vec<String>,
     /// Column of the time [default: the one called t or time, unless there is a rate].

@@ -22,7 +22,7 @@ use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
 use crate::pipeline::{Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
-use crate::recording::{LoadedRecording, Targets};
+use crate::recording::{LoadedRecording, Targets, is_formula};
 use crate::report::with_unit;
 use crate::scalar::Scalar;
 use crate::shooting::{self, Fitted, Task};
@@ -389,9 +389,9 @@ pub(crate) fn judge(
 ) -> Result<HoldOut, PipelineError> {
     let names = &prepared.reading.recording.coordinates;
     let time = header.architecture.time_like;
-    let forces = match config.recording.force.as_slice() {
-        [] => names.iter().map(|name| usual_force(name)).collect(),
-        known => known.to_vec(),
+    let forces = match named_forces(&config.recording.force) {
+        known if known.is_empty() => names.iter().map(|name| usual_force(name)).collect(),
+        known => known,
     };
     let (part, horizon) = (&prepared.measured.test, config.horizon);
     let held_out = HoldOutOptions { part, horizon, time, forces: &forces, units: &units(prepared.reading), threads };
@@ -438,7 +438,8 @@ fn labels(reading: &LoadedRecording) -> Vec<String> {
     positions.chain(velocities).collect()
 }
 
-/// Columns of recorded forces as a model remembers them; numbers of columns are not names.
+/// Columns of recorded forces as a model remembers them; numbers of columns are not names, nor are formulas.
 fn named_forces(columns: &[String]) -> Vec<String> {
-    if columns.iter().any(|name| name.parse::<f64>().is_ok()) { Vec::new() } else { columns.to_vec() }
+    let is_name = |text: &String| text.parse::<f64>().is_err() && !is_formula(text);
+    if columns.iter().all(is_name) { columns.to_vec() } else { Vec::new() }
 }

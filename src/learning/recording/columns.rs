@@ -15,7 +15,8 @@ pub struct Columns {
     pub velocity: Vec<String>,
     /// Measured accelerations, one per coordinate; empty if there are none.
     pub acceleration: Vec<String>,
-    /// Known external generalized forces, one per coordinate; empty if there are none.
+    /// Known external generalized forces, one per coordinate; empty if there are none. Behind an equals sign stands a formula of the time `t`
+    /// and of other columns, such as `=0.3*cos(1.2*t)`.
     pub force: Vec<String>,
     /// Standard deviations of the positions, sample by sample, one per coordinate and in its unit; empty if there are none.
     pub error: Vec<String>,
@@ -45,6 +46,14 @@ pub struct Columns {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{}", .0.join("; "))]
 pub struct ColumnsError(pub Vec<String>);
+
+/// Name of the time in formulas of forces, whatever its column is called.
+pub(crate) const TIME: &str = "t";
+
+/// `true` for a force that is a formula instead of a column.
+pub(crate) fn is_formula(text: &str) -> bool {
+    text.starts_with('=')
+}
 
 impl Columns {
     /// Every column named, with its meaning.
@@ -79,16 +88,8 @@ impl Columns {
         if self.coords.is_empty() {
             wrong.push("expected the columns of the coordinates".to_string());
         }
-        for (what, names) in [
-            ("velocity", &self.velocity),
-            ("acceleration", &self.acceleration),
-            ("force", &self.force),
-            ("error", &self.error),
-        ] {
-            if !names.is_empty() && names.len() != self.coords.len() {
-                let (columns, found) = (pluralize(self.coords.len(), "column", "columns"), names.len());
-                wrong.push(format!("{what}: expected {columns}, one per coordinate, found {found}"));
-            }
+        if let Err(counts) = self.count_faults() {
+            wrong.extend(counts.0);
         }
         let used: Vec<(&str, &String)> = self.used().collect();
         for (k, (what, name)) in used.iter().enumerate() {
@@ -126,6 +127,26 @@ impl Columns {
                 wrong.push(format!("columns: duplicate name {name}, at position {} again", k + 1));
             }
         }
+        if wrong.is_empty() { Ok(()) } else { Err(ColumnsError(wrong)) }
+    }
+
+    /// Checks that there are as many of everything as coordinates.
+    ///
+    /// # Errors
+    /// [`ColumnsError`]: another number of velocities, accelerations, forces or errors.
+    pub(crate) fn count_faults(&self) -> Result<(), ColumnsError> {
+        let lists = [
+            ("velocity", &self.velocity),
+            ("acceleration", &self.acceleration),
+            ("force", &self.force),
+            ("error", &self.error),
+        ];
+        let other = lists.into_iter().filter(|(_, names)| !names.is_empty() && names.len() != self.coords.len());
+        let fault = |(what, names): (&str, &Vec<String>)| {
+            let (columns, found) = (pluralize(self.coords.len(), "column", "columns"), names.len());
+            format!("{what}: expected {columns}, one per coordinate, found {found}")
+        };
+        let wrong: Vec<String> = other.map(fault).collect();
         if wrong.is_empty() { Ok(()) } else { Err(ColumnsError(wrong)) }
     }
 

@@ -32,6 +32,8 @@ mod track;
 mod units;
 
 pub(crate) use clock::Clock;
+#[cfg(feature = "pipeline")]
+pub(crate) use columns::is_formula;
 pub use columns::{Columns, ColumnsError};
 pub use guess::{ColumnGuess, Guess, guess};
 pub(crate) use held::{Filled, filled, marks};

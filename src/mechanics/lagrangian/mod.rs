@@ -70,6 +70,8 @@ pub use error::MechanicsError;
 pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
 #[cfg(feature = "cli")]
 pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
+#[cfg(feature = "data")]
+pub(crate) use expression::NamedFormula;
 #[cfg(feature = "cli")]
 pub(crate) use expression::quantity;
 pub use expression::{ExpressionError, ExpressionLagrangian};

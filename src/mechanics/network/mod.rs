@@ -3,7 +3,7 @@
 //!
 //! ```
 //! use lnn::lagrangian::{EulerLagrange, Request, Terms};
-//! use lnn::network::{NetworkLagrangian, file::ModelFile};
+//! use lnn::network::{ModelFile, NetworkLagrangian};
 //!
 //! // A double pendulum that was learned, beside the examples; two states of it.
 //! let file = ModelFile::<f64>::load("examples/data/double_pendulum.safetensors".as_ref())?;

@@ -14,6 +14,8 @@ const MOST_STATES: usize = 12_000;
 /// Errors beyond so many standard deviations count linearly.
 const HUBER: f64 = 3.0;
 const ITERATIONS: usize = 60;
+/// Share of the decrement that a step leaves at most if the next goes on with its matrix.
+const KEEPS: f64 = 0.01;
 
 /// States with their accelerations, `(states, n)`, and the expected errors of these.
 #[derive(Default)]
@@ -166,8 +168,26 @@ impl States {
 
     /// Normal equations, with the right-hand sides of batches of states; `None` where no residual is finite.
     pub fn normal(&self, problem: &Problem<'_>, x: &[f64], met: Met) -> Option<Normal> {
+        let m = problem.chosen.len();
+        let mut products = Products::new(problem.course.equations.n, m);
+        let mut matrix = vec![0.0; m * m];
+        let add = |i: usize, row: &[f64], factor: f64| products.add(i, row, factor, &mut matrix);
+        let normal = self.right(problem, x, met, add)?;
+        products.finish(&mut matrix);
+        let diagonal = (0..m).map(|k| matrix[k * m + k]).collect();
+        Some(Normal { matrix, diagonal, ..normal })
+    }
+
+    /// Normal equations without their matrix, the sum over rows of the products of `add(coordinate, row, factor)`.
+    fn right(
+        &self,
+        problem: &Problem<'_>,
+        x: &[f64],
+        met: Met,
+        mut add: impl FnMut(usize, &[f64], f64),
+    ) -> Option<Normal> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
-        let (mut normal, mut products) = (Normal::empty(m), Products::new(n, m));
+        let mut normal = Normal { right: vec![0.0; m], held: vec![false; m], ..Normal::default() };
         self.residuals(problem, x, met, |first, residuals, slopes| {
             let mut part = vec![0.0; m];
             for (k, residual) in residuals.iter().enumerate() {
@@ -182,13 +202,11 @@ impl States {
                 let cut = if size > HUBER { HUBER / size } else { 1.0 };
                 normal.square += if size > HUBER { HUBER * (2.0 * size - HUBER) } else { residual * residual };
                 part.iter_mut().zip(row).for_each(|(sum, x)| *sum += cut * weight * x * residual);
-                products.add((first + k) % n, row, cut.sqrt() * weight, &mut normal.matrix);
+                add((first + k) % n, row, cut.sqrt() * weight);
             }
             normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
             normal.parts.push(part);
         });
-        products.finish(&mut normal.matrix);
-        normal.diagonal = (0..m).map(|k| normal.matrix[k * m + k]).collect();
         (normal.count > 0.0).then_some(normal)
     }
 
@@ -211,18 +229,35 @@ impl States {
         let mut best = self.normal(problem, x, met)?;
         let given = if met == Met::Forces { &self.force } else { &self.a };
         let size: f64 = given.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
-        // Forces are often linear in the constants.
-        let mut damping = if met == Met::Forces { 1e-9 } else { 1e-3 };
+        // Forces are often linear in the constants, and the matrix of one step is then that of the next.
+        let mut linear = met == Met::Forces;
+        let mut damping = if linear { 1e-9 } else { 1e-3 };
+        let (mut kept, mut before) = (false, f64::INFINITY);
         for _ in 0..ITERATIONS {
-            let muted = problem.too_weak(x, &best, SILENT * size);
+            let mut muted = problem.too_weak(x, &best, SILENT * size);
             problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
+            if kept && !best.converged && best.decrement > KEEPS * before {
+                best = self.normal(problem, x, met)?;
+                (linear, kept) = (false, false);
+                muted = problem.too_weak(x, &best, SILENT * size);
+                problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
+            }
             let residual = (best.square / best.count.max(1.0)).sqrt();
             if best.converged || damping > MOST_DAMPING || !problem.cancellation.iterate(residual) {
                 break;
             }
+            before = best.decrement;
             let moved = problem.moved(x, &problem.step(x, &best, &muted, damping).change, &best);
-            match self.normal(problem, &moved, met) {
-                Some(tried) if tried.square < best.square => {
+            let tried = match linear {
+                true => self.right(problem, &moved, met, |_, _, _| ()),
+                false => self.normal(problem, &moved, met),
+            };
+            match tried {
+                Some(mut tried) if tried.square < best.square => {
+                    if linear {
+                        (tried.matrix, tried.diagonal) = (best.matrix, best.diagonal);
+                        kept = true;
+                    }
                     (*x, best) = (moved, tried);
                     damping = f64::max(damping / 10.0, LEAST_DAMPING);
                 }

@@ -357,3 +357,63 @@ fn motion_under_noisy_torques_is_learned_by_its_forces() {
     refused(&unforced, &["--targets forces", "--force"]);
     refused(&[&columns[..], &["--joint-friction", "wet"]].concat(), &["--joint-friction", "stribeck", "wet"]);
 }
+
+/// A spring that hardens, alone and under a drive.
+const SPRING: &str = r#"
+name = "spring"
+lagrangian = "x_dot^2/2 - k*x^2/2 - b*x^4/4"
+coordinates = [{ name = "x", bounds = [-3, 3], velocity_bounds = [-3, 3] }]
+[parameters]
+k = { default = 1, learn = true }
+b = { default = 0.5, learn = true }
+"#;
+
+#[test]
+fn forces_may_be_formulas_of_time_and_columns() {
+    let folder = Folder::new();
+    let alone = folder.file("spring.toml", SPRING);
+    let driven = folder.file("driven.toml", SPRING.to_string() + "[forces]\nx = \"0.3*cos(1.2*t)\"\n");
+    let roll = |system: &str, more: &[&str]| {
+        let words = ["rollout", "--system", system, "--state", "0.7,0", "--t-end", "20", "--dt", "0.05", "--out", "-"];
+        let run = lnn(&[&words[..], &["--rtol", "1e-11", "--atol", "1e-11"], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        table(&run.stdout)
+    };
+    let motion = roll(&driven, &[]);
+    let by_formula = roll(&alone, &["--force", "x_force=0.3*cos(1.2*t)"]);
+    let apart = motion.iter().zip(&by_formula).map(|(a, b)| (a[1] - b[1]).abs()).fold(0.0, f64::max);
+    assert!(apart < 1e-8, "{apart}");
+
+    let row = |row: &Vec<f64>| {
+        let (t, current) = (row[0], 2.0 * (1.2 * row[0]).cos());
+        format!("{t},{},{current},{}\n", row[1], 0.3 * (1.2 * t).cos())
+    };
+    let data = folder.file("motion.csv", "t,x,current,f\n".to_string() + &motion.iter().map(row).collect::<String>());
+    let ways = ["f", "=0.3*cos(1.2*t)", "=0.15*current"];
+    let constants = ways.map(|force| {
+        let run = lnn(&["identify", &data, "--system", &alone, "--force", force, "--between", "cubic", "--json"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let found: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(found["verdict"], "exact", "{force}: {}", run.stdout);
+        ["k", "b"].map(|name| found["constants"][name]["value"].as_f64().unwrap())
+    });
+    assert!(constants.iter().all(|[k, b]| (k - 1.0).abs() < 1e-4 && (b - 0.5).abs() < 1e-4), "{constants:?}");
+
+    let losses = ways.map(|force| {
+        let out = text(&folder.path(&format!("fit-{}", force.len())));
+        let words = ["fit", &data, "--coords", "x", "--force", force, "--hidden", "4", "--epochs", "2", "--out", &out];
+        let run = lnn(&[&words[..], &["--targets", "smoothed", "--json"]].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let said: Value = serde_json::from_str(&run.stdout).unwrap();
+        said["validation_loss"].as_f64().unwrap()
+    });
+    assert!(losses.iter().all(|loss| (loss / losses[0] - 1.0).abs() < 1e-9), "{losses:?}");
+
+    for (force, word) in [("=0.3*cos(1.2*tt)", "tt"), ("=1/t", "t = 0"), ("=cos(", "cos"), ("=t,=t", "force")] {
+        let run = lnn(&["identify", &data, "--system", &alone, "--force", force]);
+        assert!(run.code == Some(2) || run.code == Some(1), "{force}: {:?} {}", run.code, run.stderr);
+        assert!(run.stderr.contains(word) && !run.stderr.contains("panicked"), "{force}: {}", run.stderr);
+    }
+    let run = lnn(&["rollout", "--system", &alone, "--state", "0,0", "--force", "x_force=0.3*cos(w*t)"]);
+    assert!(run.code == Some(2) && run.stderr.contains('w'), "{}", run.stderr);
+}

@@ -4,6 +4,8 @@ use super::angles::{Angle, angle};
 use super::names::{is_acceleration, is_force, is_index, is_position, is_torque, is_trajectory, is_velocity};
 use super::time::{self, Time, counts};
 use super::{ColumnGuess, Guess};
+use crate::lagrangian::NamedFormula;
+use crate::recording::columns::TIME;
 use crate::recording::read::{RawTable, read_recording};
 use crate::recording::{Columns, DataError, Problem};
 use std::path::Path;
@@ -89,10 +91,14 @@ impl Roles<'_> {
     /// Takes the roles that options give.
     fn take_given(&mut self) {
         let place = |name: &String| self.table.names.iter().position(|known| known == name);
-        let lists: [(&[String], Role); 6] = [
+        let made_of = |text: &String| text.strip_prefix('=')?.parse::<NamedFormula>().ok();
+        let inputs = self.given.force.iter().filter_map(made_of).flat_map(|force| force.names);
+        let inputs: Vec<String> = inputs.filter(|name| name != TIME).collect();
+        let lists: [(&[String], Role); 7] = [
             (self.given.time.as_slice(), Role::Time),
             (self.given.trajectory.as_slice(), Role::Trajectory),
             (&self.given.force, Role::Force),
+            (&inputs, Role::Given("input of a force")),
             (&self.given.velocity, Role::Given("velocity")),
             (&self.given.acceleration, Role::Given("acceleration")),
             (&self.given.error, Role::Given("standard error")),

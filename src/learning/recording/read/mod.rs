@@ -8,6 +8,7 @@ mod encoding;
 mod error;
 mod facts;
 mod fill;
+mod force_formulas;
 mod foreign;
 mod gzip;
 mod npy;
@@ -35,6 +36,7 @@ use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, Recording};
 use crate::storage::open_regular;
 use builder::Builder;
+use force_formulas::ForceFormulas;
 use shared::Shared;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -55,11 +57,16 @@ const MAX_BYTES: u64 = 1 << 36;
 ///
 /// Numbers are converted to SI, by the units of the description or else by those in brackets behind the names of a header; angles are
 /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps
-/// trajectories whole across all gaps.
+/// trajectories whole across all gaps. Forces that are formulas are evaluated at the samples.
 ///
 /// # Errors
 /// [`DataError`], naming the file and, where there is one, row and column; several mistakes in the rows of a file at once.
 pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<LoadedRecording, DataError> {
+    if let Some((formulas, plain)) = ForceFormulas::of(columns)? {
+        let mut reading = read_recording(paths, &plain)?;
+        formulas.apply(columns, &mut reading)?;
+        return Ok(reading);
+    }
     columns.validate()?;
     if paths.is_empty() {
         return Err(DataError::NoFiles);

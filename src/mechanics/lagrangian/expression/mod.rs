@@ -196,6 +196,39 @@ pub(crate) fn quantity<S: Scalar>(text: &str) -> Result<S, ExpressionError> {
     Ok(compiler.formula(value).evaluate::<S>(&[], &[], &[]))
 }
 
+/// A formula of numbers that it names, such as `0.3*cos(1.2*t)` of the number `t`.
+#[cfg(feature = "data")]
+#[derive(Clone, Debug)]
+pub(crate) struct NamedFormula {
+    /// What it names, each once.
+    pub names: Vec<String>,
+    formula: Arc<Formula>,
+}
+
+#[cfg(feature = "data")]
+impl NamedFormula {
+    /// Its value for those of its names.
+    pub fn value(&self, values: &[f64]) -> f64 {
+        self.formula.evaluate(values, &[], &[])
+    }
+}
+
+#[cfg(feature = "data")]
+impl core::str::FromStr for NamedFormula {
+    type Err = ExpressionError;
+
+    fn from_str(text: &str) -> Result<Self, ExpressionError> {
+        let expression: Expression = text.parse()?;
+        let mut names: Vec<String> = expression.names().map(ToString::to_string).collect();
+        names.sort();
+        names.dedup();
+        let scope = names.iter().enumerate().map(|(i, name)| (name.clone(), Meaning::Parameter(i))).collect();
+        let mut compiler = Compiler::default();
+        let value = compiler.add(&expression, &scope, false)?;
+        Ok(Self { names, formula: Arc::new(compiler.formula(value)) })
+    }
+}
+
 /// `L(q, v; parameters)` by a formula such as `m*l^2*theta_dot^2/2 + m*g*l*cos(theta)`.
 ///
 /// ```

@@ -1,0 +1,100 @@
+//! Known forces by formulas of the time and of other columns, such as `=0.3*cos(1.2*t)` or `=K*current` with a number for `K`.
+
+use crate::lagrangian::NamedFormula;
+use crate::recording::columns::{TIME, is_formula};
+use crate::recording::reading::LoadedRecording;
+use crate::recording::{Columns, ColumnsError};
+
+/// The forces on the coordinates, some of which are formulas.
+pub struct ForceFormulas {
+    /// A formula for each coordinate; that of a column is its name.
+    formulas: Vec<Given>,
+    /// Inputs that are read for the formulas, behind those that were asked for.
+    read: Vec<String>,
+    asked: usize,
+}
+
+/// Where a force comes from.
+enum Given {
+    Column(String),
+    Formula(String, NamedFormula),
+}
+
+impl ForceFormulas {
+    /// Those of a description of columns, and the description of what has to be read for them; none if every force is a column.
+    ///
+    /// # Errors
+    /// [`ColumnsError`]: a mistake in a formula, or another number of forces than of coordinates.
+    pub fn of(columns: &Columns) -> Result<Option<(Self, Columns)>, ColumnsError> {
+        if !columns.force.iter().any(|text| is_formula(text)) {
+            return Ok(None);
+        }
+        columns.count_faults()?;
+        let given = |text: &String| match text.strip_prefix('=') {
+            None => Ok(Given::Column(text.clone())),
+            Some(formula) => match formula.parse() {
+                Ok(parsed) => Ok(Given::Formula(text.clone(), parsed)),
+                Err(error) => Err(ColumnsError(vec![format!("force: {text}: {error}")])),
+            },
+        };
+        let formulas = columns.force.iter().map(given).collect::<Result<Vec<_>, _>>()?;
+        let (mut plain, mut read) = (Columns { force: Vec::new(), ..columns.clone() }, Vec::new());
+        for name in formulas.iter().flat_map(Given::names).filter(|name| name.as_str() != TIME) {
+            if !plain.input.contains(name) {
+                plain.input.push(name.clone());
+                read.push(name.clone());
+            }
+        }
+        let asked = plain.input.len() - read.len();
+        Ok(Some((Self { formulas, read, asked }, plain)))
+    }
+
+    /// Evaluates the forces at the samples of a recording, which has the inputs of its description and then those of the formulas.
+    ///
+    /// # Errors
+    /// [`ColumnsError`] for a force that is not finite.
+    pub fn apply(&self, columns: &Columns, reading: &mut LoadedRecording) -> Result<(), ColumnsError> {
+        let count = self.asked + self.read.len();
+        let names = || columns.input[..self.asked].iter().chain(&self.read);
+        let place = |name: &String| names().position(|own| own == name);
+        for (k, track) in reading.recording.tracks.iter_mut().enumerate() {
+            for (sample, t) in track.times.iter().enumerate() {
+                let inputs = reading.inputs.get(k).map_or(&[][..], |all| &all[sample * count..(sample + 1) * count]);
+                let value = |name: &String| place(name).map_or(*t, |at| inputs[at]);
+                for given in &self.formulas {
+                    let (text, force) = match given {
+                        Given::Column(name) => (name, value(name)),
+                        Given::Formula(text, formula) => {
+                            let values: Vec<f64> = formula.names.iter().map(value).collect();
+                            (text, formula.value(&values))
+                        }
+                    };
+                    if !force.is_finite() {
+                        let problem = format!("force: {text}: expected a finite number, found {force} at t = {t}");
+                        return Err(ColumnsError(vec![problem]));
+                    }
+                    track.force.push(force);
+                }
+            }
+        }
+        for inputs in &mut reading.inputs {
+            *inputs = inputs.chunks_exact(count).flat_map(|row| &row[..self.asked]).copied().collect();
+        }
+        if self.asked == 0 {
+            reading.inputs.clear();
+        }
+        reading.columns.input.truncate(self.asked);
+        reading.columns.force.clone_from(&columns.force);
+        Ok(())
+    }
+}
+
+impl Given {
+    /// The columns and the time it is made of.
+    fn names(&self) -> &[String] {
+        match self {
+            Self::Column(name) => std::slice::from_ref(name),
+            Self::Formula(_, formula) => &formula.names,
+        }
+    }
+}
