@@ -128,7 +128,7 @@ impl Problem<'_> {
     }
 
     /// The step from the damped normal equations of unknowns that are not muted. Constants at a bound that would leave their range stay.
-    pub(super) fn step(&self, x: &[f64], normal: &Normal, muted: &[bool], damping: f64) -> Step {
+    pub(super) fn step(&self, x: &[f64], normal: &mut Normal, muted: &[bool], damping: f64) -> Step {
         let m = normal.right.len();
         let at_bound: Vec<bool> = (0..m).map(|k| x[k] <= self.bound(k)).collect();
         let mut held: Vec<bool> = (0..m).map(|k| !muted[k] && at_bound[k] && normal.right[k] <= 0.0).collect();
@@ -175,7 +175,7 @@ impl Problem<'_> {
             if normal.converged || !self.cancellation.iterate(residual) {
                 break;
             }
-            let change = self.step(x, &normal, &muted, damping).change;
+            let change = self.step(x, &mut normal, &muted, damping).change;
             let moved = self.moved(x, &change, &normal);
             let real: Vec<f64> = moved.iter().zip(x.iter()).map(|(after, before)| after - before).collect();
             let starts: Vec<Vec<f64>> = segments.iter().map(|segment| segment.start.clone()).collect();
@@ -255,27 +255,47 @@ impl Problem<'_> {
     }
 }
 
-/// Solution of damped normal equations for some unknowns with the others held fixed, by the eigenvectors of the correlation matrix; eigenvalues
-/// below rounding count as rounding.
-fn solution(normal: &Normal, free: &[usize], damping: f64) -> Vec<f64> {
-    let (m, count) = (normal.right.len(), free.len());
-    let mut change = vec![0.0; m];
-    let root = |k: usize| normal.matrix[k * m + k].max(f64::MIN_POSITIVE).sqrt();
-    let scaled: Vec<f64> = (0..count * count)
-        .map(|at| (free[at / count], free[at % count]))
-        .map(|(i, j)| normal.matrix[i * m + j] / (root(i) * root(j)))
-        .collect();
-    let (mut values, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
-    if eigh(count, &scaled, &mut values, &mut vectors, &mut Workspace::new()).is_err() {
-        return change;
+/// Eigenvectors of the correlation matrix of some unknowns of normal equations.
+#[derive(Clone, Debug)]
+pub(super) struct Spectrum {
+    free: Vec<usize>,
+    values: Vec<f64>,
+    vectors: Vec<f64>,
+}
+
+impl Spectrum {
+    /// None where the matrix has none.
+    fn of(normal: &Normal, free: &[usize]) -> Option<Self> {
+        let (m, count) = (normal.right.len(), free.len());
+        let scaled: Vec<f64> = (0..count * count)
+            .map(|at| (free[at / count], free[at % count]))
+            .map(|(i, j)| normal.matrix[i * m + j] / (root(normal, i) * root(normal, j)))
+            .collect();
+        let (mut values, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
+        eigh(count, &scaled, &mut values, &mut vectors, &mut Workspace::new()).ok()?;
+        Some(Self { free: free.to_vec(), values, vectors })
     }
-    let before = free.iter().map(|&k| normal.diagonal[k] / root(k).powi(2)).fold(0.0, f64::max);
+}
+
+/// Root of an element of the diagonal.
+fn root(normal: &Normal, k: usize) -> f64 {
+    normal.matrix[k * normal.right.len() + k].max(f64::MIN_POSITIVE).sqrt()
+}
+
+/// Solution of damped normal equations for some unknowns with the others held fixed, by the eigenvectors of the correlation matrix, which are
+/// kept; eigenvalues below rounding count as rounding.
+fn solution(normal: &mut Normal, free: &[usize], damping: f64) -> Vec<f64> {
+    let mut change = vec![0.0; normal.right.len()];
+    let known = normal.spectrum.take().filter(|spectrum| spectrum.free == free);
+    let Some(spectrum) = known.or_else(|| Spectrum::of(normal, free)) else { return change };
+    let before = free.iter().map(|&k| normal.diagonal[k] / root(normal, k).powi(2)).fold(0.0, f64::max);
     let ridge = RIDGE.max(ELIMINATION * before);
-    let pull: Vec<f64> = free.iter().map(|&k| normal.right[k] / root(k)).collect();
-    for (value, vector) in values.iter().zip(vectors.chunks_exact(count.max(1))) {
+    let pull: Vec<f64> = free.iter().map(|&k| normal.right[k] / root(normal, k)).collect();
+    for (value, vector) in spectrum.values.iter().zip(spectrum.vectors.chunks_exact(free.len().max(1))) {
         let size = dot(vector, &pull) / (value.max(ridge) + damping);
-        vector.iter().zip(free).for_each(|(v, &k)| change[k] += v * size / root(k));
+        vector.iter().zip(free).for_each(|(v, &k)| change[k] += v * size / root(normal, k));
     }
+    normal.spectrum = Some(spectrum);
     change
 }
 

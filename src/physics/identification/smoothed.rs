@@ -247,7 +247,8 @@ impl States {
                 break;
             }
             before = best.decrement;
-            let moved = problem.moved(x, &problem.step(x, &best, &muted, damping).change, &best);
+            let change = problem.step(x, &mut best, &muted, damping).change;
+            let moved = problem.moved(x, &change, &best);
             let tried = match linear {
                 true => self.right(problem, &moved, met, |_, _, _| ()),
                 false => self.normal(problem, &moved, met),
@@ -255,7 +256,7 @@ impl States {
             match tried {
                 Some(mut tried) if tried.square < best.square => {
                     if linear {
-                        (tried.matrix, tried.diagonal) = (best.matrix, best.diagonal);
+                        tried.keep_matrix(best);
                         kept = true;
                     }
                     (*x, best) = (moved, tried);

@@ -2,7 +2,7 @@
 //!
 //! Every segment has an initial state of its own, which is eliminated from the normal equations.
 
-use super::descent::{FAILED, RIDGE};
+use super::descent::{FAILED, RIDGE, Spectrum};
 use super::follow::{Course, Follower, LANES, Segment, State};
 use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
@@ -104,6 +104,8 @@ pub(crate) struct Normal {
     pub converged: bool,
     /// Constants at the bound of their range, beyond which the fit would be better.
     pub held: Vec<bool>,
+    /// Eigenvectors of the matrix, once a step needed them.
+    pub(super) spectrum: Option<Spectrum>,
 }
 
 impl Normal {
@@ -113,9 +115,15 @@ impl Normal {
         Self { matrix: vec![0.0; m * m], right, diagonal, held: vec![false; m], ..Self::default() }
     }
 
+    /// Takes the matrix of other normal equations.
+    pub fn keep_matrix(&mut self, other: Self) {
+        (self.matrix, self.diagonal, self.spectrum) = (other.matrix, other.diagonal, other.spectrum);
+    }
+
     /// The same, with constants at their bounds treated as known to far below their least value.
     pub fn with_held(mut self) -> Self {
         let m = self.right.len();
+        self.spectrum = None;
         for k in (0..m).filter(|&k| self.held[k]) {
             (0..m).for_each(|l| (self.matrix[k * m + l], self.matrix[l * m + k]) = (0.0, 0.0));
             (self.matrix[k * m + k], self.diagonal[k], self.right[k]) = (GIVEN, GIVEN, 0.0);
