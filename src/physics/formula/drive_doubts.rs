@@ -12,6 +12,9 @@ use std::f64::consts::TAU;
 /// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
 const REPEATED: f64 = 0.02;
 const MOST_REPEATED: usize = 4;
+/// Most terms of a law with a drive, whose frequency is chosen too: of two nearly linear coordinates outside the libraries, one recording in ten
+/// was followed by 24 terms, by `lnn-studies rates --part drives`; the laws of that page have up to 8.
+const MOST_TERMS: usize = 12;
 
 /// Reasons why a model with a drive may not be the law of the motion that it fits.
 pub(super) fn drive_doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
@@ -30,6 +33,10 @@ pub(super) fn drive_doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
         doubts.push(format!(
             "the motion repeats itself after each {periods} of the drive: a system that oscillates by itself moves in the same way"
         ));
+    }
+    if model.terms.len() > MOST_TERMS {
+        let count = model.terms.len();
+        doubts.push(format!("it has {count} terms and a drive: so many may follow the motion of another law as well"));
     }
     if data.recording.tracks.len() == 1 && model.terms.iter().all(|&k| is_linear(library, k)) {
         doubts.push(

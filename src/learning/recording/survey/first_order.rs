@@ -29,8 +29,9 @@ const RIDGE: f64 = 1e-10;
 
 /// Columns of samples with full windows.
 struct States {
-    /// Positions, then other quantities, with mean 0 and standard deviation 1.
-    known: Vec<Vec<f64>>,
+    /// Positions, then other quantities, with mean 0 and standard deviation 1: for each velocity smoothed as it is. A filter leaves linear
+    /// relations what they are; another one for each column would not.
+    known: Vec<Vec<Vec<f64>>>,
     velocities: Vec<Vec<f64>>,
     errors: Vec<Vec<f64>>,
     /// Samples of a block.
@@ -43,26 +44,28 @@ impl States {
         let columns = |count: usize| vec![Vec::new(); count];
         let stride = recording.samples().div_ceil(MOST_SAMPLES).max(1);
         let block = (WINDOWS * smoothing.window()).div_ceil(stride);
-        let mut states = Self { known: columns(n + inputs), velocities: columns(n), errors: columns(n), block };
+        let known = vec![columns(n + inputs); n];
+        let mut states = Self { known, velocities: columns(n), errors: columns(n), block };
         for (track, beside) in recording.tracks.iter().zip(&reading.inputs) {
             let Ok(smoothed) = smoothing.apply(track) else { continue };
-            // What changes within a window shows in neither.
-            let input = |k: usize| {
-                let q = beside.iter().skip(k).step_by(inputs).flat_map(|u| std::iter::repeat_n(*u, n)).collect();
+            // A column in the place of every coordinate.
+            let alike = |column: &mut dyn Iterator<Item = &f64>| {
+                let q = column.flat_map(|x| std::iter::repeat_n(*x, n)).collect();
                 smoothing.apply(&RecordedTrajectory { q, v: Vec::new(), ..track.clone() }).ok()
             };
-            let Some(others) = (0..inputs).map(input).collect::<Option<Vec<_>>>() else { continue };
+            let positions = (0..n).map(|k| alike(&mut track.q.iter().skip(k).step_by(n)));
+            let others = (0..inputs).map(|k| alike(&mut beside.iter().skip(k).step_by(inputs)));
+            let Some(all) = positions.chain(others).collect::<Option<Vec<_>>>() else { continue };
             for row in smoothed.interior().step_by(stride).filter(|row| smoothed.is_full(*row)) {
-                let known = smoothed.q[row * n..][..n].iter().chain(others.iter().map(|other| &other.q[row * n]));
-                states.known.iter_mut().zip(known).for_each(|(column, x)| column.push(*x));
                 for i in 0..n {
                     let at = row * n + i;
+                    states.known[i].iter_mut().zip(&all).for_each(|(column, own)| column.push(own.q[at]));
                     states.velocities[i].push(smoothed.v[at]);
                     states.errors[i].push(smoothed.v_error[at].hypot(smoothed.v_bias[at]));
                 }
             }
         }
-        for column in &mut states.known {
+        for column in states.known.iter_mut().flatten() {
             let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
             let spread = deviation(column.iter());
             column.iter_mut().for_each(|x| *x = if spread > 0.0 { (*x - mean) / spread } else { 0.0 });
@@ -76,20 +79,23 @@ impl States {
 
     /// `true` for a quantity that varies and is no measurement of a velocity.
     fn is_other(&self, k: usize) -> bool {
-        let known = &self.known[k];
-        let like = |v: &Vec<f64>| dot(known, v).abs() / (self.len() as f64 * deviation(v.iter()));
-        known.iter().any(|x| *x != 0.0) && self.velocities.iter().all(|v| like(v) < MEASURED)
+        let like = |(known, v): (&Vec<Vec<f64>>, &Vec<f64>)| {
+            dot(&known[k], v).abs() / (self.len() as f64 * deviation(v.iter()))
+        };
+        let varies = self.known.iter().all(|known| known[k].iter().any(|x| *x != 0.0));
+        varies && self.known.iter().zip(&self.velocities).all(|pair| like(pair) < MEASURED)
     }
 
     /// Root mean square over the odd blocks of what a polynomial of some of the known quantities leaves of a velocity, fitted to the even ones;
     /// `None` of too few samples.
-    fn residual(&self, velocity: &[f64], of: &[usize]) -> Option<f64> {
+    fn residual(&self, i: usize, of: &[usize]) -> Option<f64> {
+        let (known, velocity) = (&self.known[i], &self.velocities[i]);
         let degree = (1..=DEGREE).rev().find(|&degree| terms(of.len(), degree) <= TERMS)?;
         let count = terms(of.len(), degree);
         if self.len() < SAMPLES_PER_TERM * count {
             return None;
         }
-        let row = |at: usize| monomials(&of.iter().map(|&k| self.known[k][at]).collect::<Vec<_>>(), degree);
+        let row = |at: usize| monomials(&of.iter().map(|&k| known[k][at]).collect::<Vec<_>>(), degree);
         let blocks = |odd: usize| (0..self.len()).filter(move |at| at / self.block % 2 == odd);
         let (mut matrix, mut right) = (vec![0.0; count * count], vec![0.0; count]);
         for at in blocks(0) {
@@ -147,9 +153,9 @@ impl FirstOrder {
         let others: Vec<usize> = (n..n + inputs.len()).filter(|&k| states.is_other(k)).collect();
         let all = [positions.as_slice(), &others].concat();
         let (mut matter, mut residual) = (false, 0f64);
-        for (velocity, error) in states.velocities.iter().zip(&states.errors) {
-            let (error, spread) = (rms(error.iter().copied()), deviation(velocity.iter()));
-            let (with, without) = (states.residual(velocity, &all)?, states.residual(velocity, &positions)?);
+        for i in 0..n {
+            let (error, spread) = (rms(states.errors[i].iter().copied()), deviation(states.velocities[i].iter()));
+            let (with, without) = (states.residual(i, &all)?, states.residual(i, &positions)?);
             if with > (AT_ERROR * error).max(MISSED * spread).min(OF_SPREAD * spread) {
                 return None;
             }
