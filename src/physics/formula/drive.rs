@@ -29,6 +29,8 @@ const LEAST_BESIDE: f64 = 6.0;
 const MOST_ALARMS: f64 = 1e-3;
 /// Independent frequencies for each unit of the resolution, of which a maximum is taken.
 const INDEPENDENT: f64 = 3.0;
+/// Largest number of frequencies that are tried.
+const MOST_LINES: usize = 3;
 /// Largest number of terms whose effect is removed from the motion first.
 const MOST_REMOVED: usize = 20;
 
@@ -149,13 +151,18 @@ impl Rest {
         Self { times, driven, band, resolution }
     }
 
-    /// The lines of several, the most significant first, those that are one within the resolution once.
-    pub fn lines(rests: &[Self], stop: &Cancellation) -> Vec<Line> {
-        let mut lines: Vec<Line> = rests.iter().filter_map(|rest| rest.line(stop)).collect();
-        lines.sort_by(|a, b| a.alarms.total_cmp(&b.alarms));
-        let width = rests.first().map_or(0.0, |rest| rest.resolution[0]);
-        lines.dedup_by(|a, b| (a.frequency - b.frequency).abs() < width / 2.0);
-        lines
+    /// The most significant lines of several, in order; those that are one within the resolution once.
+    pub fn lines<'a>(rests: impl Iterator<Item = &'a Self>, stop: &Cancellation) -> Vec<Line> {
+        let mut lines: Vec<(Line, f64)> =
+            rests.filter_map(|rest| Some((rest.line(stop)?, rest.resolution[0] / 2.0))).collect();
+        lines.sort_by(|(a, _), (b, _)| a.alarms.total_cmp(&b.alarms));
+        let mut apart: Vec<Line> = Vec::new();
+        for (line, width) in lines {
+            if apart.len() < MOST_LINES && apart.iter().all(|own| (own.frequency - line.frequency).abs() >= width) {
+                apart.push(line);
+            }
+        }
+        apart
     }
 
     /// The most significant line; `None` if none stands out.

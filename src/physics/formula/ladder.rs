@@ -159,16 +159,17 @@ impl<'a> Ladder<'a> {
         Ok(())
     }
 
-    /// Searches the libraries again, each with a drive of the frequency that stands out of what it leaves.
+    /// Searches the libraries again with a drive, of each frequency that stands out of what one of them leaves: where a library hides it, another
+    /// may not.
     fn drive(&mut self) -> Result<(), FormulaError> {
         let Some(name) = drive_name(&self.data.recording.coordinates) else { return Ok(()) };
         let stop = &self.options.cancellation;
         stop.stage("periodic drives");
-        let (mut least, mut tried) = (f64::INFINITY, Vec::new());
-        let rests = std::mem::take(&mut self.rests);
-        for (extent, Line { frequency, .. }) in rests
-            .iter()
-            .flat_map(|(extent, rests)| Rest::lines(rests, stop).into_iter().map(move |line| (extent, line)))
+        let (mut least, mut tried) = (f64::INFINITY, BTreeSet::new());
+        let (extents, rests): (Vec<Extent>, Vec<Vec<Rest>>) = std::mem::take(&mut self.rests).into_iter().unzip();
+        let lines = Rest::lines(rests.iter().flatten(), stop);
+        for (extent, Line { frequency, .. }) in
+            extents.iter().flat_map(|extent| lines.iter().map(move |line| (extent, *line)))
         {
             stop.check()?;
             let families = extent.families;
@@ -178,7 +179,7 @@ impl<'a> Ladder<'a> {
                 continue;
             }
             least = weak.least();
-            tried.push(rounded(frequency, 4));
+            tried.insert(rounded(frequency, 4));
             let followed = self.kept(weak.follow_all(self.data, self.judges, self.options))?;
             let fits = |found: &FoundFormula| found.verdict != Verdict::NotInLibrary && found.drive.is_some();
             if let Some(mut found) = followed.filter(fits) {
@@ -189,7 +190,10 @@ impl<'a> Ladder<'a> {
         }
         self.notes.push(match tried.is_empty() {
             true => "no frequency of a drive stands out of what the libraries leave of the motion".to_string(),
-            false => format!("a drive of {} rad/s does not explain the motion either", tried.join(" or ")),
+            false => {
+                let tried = tried.into_iter().collect::<Vec<_>>().join(" or ");
+                format!("a drive of {tried} rad/s does not explain the motion either")
+            }
         });
         Ok(())
     }
