@@ -2,7 +2,7 @@
 
 use super::initial_states::Search;
 use super::pieces::Pieces;
-use super::smoothed::{Met, States};
+use super::smoothed::States;
 use super::solve::Problem;
 use super::stages::{Fitted, first, first_samples};
 use super::{IdentifyError, IdentifyOptions};
@@ -42,10 +42,9 @@ fn from_smoothed(
     options: &IdentifyOptions,
 ) -> Result<FirstFit, IdentifyError> {
     let (n, mut x) = (problem.n(), given.to_vec());
-    let cut = match problem.course.equations.known {
-        _ if states.len(n) == 0 => Some(Vec::new()),
-        0 => states.fit(on_pieces, &mut x, Met::Accelerations).map(|_| Vec::new()),
-        _ => states.fit_in_time(on_pieces, &mut x),
+    let cut = match states.len(n) {
+        0 => Some(Vec::new()),
+        _ => states.fit_phases(on_pieces, &mut x),
     };
     problem.cancellation.check()?;
     let cut = cut.ok_or(IdentifyError::Singular)?;

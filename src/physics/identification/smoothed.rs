@@ -6,6 +6,7 @@ use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
 use super::linear::Products;
 use super::solve::{Normal, Problem};
+use crate::recording::rms;
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
 
@@ -279,15 +280,15 @@ const SHORTEST: f64 = 1.0 / 16.0;
 const DOUBLED: usize = 3;
 
 impl States {
-    /// As [`States::fit`] to accelerations of a system that depends on the time: the sum of squares has many minima over a frequency, as many
-    /// as there are periods in the recording, so that the fit begins at several values of it. In a long recording a wide range is searched by
-    /// a short part, which doubles. Returns the constants, by their places, whose range was searched in part only, and that part.
-    pub fn fit_in_time(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> Option<Vec<(usize, [f64; 2])>> {
+    /// As [`States::fit`] to accelerations, of forces that may have a phase: the sum of squares has many minima over a frequency, as many as
+    /// there are periods in the recording, and over the wave number of a field that the motion crosses, so that the fit begins at several values
+    /// of it. In a long recording a wide range is searched by a short part, which doubles. Returns the constants, by their places, whose range
+    /// was searched in part only, and that part.
+    pub fn fit_phases(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> Option<Vec<(usize, [f64; 2])>> {
         let given = x.clone();
         let mut best = self.fit(problem, x, Met::Accelerations)?;
         let mut cut = Vec::new();
-        for k in 0..problem.chosen.len() {
-            let Some(step) = self.phase_step(problem, &given, k) else { continue };
+        for (k, step) in self.phase_steps(problem, &given) {
             let reach = if given[k] == 0.0 { TRIED as f64 * step } else { SEARCHED * given[k].abs() };
             let mut share = (TRIED as f64 * step / reach).clamp(SHORTEST, 1.0);
             let mut count = ((reach * share / step) as usize).min(TRIED);
@@ -361,41 +362,44 @@ impl States {
         times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)])
     }
 
-    /// Change of constant `k` that turns the phase of the forces by about half a radian at the end of the recording; none of a constant
-    /// whose effect does not grow with time.
-    fn phase_step(&self, problem: &Problem<'_>, x: &[f64], k: usize) -> Option<f64> {
+    /// Constants whose effect grows with time, each with the change that turns the phase of the forces by about half a radian at the end of the
+    /// recording.
+    fn phase_steps(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<(usize, f64)> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
         let [low, high] = self.span(problem);
         let third = (high - low) / 3.0;
-        let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+        let (mut sums, mut counts) = ([vec![0.0; m], vec![0.0; m]], [0.0; 2]);
         self.residuals(problem, x, Met::Accelerations, |first, _, slopes| {
-            for (row, slopes) in slopes.chunks_exact(2 * n + m).enumerate() {
+            for (row, slopes) in slopes.chunks_exact(m.max(1)).enumerate() {
                 let since = self.place(problem, (first + row) / n).1 - low;
                 let part = if since < third { 0 } else { 1 };
                 if since < third || since > 2.0 * third {
-                    sums[part] += slopes[2 * n + k].powi(2);
+                    sums[part].iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += slope * slope);
                     counts[part] += 1.0;
                 }
             }
         });
-        let [early, late] = [0, 1].map(|part| (sums[part] / f64::max(counts[part], 1.0)).sqrt());
-        if late.is_nan() || late <= GROWS * early {
-            return None;
+        let size = |part: usize, k: usize| (sums[part][k] / f64::max(counts[part], 1.0)).sqrt();
+        let grow: Vec<usize> = (0..m).filter(|&k| size(1, k) > GROWS * size(0, k)).collect();
+        if grow.is_empty() {
+            return Vec::new();
         }
-        // What the forces do between one time and others.
+        // What the forces do, between one time and others if they depend on it.
         let mut all = vec![0.0; self.q.len()];
         self.batches(problem, x, |_, range, a| all[range].copy_from_slice(a));
-        self.batches_at(
-            problem,
-            x,
-            |at| (self.places[at].0, low),
-            |_, range, a| {
-                all[range].iter_mut().zip(a).for_each(|(moved, still)| *moved -= still);
-            },
-        );
-        let effect = (all.iter().filter(|x| x.is_finite()).map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
-        let step = 0.5 * effect / late;
-        (step.is_finite() && step > 0.0).then_some(step)
+        if problem.course.equations.known > 0 {
+            self.batches_at(
+                problem,
+                x,
+                |at| (self.places[at].0, low),
+                |_, range, a| {
+                    all[range].iter_mut().zip(a).for_each(|(moved, still)| *moved -= still);
+                },
+            );
+        }
+        let effect = rms(all.into_iter().filter(|x| x.is_finite()));
+        let steps = grow.into_iter().map(|k| (k, 0.5 * effect / size(1, k)));
+        steps.filter(|(_, step)| step.is_finite() && *step > 0.0).collect()
     }
 }
 

@@ -96,15 +96,26 @@ impl Fitted {
         if plain { (square, 1.0) } else { (square * scatter, scatter) }
     }
 
-    /// Mean log standard error of the unknowns, each with the others fixed; only of those with a visible effect, since the errors of the others
-    /// are rounding.
-    fn spread(&self) -> f64 {
+    /// Unknowns with a visible effect.
+    fn seen(&self) -> Vec<bool> {
         let m = self.x.len();
-        let own = |k: &usize| self.normal.matrix[k * m + k];
-        let is_seen = |k: &usize| own(k) > 0.0 && (self.x[*k] == 0.0 || own(k) * self.x[*k] * self.x[*k] > 1.0);
-        let logarithms = (0..m).filter(is_seen).map(|k| own(&k).ln());
-        let (sum, count) = logarithms.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
-        (self.inflation().0.ln() - sum / f64::max(count, 1.0)) / 2.0
+        let own = |k: usize| self.normal.matrix[k * m + k];
+        (0..m).map(|k| own(k) > 0.0 && (self.x[k] == 0.0 || own(k) * self.x[k] * self.x[k] > 1.0)).collect()
+    }
+
+    /// Mean log standard error of some unknowns, each with the others fixed.
+    fn spread(&self, of: &[bool]) -> f64 {
+        let m = self.x.len();
+        let own = |k: usize| self.normal.matrix[k * m + k].max(f64::MIN_POSITIVE);
+        let logarithms: Vec<f64> = (0..m).filter(|k| of[*k]).map(|k| own(k).ln()).collect();
+        let mean = logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64;
+        (self.inflation().0.ln() - mean) / 2.0
+    }
+
+    /// `true` if it determines the unknowns better than another fit: those with a visible effect in either; errors of the others are rounding.
+    fn tells_more_than(&self, other: &Self) -> bool {
+        let either: Vec<bool> = self.seen().into_iter().zip(other.seen()).map(|(a, b)| a || b).collect();
+        self.spread(&either) < other.spread(&either) - GAIN
     }
 }
 
@@ -431,7 +442,7 @@ fn smooth(problem: &mut Problem<'_>, fitted: &mut Fitted) {
 
 fn log(fitted: &Fitted, what: &str) {
     let (x, samples) = (&fitted.x, fitted.segments.first().map_or(0, |segment| segment.samples));
-    let (square, spread) = (fitted.mean_square(), fitted.spread());
+    let (square, spread) = (fitted.mean_square(), fitted.spread(&fitted.seen()));
     let (segments, substeps) = (fitted.segments.len(), fitted.substeps);
     tracing::debug!(?x, samples, segments, substeps, square, spread, failed = fitted.normal.failed, "{what}");
 }
@@ -561,7 +572,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
         problem.settle(&shorter.x, &mut shorter.segments, 3);
         refit(problem, &mut shorter, ITERATIONS);
         log(&shorter, "shorter");
-        if shorter.normal.failed > 0 || shorter.spread() > fitted.spread() - GAIN {
+        if shorter.normal.failed > 0 || !shorter.tells_more_than(&fitted) {
             break;
         }
         fitted = shorter;
@@ -591,7 +602,7 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         // Along chaotic motion the search gets stuck on the roughness of the sum of squares.
         let is_followed = longer.normal.decrement < NEAR || !fitted.normal.converged;
         let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square() && is_followed;
-        if wanted.is_none() && !(met && longer.spread() < fitted.spread() - GAIN) {
+        if wanted.is_none() && !(met && longer.tells_more_than(&fitted)) {
             problem.course.substeps = fitted.substeps;
             break;
         }

@@ -253,6 +253,14 @@ impl Tally {
         }
     }
 
+    /// Counts a recording that is refused.
+    pub(super) fn refused(&mut self, seed: u64, why: &str) {
+        self.systems += 1;
+        if self.right {
+            self.missed.push((seed, why.to_string()));
+        }
+    }
+
     pub(super) fn explained(&self, case: &'static str, limits: RangeInclusive<f64>) -> Rate {
         for (seed, says) in &self.missed {
             eprintln!("{case}, seed {seed}: {says}");

@@ -292,7 +292,7 @@ k = { default = 2, learn = true, range = "positive" }
 
 const SPACECRAFT: Machine = Machine {
     name: "spacecraft with thrusters near its orbit (Clohessy and Wiltshire, 1960)",
-    without: "spacecraft without the tilt of a thruster",
+    without: "spacecraft without the tidal force",
     system: r#"
 name = "spacecraft"
 lagrangian = "(x_dot^2 + y_dot^2)/2 + n*(x*y_dot - y*x_dot) + 3*n^2*x^2/2"
@@ -318,7 +318,7 @@ G = { default = 2e-3, unit = "m/s^2", learn = true }
 H = { default = 1.5e-3, unit = "m/s^2", learn = true }
 tilt = { default = 2e-4, unit = "m/s^2", learn = true }
 "#,
-    wrong: (" + tilt*u", " + tilt*0"),
+    wrong: (" + 3*n^2*x^2/2", ""),
     acceleration: |_, q, v, u| {
         let n = 1.13e-3;
         let tangential = -2.0 * n * v[0] + 1.5e-3 * u[1] + 2e-4 * u[0];
@@ -455,7 +455,10 @@ impl Machine {
             let away = |x: f64, rng: &mut RandomGenerator| x * rng.random_range(1.0 - AWAY..1.0 + AWAY);
             let start: Vec<_> = truth.iter().map(|(name, x)| (name.clone(), away(*x, &mut rng).to_string())).collect();
             let options = IdentifyOptions { inputs, threads: 2, ..IdentifyOptions::default() };
-            tally.count(seed, &identify(&self.system(right, &start)?, &recording, &options)?, &pairs);
+            match identify(&self.system(right, &start)?, &recording, &options) {
+                Ok(found) => tally.count(seed, &found, &pairs),
+                Err(error) => tally.refused(seed, &error.to_string()),
+            }
         }
         Ok(tally)
     }

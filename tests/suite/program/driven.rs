@@ -59,7 +59,7 @@ fn motion((system, out): (&str, &str), options: &str) -> (Run, Vec<Vec<f64>>) {
 }
 
 /// Times and first coordinates of a motion as a CSV, with noise of a size and a seed, and with more columns.
-fn noisy(header: &str, motion: &[Vec<f64>], (size, seed): (f64, u64), more: impl Fn(f64) -> String) -> String {
+fn noisy(header: &str, motion: &[Vec<f64>], (size, seed): (f64, u64), mut more: impl FnMut(f64) -> String) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut csv = format!("{header}\n");
     for (t, q) in motion[0].iter().zip(&motion[1]) {
@@ -317,6 +317,59 @@ fn a_frequency_is_found_in_a_long_recording() {
     let found = identified("om=40");
     let says = found["obstacles"].as_array().unwrap();
     assert!(says.iter().any(|text| text.as_str().unwrap().starts_with("om was searched")), "{found}");
+}
+
+/// A charged particle in the field of a wiggler, `B cos(k z)`.
+const WIGGLER: &str = r#"
+name = "wiggler"
+lagrangian = "(x_dot^2 + z_dot^2)/2 - (B/k)*sin(k*z)*x_dot"
+[[coordinates]]
+name = "x"
+bounds = [-2, 2]
+velocity_bounds = [-2, 2]
+[[coordinates]]
+name = "z"
+bounds = [0, 30]
+velocity_bounds = [0, 3]
+[parameters]
+B = { default = 1.2, learn = true }
+k = { default = 2, learn = true, range = "positive" }
+"#;
+
+/// A phase that grows with time, or with the distance that is gone, has as many minima as periods.
+#[test]
+fn frequencies_and_wave_numbers_are_found_from_afar() {
+    let folder = Folder::new();
+    let found = |(name, system, from): (&str, &str, &str), noise: f64, starts: [&str; 2]| {
+        let (file, out) = (folder.file(name, system), text(&folder.path("motion.csv")));
+        let (_, motion) = motion((&file, &out), &format!("{from} --rtol 1e-11 --atol 1e-12"));
+        let data = match (motion.len() - 1) / 2 {
+            1 => noisy("t,theta", &motion, (noise, 5), |_| String::new()),
+            _ => {
+                let mut rng = ChaCha8Rng::seed_from_u64(6);
+                let mut z = motion[2]
+                    .iter()
+                    .map(|z| z + noise * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng));
+                noisy("t,x,z", &motion, (noise, 5), |_| format!(",{}", z.next().unwrap()))
+            }
+        };
+        let data = folder.file("data.csv", data);
+        starts.map(|start| {
+            let run = lnn(&["identify", &data, "--system", &file, "--json", "--param", start]);
+            assert_eq!(run.code, Some(0), "{}", run.stderr);
+            let found: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+            assert_eq!(found["explained"], true, "{start}: {}", run.stdout);
+            found
+        })
+    };
+    let is_near = |found: &serde_json::Value, name: &str, truth: f64| {
+        let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+        assert!((value - truth).abs() < 5.0 * error && error < 0.01 * truth, "{name} {value} {error}");
+    };
+    let shaken = ("shaken.toml", SHAKEN, "--state 0.8,0 --t-end 15 --dt 0.02");
+    found(shaken, 1e-2, ["om=5.7", "om=8.3"]).iter().for_each(|found| is_near(found, "om", 7.0));
+    let wiggler = ("wiggler.toml", WIGGLER, "--state 0.1,0,0,1 --t-end 25 --dt 0.05");
+    found(wiggler, 1e-2, ["k=1.65", "k=2.35"]).iter().for_each(|found| is_near(found, "k", 2.0));
 }
 
 /// A mass on a spring that carries another payload in every log.

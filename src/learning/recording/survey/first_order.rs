@@ -6,11 +6,11 @@ use crate::names::percent;
 use crate::recording::{LoadedRecording, RecordedTrajectory, Smoothing, deviation, rms};
 use serde::Serialize;
 
-/// Degree of the polynomials, and the number of their terms at most; with more, the degree is lower.
+/// Largest degree of the polynomials, and of the number of their terms.
 const DEGREE: usize = 3;
 const TERMS: usize = 84;
-/// Samples for each term, at least.
-const SAMPLES_PER_TERM: usize = 8;
+/// Windows for each term, at least.
+const WINDOWS_PER_TERM: usize = 8;
 /// Largest residual of a velocity over its error; share of its spread up to which the polynomial may miss it all the same, and from which on it
 /// says nothing; and how many times larger the residual is at least without the other quantities, of one velocity. By the rates of
 /// `lnn-studies rates --part check`.
@@ -20,88 +20,114 @@ const OF_SPREAD: f64 = 0.35;
 const WITHOUT: f64 = 2.0;
 /// Correlation with a velocity from which another quantity is taken for a measurement of it.
 const MEASURED: f64 = 0.995;
-/// Largest number of samples that are used, evenly spaced.
-const MOST_SAMPLES: usize = 20_000;
-/// Windows of smoothing in a block of samples; every other block is fitted.
-const WINDOWS: usize = 8;
+/// Windows in half the width of one, and their largest number.
+const OVERLAP: f64 = 8.0;
+const MOST_WINDOWS: f64 = 4000.0;
+/// Windows in a block; every other block is fitted.
+const BLOCK: usize = 64;
 /// Ridge, over the largest entry of the normal matrix.
 const RIDGE: f64 = 1e-10;
 
-/// Columns of samples with full windows.
-struct States {
-    /// Positions, then other quantities, with mean 0 and standard deviation 1: for each velocity smoothed as it is. A filter leaves linear
-    /// relations what they are; another one for each column would not.
-    known: Vec<Vec<Vec<f64>>>,
-    velocities: Vec<Vec<f64>>,
-    errors: Vec<Vec<f64>>,
-    /// Samples of a block.
-    block: usize,
+/// Weights of the samples about a time, `w(s) = (1 - s^2)^3` over their sum, with which
+///
+/// ```text
+/// mean of x' = -sum w'(t) x(t) h / sum w(t) h
+/// ```
+///
+/// is taken from positions alone. A relation `x' = f(x, u)` holds for the means of both sides, whatever the noise and however fast the motion.
+struct Window {
+    track: usize,
+    first: usize,
+    weights: Vec<f64>,
 }
 
-impl States {
-    fn of(reading: &LoadedRecording, inputs: usize, smoothing: &Smoothing) -> Self {
-        let (recording, n) = (&reading.recording, reading.recording.n());
-        let columns = |count: usize| vec![Vec::new(); count];
-        let stride = recording.samples().div_ceil(MOST_SAMPLES).max(1);
-        let block = (WINDOWS * smoothing.window()).div_ceil(stride);
-        let known = vec![columns(n + inputs); n];
-        let mut states = Self { known, velocities: columns(n), errors: columns(n), block };
-        for (track, beside) in recording.tracks.iter().zip(&reading.inputs) {
-            let Ok(smoothed) = smoothing.apply(track) else { continue };
-            // A column in the place of every coordinate.
-            let alike = |column: &mut dyn Iterator<Item = &f64>| {
-                let q = column.flat_map(|x| std::iter::repeat_n(*x, n)).collect();
-                smoothing.apply(&RecordedTrajectory { q, v: Vec::new(), ..track.clone() }).ok()
-            };
-            let positions = (0..n).map(|k| alike(&mut track.q.iter().skip(k).step_by(n)));
-            let others = (0..inputs).map(|k| alike(&mut beside.iter().skip(k).step_by(inputs)));
-            let Some(all) = positions.chain(others).collect::<Option<Vec<_>>>() else { continue };
-            for row in smoothed.interior().step_by(stride).filter(|row| smoothed.is_full(*row)) {
-                for i in 0..n {
-                    let at = row * n + i;
-                    states.known[i].iter_mut().zip(&all).for_each(|(column, own)| column.push(own.q[at]));
-                    states.velocities[i].push(smoothed.v[at]);
-                    states.errors[i].push(smoothed.v_error[at].hypot(smoothed.v_bias[at]));
+/// A velocity by windows, and what it may follow from.
+struct Equation<'a> {
+    /// Positions, then other quantities, of every trajectory, `(samples, columns)`, with mean 0 and standard deviation 1.
+    known: &'a [Vec<f64>],
+    columns: usize,
+    windows: Vec<Window>,
+    velocities: Vec<f64>,
+    /// Standard error of the velocities by the noise of the positions.
+    error: f64,
+}
+
+impl<'a> Equation<'a> {
+    /// That of coordinate `i`, with windows as wide as those that smooth it.
+    fn of(reading: &LoadedRecording, known: &'a [Vec<f64>], columns: usize, smoothing: &Smoothing, i: usize) -> Self {
+        let (recording, n, chosen) = (&reading.recording, reading.recording.n(), &smoothing.coordinates[i]);
+        let half = chosen.seconds / 2.0;
+        let all: f64 = recording.tracks.iter().map(|track| span(&track.times)).sum();
+        let step = (half / OVERLAP).max(all / MOST_WINDOWS);
+        let (mut windows, mut velocities, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+        for (at, RecordedTrajectory { times, q, .. }) in recording.tracks.iter().enumerate() {
+            let Some(start) = times.first().map(|t| t + half) else { continue };
+            let count = ((span(times) - 2.0 * half) / step).floor();
+            for centre in (0..).map(|k| f64::from(k)).take_while(|k| *k <= count).map(|k| start + k * step) {
+                let first = times.partition_point(|t| *t <= centre - half);
+                let end = times.partition_point(|t| *t < centre + half);
+                let (mut weights, mut slope, mut square) = (Vec::with_capacity(end - first), 0.0, 0.0);
+                for k in first..end {
+                    let h = (times[(k + 1).min(times.len() - 1)] - times[k.saturating_sub(1)]) / 2.0;
+                    let s = (times[k] - centre) / half;
+                    let inside = 1.0 - s * s;
+                    let derivative = 6.0 * s * inside * inside / half * h;
+                    weights.push(inside.powi(3) * h);
+                    slope += derivative * q[k * n + i];
+                    square += derivative * derivative;
                 }
+                let whole: f64 = weights.iter().sum();
+                weights.iter_mut().for_each(|w| *w /= whole);
+                windows.push(Window { track: at, first, weights });
+                velocities.push(slope / whole);
+                errors.push(chosen.noise.sigma * square.sqrt() / whole);
             }
         }
-        for column in states.known.iter_mut().flatten() {
-            let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
-            let spread = deviation(column.iter());
-            column.iter_mut().for_each(|x| *x = if spread > 0.0 { (*x - mean) / spread } else { 0.0 });
+        Self { known, columns, windows, velocities, error: rms(errors.into_iter()) }
+    }
+
+    fn spread(&self) -> f64 {
+        deviation(self.velocities.iter())
+    }
+
+    /// Means over a window of the monomials of some columns.
+    fn mean(&self, window: &Window, of: &[usize], monomials: &Monomials) -> Vec<f64> {
+        let (mut mean, mut values) = (vec![0.0; monomials.count()], vec![1.0; monomials.count()]);
+        let rows = self.known[window.track].chunks_exact(self.columns).skip(window.first);
+        for (weight, row) in window.weights.iter().zip(rows) {
+            monomials.write(|k| row[of[k]], &mut values);
+            mean.iter_mut().zip(&values).for_each(|(sum, x)| *sum += weight * x);
         }
-        states
+        mean
     }
 
-    fn len(&self) -> usize {
-        self.velocities[0].len()
-    }
-
-    /// `true` for a quantity that varies and is no measurement of a velocity.
+    /// `true` if column `k` varies and is no measurement of this velocity.
     fn is_other(&self, k: usize) -> bool {
-        let like = |(known, v): (&Vec<Vec<f64>>, &Vec<f64>)| {
-            dot(&known[k], v).abs() / (self.len() as f64 * deviation(v.iter()))
-        };
-        let varies = self.known.iter().all(|known| known[k].iter().any(|x| *x != 0.0));
-        varies && self.known.iter().zip(&self.velocities).all(|pair| like(pair) < MEASURED)
+        let alone = Monomials::new(1, 1);
+        let column: Vec<f64> = self.windows.iter().map(|window| self.mean(window, &[k], &alone)[1]).collect();
+        let (mean, spread) = (column.iter().sum::<f64>() / column.len() as f64, deviation(column.iter()));
+        let centred: Vec<f64> = column.iter().map(|x| x - mean).collect();
+        spread > 0.0 && dot(&centred, &self.velocities).abs() < MEASURED * column.len() as f64 * spread * self.spread()
     }
 
-    /// Root mean square over the odd blocks of what a polynomial of some of the known quantities leaves of a velocity, fitted to the even ones;
-    /// `None` of too few samples.
-    fn residual(&self, i: usize, of: &[usize]) -> Option<f64> {
-        let (known, velocity) = (&self.known[i], &self.velocities[i]);
-        let degree = (1..=DEGREE).rev().find(|&degree| terms(of.len(), degree) <= TERMS)?;
-        let count = terms(of.len(), degree);
-        if self.len() < SAMPLES_PER_TERM * count {
-            return None;
-        }
-        let row = |at: usize| monomials(&of.iter().map(|&k| known[k][at]).collect::<Vec<_>>(), degree);
-        let blocks = |odd: usize| (0..self.len()).filter(move |at| at / self.block % 2 == odd);
+    /// Root mean square over the odd blocks of what a polynomial of some of the known columns leaves of the velocity, fitted to the even ones:
+    /// that of the best degree. `None` of too few windows.
+    fn residual(&self, of: &[usize]) -> Option<f64> {
+        let enough = |count: usize| count <= TERMS && self.windows.len() >= WINDOWS_PER_TERM * count;
+        let degrees = || (1..=DEGREE).filter(|&degree| enough(terms(of.len(), degree)));
+        let monomials = Monomials::new(of.len(), degrees().last()?);
+        let rows: Vec<Vec<f64>> = self.windows.iter().map(|window| self.mean(window, of, &monomials)).collect();
+        degrees().filter_map(|degree| self.residual_of(&rows, terms(of.len(), degree))).min_by(f64::total_cmp)
+    }
+
+    /// The same by the first so many functions of every row.
+    fn residual_of(&self, rows: &[Vec<f64>], count: usize) -> Option<f64> {
+        let rows = || rows.iter().map(|row| &row[..count]).zip(&self.velocities).enumerate();
+        let block = |odd: usize| rows().filter(move |(at, _)| at / BLOCK % 2 == odd).map(|(_, row)| row);
         let (mut matrix, mut right) = (vec![0.0; count * count], vec![0.0; count]);
-        for at in blocks(0) {
-            let row = row(at);
+        for (row, velocity) in block(0) {
             for (i, x) in row.iter().enumerate() {
-                right[i] += x * velocity[at];
+                right[i] += x * velocity;
                 row.iter().enumerate().for_each(|(j, y)| matrix[i * count + j] += x * y);
             }
         }
@@ -109,8 +135,31 @@ impl States {
         (0..count).for_each(|i| matrix[i * count + i] += RIDGE * largest);
         let mut solution = vec![0.0; count];
         solve_symmetric(count, &matrix, &right, &mut solution, &mut Workspace::new()).ok()?;
-        Some(rms(blocks(1).map(|at| velocity[at] - dot(&row(at), &solution))))
+        Some(rms(block(1).map(|(row, velocity)| velocity - dot(row, &solution))))
     }
+}
+
+/// Time from the first to the last sample.
+fn span(times: &[f64]) -> f64 {
+    times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first)
+}
+
+/// Positions and inputs of every trajectory, `(samples, columns)`, with mean 0 and standard deviation 1.
+fn standardised(reading: &LoadedRecording, inputs: usize) -> Vec<Vec<f64>> {
+    let n = reading.recording.n();
+    let rows = |(track, beside): (&RecordedTrajectory, &Vec<f64>)| -> Vec<f64> {
+        track.q.chunks_exact(n).zip(beside.chunks_exact(inputs)).flat_map(|(q, u)| [q, u].concat()).collect()
+    };
+    let mut known: Vec<Vec<f64>> = reading.recording.tracks.iter().zip(&reading.inputs).map(rows).collect();
+    let columns = n + inputs;
+    for k in 0..columns {
+        let column = || known.iter().flat_map(|rows| rows.iter().skip(k).step_by(columns));
+        let (count, spread) = (column().count().max(1) as f64, deviation(column()));
+        let mean = column().sum::<f64>() / count;
+        let scaled = |x: f64| if spread > 0.0 { (x - mean) / spread } else { 0.0 };
+        known.iter_mut().flat_map(|rows| rows.iter_mut().skip(k).step_by(columns)).for_each(|x| *x = scaled(*x));
+    }
+    known
 }
 
 /// Number of monomials of so many variables up to a degree.
@@ -118,16 +167,40 @@ fn terms(variables: usize, degree: usize) -> usize {
     (1..=degree).fold(1, |product, k| product * (variables + k) / k)
 }
 
-/// All monomials of some variables up to a degree.
-fn monomials(x: &[f64], degree: usize) -> Vec<f64> {
-    let mut all = vec![1.0];
-    // Those of the last degree with the last of their variables, from which on others join them: each comes once.
-    let mut last = vec![(0, 1.0)];
-    for _ in 0..degree {
-        last = last.iter().flat_map(|&(from, value)| (from..x.len()).map(move |k| (k, value * x[k]))).collect();
-        all.extend(last.iter().map(|(_, value)| value));
+/// All monomials of some variables up to a degree, the lower degrees first.
+struct Monomials {
+    /// Of each but the first, which is 1: another one, and the variable it is multiplied by.
+    factors: Vec<(usize, usize)>,
+}
+
+impl Monomials {
+    fn new(variables: usize, degree: usize) -> Self {
+        let mut factors = Vec::new();
+        // Those of the last degree with the last of their variables, from which on others join them: each comes once.
+        let mut last = vec![(0, 0)];
+        for _ in 0..degree {
+            let mut next = Vec::new();
+            for (at, from) in last {
+                for variable in from..variables {
+                    factors.push((at, variable));
+                    next.push((factors.len(), variable));
+                }
+            }
+            last = next;
+        }
+        Self { factors }
     }
-    all
+
+    fn count(&self) -> usize {
+        self.factors.len() + 1
+    }
+
+    /// Their values, `(count)`, of which the first is 1.
+    fn write(&self, x: impl Fn(usize) -> f64, values: &mut [f64]) {
+        for (k, (at, variable)) in self.factors.iter().enumerate() {
+            values[k + 1] = values[*at] * x(*variable);
+        }
+    }
 }
 
 /// Motion of first order.
@@ -148,15 +221,18 @@ impl FirstOrder {
         if inputs.is_empty() || reading.inputs.len() != recording.tracks.len() || recording.is_driven() {
             return None;
         }
-        let states = States::of(reading, inputs.len(), smoothing);
+        let (known, columns) = (standardised(reading, inputs.len()), n + inputs.len());
+        let equations: Vec<Equation<'_>> =
+            (0..n).map(|i| Equation::of(reading, &known, columns, smoothing, i)).collect();
         let positions: Vec<usize> = (0..n).collect();
-        let others: Vec<usize> = (n..n + inputs.len()).filter(|&k| states.is_other(k)).collect();
+        let others: Vec<usize> = (n..columns).filter(|&k| equations.iter().all(|own| own.is_other(k))).collect();
         let all = [positions.as_slice(), &others].concat();
         let (mut matter, mut residual) = (false, 0f64);
-        for i in 0..n {
-            let (error, spread) = (rms(states.errors[i].iter().copied()), deviation(states.velocities[i].iter()));
-            let (with, without) = (states.residual(i, &all)?, states.residual(i, &positions)?);
-            if with > (AT_ERROR * error).max(MISSED * spread).min(OF_SPREAD * spread) {
+        for equation in &equations {
+            let spread = equation.spread();
+            let (with, without) = (equation.residual(&all)?, equation.residual(&positions)?);
+            tracing::debug!(with, without, error = equation.error, spread, "first order");
+            if with > (AT_ERROR * equation.error).max(MISSED * spread).min(OF_SPREAD * spread) {
                 return None;
             }
             matter |= without > WITHOUT * with;
