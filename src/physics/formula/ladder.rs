@@ -175,10 +175,11 @@ impl<'a> Ladder<'a> {
             let families = extent.families;
             let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent.clone() };
             let Some(weak) = self.weak_form(&extent)? else { continue };
-            if weak.least() > BETTER * least {
+            // As long as the frequency is that of a line, errors of libraries are hardly different.
+            if weak.least() > least / BETTER {
                 continue;
             }
-            least = weak.least();
+            least = least.min(weak.least());
             tried.insert(rounded(frequency, 4));
             let followed = self.kept(weak.follow_all(self.data, self.judges, self.options))?;
             let fits = |found: &FoundFormula| found.verdict != Verdict::NotInLibrary && found.drive.is_some();
