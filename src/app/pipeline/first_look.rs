@@ -83,7 +83,9 @@ impl FirstLook {
         let obstacle = obstacle.map(|error| error.to_string());
         let some = part(&reading.recording);
         let searched = some.samples();
-        let search = obstacle.is_none() && survey.accelerates && survey.motionless.is_empty();
+        // Equations of first order are relations of positions and velocities, but no constraints.
+        let moves = survey.accelerates && survey.motionless.is_empty() && survey.first_order.is_none();
+        let search = obstacle.is_none() && moves;
         let constraints = if search { constraints(&some, cancellation)? } else { None };
         let held = constraints.as_ref().is_some_and(|found| found.count > 0);
         let (formula, unfinished) = if search && !held { formula(&some, cancellation)? } else { (None, false) };
