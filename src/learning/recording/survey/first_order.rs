@@ -23,8 +23,9 @@ const MEASURED: f64 = 0.995;
 /// Windows in half the width of one, and their largest number.
 const OVERLAP: f64 = 8.0;
 const MOST_WINDOWS: f64 = 4000.0;
-/// Windows in a block; every other block is fitted.
+/// Windows in a block, of which every other one is fitted, and the smallest number of blocks.
 const BLOCK: usize = 64;
+const LEAST_BLOCKS: usize = 3;
 /// Ridge, over the largest entry of the normal matrix.
 const RIDGE: f64 = 1e-10;
 
@@ -113,7 +114,8 @@ impl<'a> Equation<'a> {
     /// Root mean square over the odd blocks of what a polynomial of some of the known columns leaves of the velocity, fitted to the even ones:
     /// that of the best degree. `None` of too few windows.
     fn residual(&self, of: &[usize]) -> Option<f64> {
-        let enough = |count: usize| count <= TERMS && self.windows.len() >= WINDOWS_PER_TERM * count;
+        let least = |count: usize| (WINDOWS_PER_TERM * count).max(LEAST_BLOCKS * BLOCK);
+        let enough = |count: usize| count <= TERMS && self.windows.len() >= least(count);
         let degrees = || (1..=DEGREE).filter(|&degree| enough(terms(of.len(), degree)));
         let monomials = Monomials::new(of.len(), degrees().last()?);
         let rows: Vec<Vec<f64>> = self.windows.iter().map(|window| self.mean(window, of, &monomials)).collect();
@@ -305,7 +307,14 @@ mod tests {
             assert_eq!(found(masses, [0.0; 4]), None, "{noise}");
         }
         // Without the other quantity nothing can be said.
-        let unknown = LoadedRecording::from(recorded(tanks, [3.0, 2.0, 0.0, 0.0], 1e-3).recording);
+        let mut short = recorded(tanks, [3.0, 2.0, 0.0, 0.0], 1e-3);
+        let unknown = LoadedRecording::from(short.recording.clone());
         assert_eq!(first_order(&unknown), None);
+        // Nor where no block is left to try a polynomial on.
+        let track = &mut short.recording.tracks[0];
+        track.times.truncate(200);
+        track.q.truncate(400);
+        short.inputs[0].truncate(200);
+        assert_eq!(first_order(&short), None);
     }
 }
