@@ -64,7 +64,7 @@ impl<'a> Equation<'a> {
         for (at, RecordedTrajectory { times, q, .. }) in recording.tracks.iter().enumerate() {
             let Some(start) = times.first().map(|t| t + half) else { continue };
             let count = ((span(times) - 2.0 * half) / step).floor();
-            for centre in (0..).map(|k| f64::from(k)).take_while(|k| *k <= count).map(|k| start + k * step) {
+            for centre in (0..).map(f64::from).take_while(|k| *k <= count).map(|k| start + k * step) {
                 let first = times.partition_point(|t| *t <= centre - half);
                 let end = times.partition_point(|t| *t < centre + half);
                 let (mut weights, mut slope, mut square) = (Vec::with_capacity(end - first), 0.0, 0.0);
@@ -84,7 +84,7 @@ impl<'a> Equation<'a> {
                 errors.push(chosen.noise.sigma * square.sqrt() / whole);
             }
         }
-        Self { known, columns, windows, velocities, error: rms(errors.into_iter()) }
+        Self { known, columns, windows, velocities, error: rms(errors) }
     }
 
     fn spread(&self) -> f64 {
@@ -117,7 +117,7 @@ impl<'a> Equation<'a> {
         let least = |count: usize| (WINDOWS_PER_TERM * count).max(LEAST_BLOCKS * BLOCK);
         let enough = |count: usize| count <= TERMS && self.windows.len() >= least(count);
         let degrees = || (1..=DEGREE).filter(|&degree| enough(terms(of.len(), degree)));
-        let monomials = Monomials::new(of.len(), degrees().last()?);
+        let monomials = Monomials::new(of.len(), degrees().next_back()?);
         let rows: Vec<Vec<f64>> = self.windows.iter().map(|window| self.mean(window, of, &monomials)).collect();
         degrees().filter_map(|degree| self.residual_of(&rows, terms(of.len(), degree))).min_by(f64::total_cmp)
     }
@@ -233,7 +233,6 @@ impl FirstOrder {
         for equation in &equations {
             let spread = equation.spread();
             let (with, without) = (equation.residual(&all)?, equation.residual(&positions)?);
-            tracing::debug!(with, without, error = equation.error, spread, "first order");
             if with > (AT_ERROR * equation.error).max(MISSED * spread).min(OF_SPREAD * spread) {
                 return None;
             }
