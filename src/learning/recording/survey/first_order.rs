@@ -233,7 +233,8 @@ impl FirstOrder {
         for equation in &equations {
             let spread = equation.spread();
             let (with, without) = (equation.residual(&all)?, equation.residual(&positions)?);
-            if with > (AT_ERROR * equation.error).max(MISSED * spread).min(OF_SPREAD * spread) {
+            // A window that holds no sample has no mean.
+            if with.is_nan() || with > (AT_ERROR * equation.error).max(MISSED * spread).min(OF_SPREAD * spread) {
                 return None;
             }
             matter |= without > WITHOUT * with;
