@@ -23,9 +23,9 @@ const MEASURED: f64 = 0.995;
 /// Windows in half the width of one, and their largest number.
 const OVERLAP: f64 = 8.0;
 const MOST_WINDOWS: f64 = 4000.0;
-/// Windows in a block, of which every other one is fitted, and the smallest number of blocks.
+/// Windows in a block, of which every other one is fitted, and the smallest number of windows, half a block to try the fit on.
 const BLOCK: usize = 64;
-const LEAST_BLOCKS: usize = 3;
+const LEAST_WINDOWS: usize = BLOCK + BLOCK / 2;
 /// Ridge, over the largest entry of the normal matrix.
 const RIDGE: f64 = 1e-10;
 
@@ -114,7 +114,7 @@ impl<'a> Equation<'a> {
     /// Root mean square over the odd blocks of what a polynomial of some of the known columns leaves of the velocity, fitted to the even ones:
     /// that of the best degree. `None` of too few windows.
     fn residual(&self, of: &[usize]) -> Option<f64> {
-        let least = |count: usize| (WINDOWS_PER_TERM * count).max(LEAST_BLOCKS * BLOCK);
+        let least = |count: usize| (WINDOWS_PER_TERM * count).max(LEAST_WINDOWS);
         let enough = |count: usize| count <= TERMS && self.windows.len() >= least(count);
         let degrees = || (1..=DEGREE).filter(|&degree| enough(terms(of.len(), degree)));
         let monomials = Monomials::new(of.len(), degrees().next_back()?);
