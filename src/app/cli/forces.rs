@@ -8,7 +8,7 @@ use crate::lagrangian::NamedFormula;
 use crate::names::unknown;
 use crate::network::file::Header;
 use crate::pipeline::usual_force;
-use crate::recording::factor;
+use crate::recording::{TIME, factor};
 use crate::rollout::{Between, Force, SampledForce};
 use crate::storage::read_regular;
 use clap::builder::PossibleValue;
@@ -19,9 +19,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub struct ForceArgs {
     /// External generalized forces that drive the motion: NAME=VALUE, a constant (N, N m) or a formula of the time t such as
-    /// 0.3*cos(1.2*t), or a CSV with a column of time and columns of forces, joined as --between says; may be repeated, one CSV at most. NAME is the column of the data that
-    /// the model was fitted to, or COORDINATE_force. Forces that are not named are 0. Inputs of a system file are given in the same way, by
-    /// their names, all of them.
+    /// 0.3*cos(1.2*t), or a CSV with a column of time and columns of forces, joined as --between says; may be repeated, one CSV at most.
+    /// NAME is the column of the data that the model was fitted to, or COORDINATE_force. Forces that are not named are 0. Inputs of a system
+    /// file are given in the same way, by their names, all of them.
     #[arg(long, value_name = "FILE.csv|NAME=VALUE", allow_hyphen_values = true)]
     force: Vec<String>,
     /// Column of time of the forces' CSV; if not given, the one called t or time.
@@ -94,8 +94,8 @@ impl Force<f64> for KnownForce {
 /// A formula of the time and of nothing else.
 fn of_time(text: &str) -> Result<NamedFormula, String> {
     let formula: NamedFormula = text.parse().map_err(|error| format!("{error}"))?;
-    match formula.names.iter().find(|name| *name != "t") {
-        Some(name) => Err(unknown("name", name, ["t"])),
+    match formula.names.iter().find(|name| *name != TIME) {
+        Some(name) => Err(unknown("name", name, [TIME])),
         None => Ok(formula),
     }
 }

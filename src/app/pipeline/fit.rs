@@ -22,7 +22,7 @@ use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
 use crate::pipeline::{Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
-use crate::recording::{LoadedRecording, Targets, is_formula};
+use crate::recording::{LoadedRecording, Targets, formula_in};
 use crate::report::with_unit;
 use crate::scalar::Scalar;
 use crate::shooting::{self, Fitted, Task};
@@ -440,6 +440,6 @@ fn labels(reading: &LoadedRecording) -> Vec<String> {
 
 /// Columns of recorded forces as a model remembers them; numbers of columns are not names, nor are formulas.
 fn named_forces(columns: &[String]) -> Vec<String> {
-    let is_name = |text: &String| text.parse::<f64>().is_err() && !is_formula(text);
+    let is_name = |text: &String| text.parse::<f64>().is_err() && formula_in(text).is_none();
     if columns.iter().all(is_name) { columns.to_vec() } else { Vec::new() }
 }

@@ -50,9 +50,9 @@ pub struct ColumnsError(pub Vec<String>);
 /// Name of the time in formulas of forces, whatever its column is called.
 pub(crate) const TIME: &str = "t";
 
-/// `true` for a force that is a formula instead of a column.
-pub(crate) fn is_formula(text: &str) -> bool {
-    text.starts_with('=')
+/// The formula of a force that is one instead of a column.
+pub(crate) fn formula_in(text: &str) -> Option<&str> {
+    text.strip_prefix('=')
 }
 
 impl Columns {

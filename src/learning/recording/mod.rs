@@ -32,9 +32,9 @@ mod track;
 mod units;
 
 pub(crate) use clock::Clock;
-#[cfg(feature = "pipeline")]
-pub(crate) use columns::is_formula;
 pub use columns::{Columns, ColumnsError};
+#[cfg(feature = "pipeline")]
+pub(crate) use columns::{TIME, formula_in};
 pub use guess::{ColumnGuess, Guess, guess};
 pub(crate) use held::{Filled, filled, marks};
 pub(crate) use hermite::hermite;

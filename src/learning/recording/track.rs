@@ -72,6 +72,11 @@ impl RecordedTrajectory {
         self.times.len()
     }
 
+    /// Time from the first to the last sample, in s.
+    pub(crate) fn span(&self) -> f64 {
+        self.times.last().zip(self.times.first()).map_or(0.0, |(last, first)| last - first)
+    }
+
     /// `true` if there is no sample.
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()

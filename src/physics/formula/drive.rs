@@ -93,14 +93,9 @@ pub(super) struct Line {
     pub alarms: f64,
 }
 
-/// Time from the first to the last sample of a trajectory.
-fn span(track: &RecordedTrajectory) -> f64 {
-    track.times.last().zip(track.times.first()).map_or(0.0, |(last, first)| last - first)
-}
-
 /// Time from the first to the last sample of the longest trajectory.
 pub(super) fn longest(data: &Prepared<'_>) -> f64 {
-    data.recording.tracks.iter().map(span).fold(0.0, f64::max)
+    data.recording.tracks.iter().map(RecordedTrajectory::span).fold(0.0, f64::max)
 }
 
 impl Rest {

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 const REPEATED: f64 = 0.02;
 const MOST_REPEATED: usize = 4;
 /// Most terms of a law with a drive, whose frequency is chosen too: of two nearly linear coordinates outside the libraries, one recording in ten
-/// was followed by 24 terms, by `lnn-studies rates --part drives`; the laws of that page have up to 8.
+/// was followed by 24 terms; laws with a drive of the same study have up to 7 (`lnn-studies rates --part drives`).
 const MOST_TERMS: usize = 12;
 
 /// Reasons why a model with a drive may not be the law of the motion that it fits.

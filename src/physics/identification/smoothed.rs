@@ -235,13 +235,12 @@ impl States {
         let mut damping = if linear { 1e-9 } else { 1e-3 };
         let (mut kept, mut before) = (false, f64::INFINITY);
         for _ in 0..ITERATIONS {
-            let mut muted = problem.too_weak(x, &best, SILENT * size);
+            let muted = problem.too_weak(x, &best, SILENT * size);
             problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
             if kept && !best.converged && best.decrement > KEEPS * before {
                 best = self.normal(problem, x, met)?;
                 (linear, kept) = (false, false);
-                muted = problem.too_weak(x, &best, SILENT * size);
-                problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
+                continue;
             }
             let residual = (best.square / best.count.max(1.0)).sqrt();
             if best.converged || damping > MOST_DAMPING || !problem.cancellation.iterate(residual) {

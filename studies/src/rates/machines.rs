@@ -262,21 +262,7 @@ c = { default = 0.02, learn = true }
 const WIGGLER: Machine = Machine {
     name: "charged particle in a wiggler",
     without: "wiggler without its field",
-    system: r#"
-name = "wiggler"
-lagrangian = "(x_dot^2 + z_dot^2)/2 - (B/k)*sin(k*z)*x_dot"
-[[coordinates]]
-name = "x"
-bounds = [-2, 2]
-velocity_bounds = [-2, 2]
-[[coordinates]]
-name = "z"
-bounds = [0, 30]
-velocity_bounds = [0, 3]
-[parameters]
-B = { default = 1.2, learn = true }
-k = { default = 2, learn = true, range = "positive" }
-"#,
+    system: include_str!("../../../examples/systems/wiggler.toml"),
     wrong: ("sin(k*z)", "sin(k*x)"),
     acceleration: |_, q, v, _| {
         let field = 1.2 * (2.0 * q[1]).cos();

@@ -320,21 +320,7 @@ fn a_frequency_is_found_in_a_long_recording() {
 }
 
 /// A charged particle in the field of a wiggler, `B cos(k z)`.
-const WIGGLER: &str = r#"
-name = "wiggler"
-lagrangian = "(x_dot^2 + z_dot^2)/2 - (B/k)*sin(k*z)*x_dot"
-[[coordinates]]
-name = "x"
-bounds = [-2, 2]
-velocity_bounds = [-2, 2]
-[[coordinates]]
-name = "z"
-bounds = [0, 30]
-velocity_bounds = [0, 3]
-[parameters]
-B = { default = 1.2, learn = true }
-k = { default = 2, learn = true, range = "positive" }
-"#;
+const WIGGLER: &str = include_str!("../../../examples/systems/wiggler.toml");
 
 /// A phase that grows with time, or with the distance that is gone, has as many minima as periods.
 #[test]

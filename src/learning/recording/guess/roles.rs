@@ -5,7 +5,7 @@ use super::names::{is_acceleration, is_force, is_index, is_position, is_torque, 
 use super::time::{self, Time, counts};
 use super::{ColumnGuess, Guess};
 use crate::lagrangian::NamedFormula;
-use crate::recording::columns::TIME;
+use crate::recording::columns::{TIME, formula_in};
 use crate::recording::read::{RawTable, read_recording};
 use crate::recording::{Columns, DataError, Problem};
 use std::path::Path;
@@ -91,7 +91,7 @@ impl Roles<'_> {
     /// Takes the roles that options give.
     fn take_given(&mut self) {
         let place = |name: &String| self.table.names.iter().position(|known| known == name);
-        let made_of = |text: &String| text.strip_prefix('=')?.parse::<NamedFormula>().ok();
+        let made_of = |text: &String| formula_in(text)?.parse::<NamedFormula>().ok();
         let inputs = self.given.force.iter().filter_map(made_of).flat_map(|force| force.names);
         let inputs: Vec<String> = inputs.filter(|name| name != TIME).collect();
         let lists: [(&[String], Role); 7] = [

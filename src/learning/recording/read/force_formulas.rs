@@ -1,7 +1,7 @@
 //! Known forces by formulas of the time and of other columns, such as `=0.3*cos(1.2*t)` or `=K*current` with a number for `K`.
 
 use crate::lagrangian::NamedFormula;
-use crate::recording::columns::{TIME, is_formula};
+use crate::recording::columns::{TIME, formula_in};
 use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, ColumnsError};
 
@@ -26,11 +26,11 @@ impl ForceFormulas {
     /// # Errors
     /// [`ColumnsError`]: a mistake in a formula, or another number of forces than of coordinates.
     pub fn of(columns: &Columns) -> Result<Option<(Self, Columns)>, ColumnsError> {
-        if !columns.force.iter().any(|text| is_formula(text)) {
+        if !columns.force.iter().any(|text| formula_in(text).is_some()) {
             return Ok(None);
         }
         columns.count_faults()?;
-        let given = |text: &String| match text.strip_prefix('=') {
+        let given = |text: &String| match formula_in(text) {
             None => Ok(Given::Column(text.clone())),
             Some(formula) => match formula.parse() {
                 Ok(parsed) => Ok(Given::Formula(text.clone(), parsed)),

@@ -58,12 +58,13 @@ impl<'a> Equation<'a> {
     fn of(reading: &LoadedRecording, known: &'a [Vec<f64>], columns: usize, smoothing: &Smoothing, i: usize) -> Self {
         let (recording, n, chosen) = (&reading.recording, reading.recording.n(), &smoothing.coordinates[i]);
         let half = chosen.seconds / 2.0;
-        let all: f64 = recording.tracks.iter().map(|track| span(&track.times)).sum();
+        let all: f64 = recording.tracks.iter().map(RecordedTrajectory::span).sum();
         let step = (half / OVERLAP).max(all / MOST_WINDOWS);
         let (mut windows, mut velocities, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-        for (at, RecordedTrajectory { times, q, .. }) in recording.tracks.iter().enumerate() {
+        for (at, track) in recording.tracks.iter().enumerate() {
+            let RecordedTrajectory { times, q, .. } = track;
             let Some(start) = times.first().map(|t| t + half) else { continue };
-            let count = ((span(times) - 2.0 * half) / step).floor();
+            let count = ((track.span() - 2.0 * half) / step).floor();
             for centre in (0..).map(f64::from).take_while(|k| *k <= count).map(|k| start + k * step) {
                 let first = times.partition_point(|t| *t <= centre - half);
                 let end = times.partition_point(|t| *t < centre + half);
@@ -139,11 +140,6 @@ impl<'a> Equation<'a> {
         solve_symmetric(count, &matrix, &right, &mut solution, &mut Workspace::new()).ok()?;
         Some(rms(block(1).map(|(row, velocity)| velocity - dot(row, &solution))))
     }
-}
-
-/// Time from the first to the last sample.
-fn span(times: &[f64]) -> f64 {
-    times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first)
 }
 
 /// Positions and inputs of every trajectory, `(samples, columns)`, with mean 0 and standard deviation 1.
