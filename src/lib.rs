@@ -47,8 +47,10 @@
 //! | end a long search, or see how far it is | [`cancellation::Cancellation`] |
 //! | train, fit, evaluate, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
-//! [`prelude`] holds the names that most programs need. Internally, the modules are arranged on six floors, `numerics`, `support`,
-//! `mechanics`, `learning`, `physics` and `app`, each of which imports only from those before it.
+//! [`prelude`] holds the names that most programs need. Numbers, derivatives, Euler-Lagrange terms and roll-outs are a package of their
+//! own, `lnn-engine`, with the same module names: a solver that embeds no more than them may depend on it alone. Internally, the
+//! modules are arranged on six floors, `numerics`, `support` and `mechanics` in the engine, `learning`, `physics` and `app` above it,
+//! each of which imports only from those before it.
 //!
 //! # Shapes, units, numbers
 //!
@@ -165,12 +167,14 @@ pub mod prelude;
 mod app;
 #[cfg(feature = "data")]
 mod learning;
-mod mechanics;
-mod numerics;
+#[cfg(test)]
+#[allow(dead_code, reason = "the engine's own tests use the others")]
+#[path = "../crates/lnn-engine/src/mechanics/rollout/models.rs"]
+mod models;
 mod physics;
 #[cfg(test)]
+#[path = "../crates/lnn-engine/src/properties.rs"]
 mod properties;
-mod support;
 
 // Users need not know the floors.
 #[cfg(feature = "cli")]
@@ -191,13 +195,16 @@ pub use learning::recording;
 pub use learning::shooting;
 #[cfg(feature = "training")]
 pub use learning::{configuration, data, optimizers, presets, training};
+#[cfg(feature = "std")]
+pub use lnn_engine::cancellation;
 #[cfg(feature = "rollout")]
-pub use mechanics::rollout;
-pub use mechanics::{lagrangian, network};
-pub(crate) use numerics::platform;
+pub use lnn_engine::rollout;
+#[cfg(feature = "std")]
 #[doc(hidden)]
-pub use numerics::{forward, ops};
-pub use numerics::{linalg, random, scalar, tape};
+pub use lnn_engine::storage;
+pub use lnn_engine::{findings, lagrangian, linalg, network, random, scalar, tape};
+#[doc(hidden)]
+pub use lnn_engine::{forward, names, ops};
 #[cfg(feature = "std")]
 pub use physics::certificate;
 #[cfg(feature = "data")]
@@ -207,14 +214,6 @@ pub use physics::geometry;
 pub use physics::{analysis, formula, identification};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
-#[cfg(feature = "std")]
-pub use support::cancellation;
-pub use support::findings;
-#[doc(hidden)]
-pub use support::names;
-#[cfg(feature = "std")]
-#[doc(hidden)]
-pub use support::storage;
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]
 #[cfg(any(doc, doctest))]

@@ -3,6 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`recording`] | recorded motion: read, survey, smooth, split |
+//! | [`state`] | the state of a computation in bytes, for checkpoints |
 //! | [`optimizers`] | update rules, schedules of the learning rate |
 //! | [`configuration`] | every choice of a training, its ranges, its penalty |
 //! | [`data`] | states with their accelerations, sampled from known systems or taken from recorded motion |
@@ -22,5 +23,7 @@ pub mod presets;
 pub mod recording;
 #[cfg(feature = "training")]
 pub mod shooting;
+#[cfg(feature = "training")]
+pub mod state;
 #[cfg(feature = "training")]
 pub mod training;

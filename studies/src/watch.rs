@@ -141,7 +141,7 @@ fn git(arguments: &[&str]) -> Option<String> {
 }
 
 /// Folders whose changes may change a figure.
-const NUMERICS: [&str; 4] = ["src/numerics", "src/mechanics", "src/learning", "src/physics"];
+const NUMERICS: [&str; 3] = ["crates/lnn-engine/src", "src/learning", "src/physics"];
 
 /// For a page the rows of tables with figures, the commit of the oldest, and commits of the numerics since; `None` without rows.
 fn age(page: &str) -> Option<(usize, String, u64)> {

@@ -1,4 +1,4 @@
-"""Counts what the crate shows: python3 tests/scripts/public_items.py [SRC] [--list]
+"""Counts what the crate shows: python3 tests/scripts/public_items.py [--list]
 
 Counted are modules, items (functions, types, traits, constants) and inherent methods that a path of public modules and re-exports leads to.
 What `#[doc(hidden)]` hides is not: it is there for the program, its tests and its benchmarks. Pages of documentation are not items.
@@ -25,14 +25,19 @@ def stripped(text):
     return text if tests < 0 else text[:tests]
 
 
-def read(root):
-    files = {}
-    for folder, _, names in os.walk(root):
-        for name in (name for name in names if name.endswith(".rs") and name != "main.rs"):
-            module = os.path.relpath(os.path.join(folder, name), root)[:-3].replace("/", "::")
-            module = "" if module == "lib" else re.sub(r"::mod$", "", module)
-            with open(os.path.join(folder, name), encoding="utf-8") as file:
-                files[module] = stripped(file.read())
+def read(roots):
+    """Sources by their modules; the last root is that of the package whose surface is counted, those before are what it leans on."""
+    files = {"": ""}
+    for root in roots:
+        for folder, _, names in os.walk(root):
+            for name in (name for name in names if name.endswith(".rs") and name != "main.rs"):
+                module = os.path.relpath(os.path.join(folder, name), root)[:-3].replace("/", "::")
+                with open(os.path.join(folder, name), encoding="utf-8") as file:
+                    text = stripped(file.read())
+                if module != "lib":
+                    files[re.sub(r"::mod$", "", module)] = text
+                else:
+                    files[""] += text if root == roots[-1] else text.replace("pub use", "pub(crate) use")
     return files
 
 
@@ -74,7 +79,7 @@ class Surface:
                 yield from leaves([], re.sub(r"\s+", " ", tree))
 
     def resolve(self, path, module):
-        if path[0] == "crate":
+        if path[0] in ("crate", "lnn_engine"):
             module, path = "", path[1:]
         while path and path[0] in ("self", "super"):
             module = "::".join(module.split("::")[:-1]) if path[0] == "super" else module
@@ -143,8 +148,8 @@ class Surface:
 
 
 def main():
-    arguments = [argument for argument in sys.argv[1:] if argument != "--list"]
-    surface = Surface(read(arguments[0] if arguments else os.path.join(os.path.dirname(__file__), "../../src")))
+    top = os.path.join(os.path.dirname(__file__), "../..")
+    surface = Surface(read([os.path.join(top, "crates/lnn-engine/src"), os.path.join(top, "src")]))
     modules, items, methods = len(surface.modules) - 1, len(surface.items), surface.methods()
     print(f"{modules + items + len(methods)} public: {modules} modules, {items} items, {len(methods)} methods")
     per_room = collections.Counter(room for room, _ in methods)

@@ -1,6 +1,6 @@
 //! Forces from outside, as arguments: constants, formulas of the time, and recorded columns.
 
-use crate::cli::number::finite;
+use crate::cli::number::{choice, finite};
 use crate::cli::recording_args::unit;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, output, states};
@@ -11,7 +11,6 @@ use crate::pipeline::usual_force;
 use crate::recording::{TIME, factor};
 use crate::rollout::{Between, Force, SampledForce};
 use crate::storage::read_regular;
-use clap::builder::PossibleValue;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -31,23 +30,8 @@ pub struct ForceArgs {
     #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit, requires = "force")]
     force_units: Vec<(String, String)>,
     /// Forces of the CSV between its rows; those of an identified system as `lnn identify` says that it took them [default: linear].
-    #[arg(long, value_enum, value_name = "WAY", requires = "force")]
+    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "WAY", requires = "force")]
     between: Option<Between>,
-}
-
-impl clap::ValueEnum for Between {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Held => "As they were at the sample before",
-            Self::Linear => "On straight lines",
-            Self::Cubic => "On curves of the third degree through the four nearest samples",
-            Self::BandLimited => "Without frequencies above half the rate of the samples",
-        };
-        Some(PossibleValue::new(self.name()).help(help))
-    }
 }
 
 /// Forces from outside and inputs as they are known.

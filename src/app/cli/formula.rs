@@ -1,7 +1,7 @@
 //! `lnn formula`: the Lagrangian of recorded motion, or of a model, as a formula.
 
 use crate::cli::files::OutputFile;
-use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
+use crate::cli::number::{choice, finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::result_page::{self, PageArgs};
@@ -44,7 +44,7 @@ pub struct Args {
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
     /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
-    #[arg(long, value_enum, value_name = "WAY")]
+    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "WAY")]
     between: Option<Between>,
     /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
     /// the forces where they are known].

@@ -1,7 +1,7 @@
 //! `lnn identify`: the constants of a known Lagrangian from recorded motion.
 
 use crate::cli::files::OutputFile;
-use crate::cli::number::{positive, seconds, thread_count, threads};
+use crate::cli::number::{choice, positive, seconds, thread_count, threads};
 use crate::cli::recording_args::{RecordingArgs, read as read_files};
 use crate::cli::result_page::{self, PageArgs};
 use crate::cli::source::parameter;
@@ -49,7 +49,7 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "WHAT")]
     targets: Option<Met>,
     /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
-    #[arg(long, value_enum, value_name = "WAY")]
+    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "WAY")]
     between: Option<Between>,
     /// Length of the segments, in s [default: the one with the smallest standard errors].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = seconds)]

@@ -1,4 +1,4 @@
-//! Numbers of the command line, with their ranges.
+//! Values of the command line: numbers with their ranges, choices by name.
 
 use crate::cli::CliError;
 use crate::lagrangian::quantity;
@@ -6,6 +6,7 @@ use crate::names::unknown;
 use crate::rollout::Options;
 use crate::scalar::Scalar;
 use crate::storage::MOST_THREADS;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// Precision that a command computes in.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -16,6 +17,17 @@ pub enum Precision {
     F64,
     /// Double-double, about 32 digits.
     Dd,
+}
+
+/// A parser of one value of a type by its name; the help says of each what it is.
+pub fn choice<T: Copy + Send + Sync>(
+    all: &'static [T],
+    name: fn(T) -> &'static str,
+    about: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    let values = all.iter().map(|&value| PossibleValue::new(name(value)).help(about(value)));
+    PossibleValuesParser::new(values)
+        .try_map(move |text| all.iter().copied().find(|&x| name(x) == text).ok_or("not named"))
 }
 
 /// A finite decimal number.

@@ -8,7 +8,7 @@ use crate::cli::motion::pictures::{Texts, picture_file};
 use crate::cli::motion::readings::ReadingColumns;
 use crate::cli::motion::{Facts, Kept, Target, Watch, events, place};
 use crate::cli::motion_source::MotionSource;
-use crate::cli::number::{finite, positive, tolerance};
+use crate::cli::number::{choice, finite, positive, tolerance};
 use crate::cli::probe::Probe;
 use crate::cli::source::parameter;
 use crate::cli::tube::{MotionTube, TubeArgs};
@@ -20,7 +20,6 @@ use crate::rollout::{
     Driven, Ending, EnergyBalance, Event, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
 };
 use crate::symmetry::Invariant;
-use clap::builder::PossibleValue;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -54,7 +53,7 @@ pub struct Args {
     #[command(flatten)]
     forces: ForceArgs,
     /// Integrator. If unsure, keep the default; take gauss6 for long times. variational refuses models with friction.
-    #[arg(long, value_enum, value_name = "NAME", default_value = "dopri5")]
+    #[arg(long, value_parser = choice(&Integrator::ALL, Integrator::name, Integrator::about), value_name = "NAME", default_value = "dopri5")]
     method: Integrator,
     /// Relative tolerance of a step, at least 2e-15.
     #[arg(long, value_name = "R", default_value = "1e-6", allow_hyphen_values = true, value_parser = tolerance)]
@@ -99,23 +98,6 @@ pub struct Args {
     /// Print a JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-impl clap::ValueEnum for Integrator {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Dopri5 => "Dormand and Prince, order 5, error control",
-            Self::Dop853 => "Dormand and Prince, order 8, error control",
-            Self::Midpoint => "Implicit midpoint rule, order 2, symplectic",
-            Self::Gauss4 => "Gauss collocation, order 4, symplectic",
-            Self::Gauss6 => "Gauss collocation, order 6, symplectic",
-            Self::Variational => "Discrete Euler-Lagrange equations, order 2, symplectic",
-        };
-        Some(PossibleValue::new(self.name()).help(help))
-    }
 }
 
 impl Args {

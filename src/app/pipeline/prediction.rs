@@ -114,8 +114,8 @@ fn reason(stop: &RolloutError) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::models::{OSCILLATOR, SINGULAR};
     use crate::pipeline::Watch;
-    use crate::rollout::models::{OSCILLATOR, SINGULAR};
     use std::sync::atomic::Ordering;
 
     fn windows(count: usize) -> Vec<Window> {

@@ -295,8 +295,8 @@ mod tests {
     use super::*;
     use crate::analysis::{StartBox, TrajectoryTest};
     use crate::lagrangian::configure;
+    use crate::models::{PENDULUM, SINGULAR};
     use crate::report::save_pictures;
-    use crate::rollout::models::{PENDULUM, SINGULAR};
 
     #[test]
     fn what_is_missing_is_left_out() {

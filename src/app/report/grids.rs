@@ -230,8 +230,8 @@ impl Turn {
 mod tests {
     use super::*;
     use crate::analysis::{Axis, determinant_grid, lagrangian_grid};
+    use crate::models::{OSCILLATOR, PENDULUM};
     use crate::report::save_pictures;
-    use crate::rollout::models::{OSCILLATOR, PENDULUM};
 
     #[test]
     fn grids_are_compared_up_to_the_fit() {

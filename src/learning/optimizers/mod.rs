@@ -5,8 +5,8 @@ mod soap;
 
 pub(crate) use soap::Block;
 
+use crate::learning::state::numbers;
 use crate::scalar::{Real, Scalar, vectorized};
-use crate::storage::container::state::numbers;
 use serde::{Deserialize, Serialize};
 use soap::{Eigenbasis, Step};
 

@@ -4,10 +4,10 @@
 //! rows); Adam works on `U G V^T`, where the curvature is closer to diagonal, and its step is turned back. The
 //! eigenvectors follow by a step of subspace iteration every [`EVERY`] steps.
 
+use crate::learning::state::numbers;
 use crate::linalg::{MatMut, MatRef, Workspace, eigh, gemm};
 use crate::optimizers::{Part, Rule, Update};
 use crate::scalar::{Real, Scalar, vectorized};
-use crate::storage::container::state::numbers;
 use serde::{Deserialize, Serialize};
 
 /// Steps between two looks at the eigenvectors.
@@ -397,8 +397,8 @@ fn norm<S: Scalar>(a: &[S]) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learning::state::{from_bytes, to_bytes};
     use crate::optimizers::{Method, Moments};
-    use crate::storage::container::state::{from_bytes, to_bytes};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

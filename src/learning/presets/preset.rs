@@ -56,7 +56,7 @@ pub(crate) fn take_structure(config: &mut Config, structure: Structure, rate: Op
     }
     let rate = rate.unwrap_or(match config.network.factor {
         Factor::Triangle => TRIANGLE_RATE,
-        Factor::Rectangle => Phase::default().rate,
+        _ => Phase::default().rate,
     });
     config.phases.iter_mut().for_each(|phase| phase.rate = rate);
     if config.data.shell.is_empty() {

@@ -1,11 +1,11 @@
 //! Segments of motion as what the loop over epochs learns from: their starts move beside the weights.
 
+use crate::learning::state::{self, numbers};
 use crate::optimizers::{Method, Moments};
 use crate::scalar::{Real, Scalar};
 use crate::shooting::objective::{ShootingObjective, ShootingReport};
 use crate::shooting::segments::Segments;
 use crate::shooting::starts::Curvature;
-use crate::storage::container::state::{self, numbers};
 use crate::training::BatchReport;
 use crate::training::learner::{Learner, Validation};
 use argmin::core::KV;

@@ -167,7 +167,7 @@ mod tests {
     use super::*;
     use crate::analysis::StartBox;
     use crate::lagrangian::{configure, systems};
-    use crate::rollout::models::{OSCILLATOR, PENDULUM};
+    use crate::models::{OSCILLATOR, PENDULUM};
     use crate::rollout::{Options, rollout};
 
     #[test]

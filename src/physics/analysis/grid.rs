@@ -306,7 +306,7 @@ pub(crate) fn metric_components(
 mod tests {
     use super::*;
     use crate::lagrangian::{Lagrangian, Mechanics, configure};
-    use crate::rollout::models::{PENDULUM, SINGULAR};
+    use crate::models::{PENDULUM, SINGULAR};
     use crate::scalar::Real;
 
     const AXES: [Axis; 2] =

@@ -196,8 +196,8 @@ fn lengths(n: usize, mass: &[f64], v: &[f64]) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::lagrangian::{MechanicsError, build};
+    use crate::models::OSCILLATOR;
     use crate::random::RngStream;
-    use crate::rollout::models::OSCILLATOR;
     use rand::Rng;
 
     /// `q'' = q`: nearby motions part as `e^t`.

@@ -240,9 +240,9 @@ pub fn window_valid_times(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::models::{OSCILLATOR, SINGULAR};
     use crate::recording::RecordedTrajectory;
     use crate::rollout::Between;
-    use crate::rollout::models::{OSCILLATOR, SINGULAR};
 
     /// The track with its own positions and these velocities as states.
     fn estimate<'a>(track: &'a RecordedTrajectory, v: &'a [f64]) -> StateEstimate<'a> {

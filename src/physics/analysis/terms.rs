@@ -268,7 +268,7 @@ pub fn affine_fit(source: &[f64], target: &[f64]) -> Option<AffineFit> {
 mod tests {
     use super::*;
     use crate::lagrangian::{Lagrangian, Mechanics};
-    use crate::rollout::models::{OSCILLATOR, PENDULUM, SINGULAR};
+    use crate::models::{OSCILLATOR, PENDULUM, SINGULAR};
 
     #[test]
     fn known_distribution() {

@@ -371,7 +371,7 @@ mod tests {
     use super::*;
     use crate::analysis::{Lyapunov, StartBox, ValidTime};
     use crate::lagrangian::configure;
-    use crate::rollout::models::{OSCILLATOR, PENDULUM, SINGULAR};
+    use crate::models::{OSCILLATOR, PENDULUM, SINGULAR};
 
     fn test() -> TrajectoryTest<f64> {
         let bounds = StartBox { q: vec![(-0.1, 0.1)], v: vec![(-0.01, 0.01)] };

@@ -188,7 +188,7 @@ impl Real for Number<'_> {
             _ => f.value(self),
         }
     }
-    crate::ops::unary_methods! { methods }
+    lnn_engine::unary_methods! { methods }
     fn powi(self, exponent: i32) -> Self {
         self.apply(Function::Table(Unary::Powi(exponent)))
     }

@@ -127,7 +127,7 @@ fn networks_are_enclosed() {
             match structure {
                 Structure::BlackBox => shape.form.even_in_v = seed % 2 == 0,
                 Structure::Mechanical | Structure::ConstantMass => shape.input_layer = InputLayer::Dyt,
-                Structure::Metric => (shape.time_like, shape.embed_periodic) = (Some(1), false),
+                _ => (shape.time_like, shape.embed_periodic) = (Some(1), false),
             }
             let model = network(shape, seed);
             let exact = model.cast::<Dd>();

@@ -15,7 +15,7 @@ pub mod nested;
 pub mod penalties;
 #[cfg(feature = "cli")]
 pub mod program;
-#[path = "../../../src/properties.rs"]
+#[path = "../../../crates/lnn-engine/src/properties.rs"]
 mod properties;
 
 use lnn::scalar::{Real, Scalar};

@@ -385,7 +385,7 @@ fn continuous_integration_runs_every_check() {
 #[test]
 fn the_version_is_the_same_everywhere() {
     let version = env!("CARGO_PKG_VERSION");
-    for path in ["python/Cargo.toml", "python/pyproject.toml"] {
+    for path in ["python/Cargo.toml", "python/pyproject.toml", "Cargo.toml"] {
         assert!(read(path).contains(&format!("\nversion = \"{version}\"\n")), "{path}");
     }
     assert!(read("CITATION.cff").contains(&format!("\nversion: {version}\n")));

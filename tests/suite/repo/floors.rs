@@ -8,7 +8,7 @@ const FLOORS: [(&str, &[&str]); 6] = [
     ("numerics", &["platform", "scalar", "random", "ops", "forward", "linalg", "tape"]),
     ("support", &["cancellation", "names", "findings", "storage"]),
     ("mechanics", &["lagrangian", "rollout", "network"]),
-    ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
+    ("learning", &["recording", "state", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
     (
         "physics",
         &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity", "identification", "formula"],
@@ -27,7 +27,7 @@ const ADAPTERS: [(&str, &[&str]); 15] = [
     ("argmin", &["learning/training/", "learning/shooting/"]),
     ("safetensors", &["support/storage/container/"]),
     ("crc32fast", &["support/storage/container/"]),
-    ("postcard", &["support/storage/container/"]),
+    ("postcard", &["learning/state.rs"]),
     ("zip", &["learning/recording/read/"]),
     ("flate2", &["app/report/plot/png.rs", "learning/recording/read/gzip.rs"]),
     ("roxmltree", &["app/pipeline/robot/"]),
@@ -40,7 +40,10 @@ fn position(module: &str) -> Option<usize> {
     FLOORS.iter().flat_map(|(_, modules)| *modules).position(|known| *known == module)
 }
 
-/// Source files below `src` that are not tests, by their path there, without comments and tests.
+/// Folders of sources of the packages that a user's program contains, the floors below before those above.
+pub(super) const SOURCES: [&str; 2] = ["crates/lnn-engine/src", "src"];
+
+/// Source files that are not tests, by their path below [`SOURCES`], without comments and tests.
 pub(super) fn sources() -> Vec<(String, String)> {
     fn gather(folder: &Path, root: &Path, found: &mut Vec<(String, String)>) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -57,9 +60,10 @@ pub(super) fn sources() -> Vec<(String, String)> {
             }
         }
     }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut found = Vec::new();
-    gather(&root, &root, &mut found);
+    for root in SOURCES.map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)) {
+        gather(&root, &root, &mut found);
+    }
     found
 }
 

@@ -2,9 +2,10 @@
 
 use super::fingerprint::{Fingerprint, Saved};
 use super::{OptimizerState, Outcome, PhaseState, Snapshot};
+use crate::learning::state;
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
-use crate::storage::container::{FileKind, Tensor, pack, state, unpack};
+use crate::storage::container::{FileKind, Tensor, pack, unpack};
 use serde::{Deserialize, Serialize};
 
 const CHECKPOINT: FileKind = FileKind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };

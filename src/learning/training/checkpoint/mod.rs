@@ -18,11 +18,11 @@ pub use manager::{
     CheckpointError, CheckpointInterval, CheckpointManager, LATEST, PREVIOUS, Restored, remove_checkpoints, saved,
 };
 
+use crate::learning::state::numbers;
 use crate::network::file::ModelFileError;
 use crate::optimizers::Moments;
 use crate::random::RandomGenerator;
 use crate::scalar::Scalar;
-use crate::storage::container::state::numbers;
 use crate::training::epoch::{Epoch, Means};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;

@@ -1,0 +1,58 @@
+//! The engine of `lnn`: derivatives of Lagrangians, their Euler-Lagrange terms in batches, their motion.
+//!
+//! The package `lnn` re-exports every module below under the same name and adds learning, physics and the program. Depend on this
+//! package alone to embed the engine in a solver: without features it needs neither the standard library nor any of the packages that
+//! training and files need.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`lagrangian`] | Lagrangians written down, as a formula or from the catalogue; `L`, `p`, `M`, `a`, `E` of a batch; accelerations, torques and linearizations of one state |
+//! | [`rollout`] | integrators with error control and symplectic ones, events, forces, derivatives of the end of a motion (feature `rollout`) |
+//! | [`network`] | Lagrangians by a network; model files (feature `model-files`) |
+//! | [`tape`] | reverse mode, recorded functions and their second derivatives |
+//! | [`linalg`] | small symmetric systems in batches |
+//! | [`scalar`], [`random`] | number types up to double-double; random streams that a seed repeats |
+//! | [`cancellation`], [`findings`] | the end of a long search; what a result says, in sentences and tables |
+//!
+//! Shapes, units and numbers are those of `lnn`: batches are row-major `(batch, n)`, units SI, results do not depend on the number of
+//! threads. What is hidden from these pages is shared by the packages of the repository and may change in every version.
+//!
+//! ```
+//! use lnn_engine::lagrangian::{EulerLagrange, build};
+//!
+//! let pendulum = build::<f64>("pendulum", &[])?;
+//! let acceleration = pendulum.acceleration(&[0.5], &[0.0])?; // q in rad, v in rad/s
+//! assert!((acceleration[0] + 9.81 * 0.5_f64.sin()).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+// What only some features use is dead without them; all features together tell what is dead for everybody.
+#![cfg_attr(not(all(feature = "faer", feature = "model-files", feature = "rollout")), allow(dead_code, unused_imports))]
+#![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+#[macro_use]
+extern crate alloc;
+
+mod mechanics;
+mod numerics;
+#[cfg(test)]
+mod properties;
+mod support;
+
+#[cfg(feature = "rollout")]
+pub use mechanics::rollout;
+pub use mechanics::{lagrangian, network};
+pub(crate) use numerics::platform;
+#[doc(hidden)]
+pub use numerics::{forward, ops};
+pub use numerics::{linalg, random, scalar, tape};
+#[cfg(feature = "std")]
+pub use support::cancellation;
+pub use support::findings;
+#[doc(hidden)]
+pub use support::names;
+#[cfg(feature = "std")]
+#[doc(hidden)]
+pub use support::storage;

@@ -1,0 +1,694 @@
+//! Systems by name, with the values of their parameters as text or as numbers: description, Euler-Lagrange terms, closed-
+//! form acceleration.
+
+use super::derivatives::{StateTerms, evaluate};
+use super::equations::Friction;
+use super::formula_events::GivenEvent;
+use super::formula_forces::{FormulaForces, GivenForces};
+use super::recursion::Recursive;
+use super::system::{Range, Size, System};
+use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, unconstrained, visit_lagrangian};
+use super::{
+    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce, InTime,
+    Inputs, Lagrangian, MechanicsError, Rayleigh, Request, Terms, WithForces, constrained_description,
+    constrained_descriptions,
+};
+use crate::linalg::Workspace;
+use crate::names::unknown;
+use crate::random::RngStream;
+use crate::scalar::{Real, Scalar};
+use crate::tape;
+use alloc::borrow::Cow;
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
+use rand::Rng;
+
+/// Why a system could not be built.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SystemError {
+    /// No system of this name.
+    UnknownSystem {
+        /// The requested name.
+        name: String,
+        /// Names there are.
+        known: Vec<String>,
+    },
+    /// No parameter of this symbol.
+    UnknownParameter {
+        /// The system.
+        system: String,
+        /// The symbol given.
+        symbol: String,
+        /// Symbols there are.
+        known: Vec<String>,
+    },
+    /// A parameter given twice.
+    Repeated {
+        /// The symbol.
+        symbol: String,
+    },
+    /// A value that is not a number or outside the allowed range.
+    Value {
+        /// The system.
+        system: String,
+        /// The symbol.
+        symbol: String,
+        /// The values allowed.
+        demand: String,
+        /// The text given.
+        found: String,
+    },
+    /// A dependence on the time, where states are needed.
+    Timed {
+        /// The system.
+        system: String,
+    },
+    /// Constraints that contradict each other or leave no motion.
+    Constraints {
+        /// The system.
+        system: String,
+        /// What is wrong with them.
+        problem: String,
+    },
+    /// A state of the wrong length.
+    State {
+        /// The system.
+        system: String,
+        /// Number of coordinates.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+}
+
+impl core::fmt::Display for SystemError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::UnknownSystem { name, known } => {
+                f.write_str(&unknown("system", name, known.iter().map(String::as_str)))
+            }
+            Self::UnknownParameter { system, symbol, known } => {
+                write!(f, "{system}: {}", unknown("parameter", symbol, known.iter().map(String::as_str)))
+            }
+            Self::Repeated { symbol } => write!(f, "parameter `{symbol}` is given twice"),
+            Self::Value { system, symbol, demand, found } => {
+                write!(f, "parameter `{symbol}` of {system} must be {demand}, found `{found}`")
+            }
+            Self::Timed { system } => write!(f, "{system}: {}", MechanicsError::Timed),
+            Self::Constraints { system, problem } => write!(f, "{system}: {problem}"),
+            Self::State { system, expected, found } => {
+                write!(f, "{system}: expected {expected} coordinates and velocities, found {found}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SystemError {}
+
+/// Parameters as given: symbol and decimal text.
+pub type Given = [(String, String)];
+
+/// A system with its size and the values of its parameters.
+#[derive(Clone, Debug)]
+pub struct SystemInstance<S> {
+    /// Description.
+    pub system: Cow<'static, System>,
+    /// Number of coordinates.
+    pub coordinates: usize,
+    /// Values in the order of [`System::parameters`].
+    pub parameters: Vec<S>,
+}
+
+/// A function of the Lagrangian of a system, generic in the type of the Lagrangian.
+pub trait LagrangianVisitor {
+    /// Result of the visit.
+    type Output;
+
+    /// Takes the Lagrangian; its parameters are [`SystemInstance::parameters`].
+    fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output;
+}
+
+/// All systems whose coordinates are free; `constrained_systems` are the others.
+pub fn systems() -> &'static [System] {
+    SYSTEMS
+}
+
+/// The system of a name.
+///
+/// # Errors
+/// [`SystemError::UnknownSystem`] with the nearest name.
+pub fn find(name: &str) -> Result<&'static System, SystemError> {
+    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+}
+
+/// The system of a name, one under constraints as well.
+///
+/// # Errors
+/// As [`find`].
+pub fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
+    match find(name) {
+        Ok(system) => Ok(Cow::Borrowed(system)),
+        Err(unknown) => {
+            let constrained = constrained_description(name).and_then(|description| description.compile().ok());
+            constrained.map(Cow::Owned).ok_or(unknown)
+        }
+    }
+}
+
+impl<S: Scalar> SystemInstance<S> {
+    /// As [`build`](super::build).
+    ///
+    /// # Errors
+    /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
+    /// [`Dd`](crate::scalar::Dd).
+    pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+        let count = self.inputs().count();
+        self.build_with(Box::new((count, |_: S, values: &mut [S]| values.fill(<S as Real>::zero()))))
+    }
+    /// The same with values for its inputs, which are otherwise 0.
+    ///
+    /// # Errors
+    /// As of [`build`](Self::build).
+    pub fn build_with(&self, inputs: Box<dyn Inputs<S>>) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+        let mut model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
+        if let Some(forces) = self.forces() {
+            let given = GivenForces { forces: forces.clone(), parameters: self.parameters.clone() };
+            model = Box::new(WithForces::new(model, given));
+        }
+        self.constrain(if self.is_timed() { Box::new(InTime::with_inputs(model, inputs)) } else { model })
+    }
+    /// `true` if its forces depend on measured inputs.
+    pub fn has_inputs(&self) -> bool {
+        self.system.description().is_some_and(|own| own.inputs.len() > own.marks())
+    }
+    /// Names of the inputs of its forces.
+    pub fn inputs(&self) -> impl Iterator<Item = &str> {
+        self.system.description().into_iter().flat_map(|own| own.inputs.keys().map(String::as_str))
+    }
+    /// Refuses a system whose states alone have no accelerations.
+    ///
+    /// # Errors
+    /// [`SystemError::Timed`].
+    pub fn require_states(&self) -> Result<(), SystemError> {
+        if self.is_timed() { Err(SystemError::Timed { system: self.system.name.to_string() }) } else { Ok(()) }
+    }
+    /// `true` if the Lagrangian or forces of its description depend on the time or on inputs, which are then their last coordinates.
+    pub fn is_timed(&self) -> bool {
+        self.system.described.as_ref().is_some_and(|described| described.is_timed())
+    }
+    /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
+    #[doc(hidden)]
+    pub fn forces(&self) -> Option<&FormulaForces> {
+        self.system.described.as_ref()?.forces.as_ref()
+    }
+    /// The events of a system by its description, in the order of their names.
+    pub fn events(&self) -> Vec<GivenEvent<S>> {
+        let events = self.system.described.as_ref().map_or(&[][..], |described| &described.events);
+        events.iter().map(|event| GivenEvent::new(event.clone(), self.parameters.clone())).collect()
+    }
+    /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.
+    pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {
+        let model = match self.friction() {
+            None => free,
+            Some((friction, false)) => Box::new(WithForces::new(free, friction)),
+            Some((friction, true)) => Box::new(WithForces::vanishing(free, friction)),
+        };
+        let chain = self.system.described.as_ref().and_then(|described| described.chain.as_ref());
+        // The rows of a chain are numbers of double precision.
+        match chain.filter(|_| S::epsilon().to_f64() >= f64::EPSILON && !self.is_timed()) {
+            Some(shape) => Box::new(Recursive::new(model, shape, &self.parameters)),
+            None => model,
+        }
+    }
+    /// A model of the same coordinates, learned for instance, under the constraints of the system; without any, as it is.
+    ///
+    /// # Errors
+    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion, or a model of other coordinates.
+    #[doc(hidden)]
+    pub fn constrain<'a>(
+        &self,
+        model: Box<dyn EulerLagrange<S> + 'a>,
+    ) -> Result<Box<dyn EulerLagrange<S> + 'a>, SystemError> {
+        let Some(constraints) = self.constraints() else { return Ok(model) };
+        let wrong = |error: ConstraintError| SystemError::Constraints {
+            system: self.system.name.to_string(),
+            problem: error.to_string(),
+        };
+        let model = Constrained::new(model, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
+        let model = model.with_parameters_of_model();
+        if self.system.described.as_ref().is_some_and(|described| described.independent) {
+            return Ok(Box::new(model));
+        }
+        let (q, v) = self.anywhere();
+        Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
+    }
+    /// The constraints of a system by its description.
+    #[doc(hidden)]
+    pub fn constraints(&self) -> Option<&ExpressionConstraints> {
+        self.system.described.as_ref()?.constraints.as_ref()
+    }
+    /// Numbers of the constraints that act; those that follow from others are left out.
+    ///
+    /// # Errors
+    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion.
+    pub fn acting_constraints(&self) -> Result<Vec<usize>, SystemError> {
+        use super::Constraints;
+        let Some(constraints) = self.constraints() else { return Ok(Vec::new()) };
+        let model = self.build()?;
+        let acting = model.manifold().map_or(&[][..], |manifold| manifold.names());
+        let all = constraints.names().into_iter().enumerate();
+        Ok(all.filter(|(_, name)| acting.contains(name)).map(|(row, _)| row).collect())
+    }
+    /// The dissipation function of a system by its description; its parameters are the Lagrangian's.
+    pub fn dissipation(&self) -> Option<&ExpressionLagrangian> {
+        self.system.described.as_ref()?.dissipation.as_ref()
+    }
+    /// The same with the values of the parameters, and whether these take all friction away.
+    fn friction(&self) -> Option<(Friction<S>, bool)> {
+        let (function, mut vanishes) = (self.dissipation()?, false);
+        let n = function.coordinates();
+        // Products with a constant 0 are 0 for a tracer.
+        let _ = tape::Program::<S>::record(2 * n, 0, |x, _| {
+            let values: Vec<_> = self.parameters.iter().map(|value| tape::Tracer::constant(*value)).collect();
+            let lost = function.lagrangian(&values, &x[..n], &x[n..]);
+            vanishes = lost.is_exact_zero();
+            vec![lost]
+        });
+        let parameters = self.parameters.clone();
+        Some((Friction { function: function.clone(), parameters }, vanishes))
+    }
+    /// States within the bounds of the validation, at which constraints are examined.
+    fn anywhere(&self) -> (Vec<S>, Vec<S>) {
+        const STATES: usize = 24;
+        let (bounds, mut rng) = (self.system.validation(self.coordinates), RngStream::Region.generator(0));
+        let mut draw = |sides: &[(f64, f64)]| -> Vec<S> {
+            let all = (0..STATES).flat_map(|_| sides.iter());
+            all.map(|&(low, high)| S::of_f64(low + (high - low) * rng.random::<f64>())).collect()
+        };
+        (draw(&bounds.positions), draw(&bounds.velocities))
+    }
+    /// Shows the Lagrangian to a visitor, with the time as its last coordinate if the system depends on it; `None` if the description is not of the catalogue, and of a system with constraints, whose
+    /// Lagrangian alone does not tell its motion.
+    #[doc(hidden)]
+    pub fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
+        if self.constraints().is_some() { None } else { self.visit_unconstrained(visitor) }
+    }
+    /// The same of a system under constraints as well.
+    #[doc(hidden)]
+    pub fn visit_unconstrained<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
+        visit_lagrangian(self, visitor)
+    }
+    /// Acceleration of one state by the closed form, which shares nothing with the Lagrangian but the parameters; of a system by its
+    /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.
+    ///
+    /// # Errors
+    /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
+    /// [`SystemInstance::build`] gives.
+    pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
+        self.check_lengths(q, v)?;
+        if self.forces().is_some() || self.is_timed() {
+            return Ok(self.build()?.acceleration(q, v).unwrap_or_else(|_| vec![S::nan(); q.len()]));
+        }
+        if self.constraints().is_some() {
+            let (system, problem) =
+                (self.system.name.to_string(), "the acceleration under constraints has no closed form");
+            return Err(SystemError::Constraints { system, problem: problem.to_string() });
+        }
+        Ok(match &self.system.described {
+            Some(described) => differentiated(
+                &described.lagrangian,
+                self.friction().map(|(friction, _)| friction),
+                &self.parameters,
+                q,
+                v,
+            ),
+            None => closed_acceleration(self, q, v),
+        })
+    }
+    /// Index of the coordinate whose velocity the mass shell fixes.
+    pub fn constrained_coordinate(&self) -> Option<usize> {
+        self.system.time_like.filter(|_| self.system.constraint.is_some())
+    }
+    /// Puts one state on the mass shell `g(v, v) = -1` by the velocity of its time-like coordinate; systems without a
+    /// constraint leave the state alone.
+    ///
+    /// Outside the domain the velocity becomes `NaN` or infinite.
+    ///
+    /// # Errors
+    /// [`SystemError::State`] for a state of the wrong length.
+    pub fn impose_constraint(&self, q: &[S], v: &mut [S]) -> Result<(), SystemError> {
+        self.check_lengths(q, v)?;
+        let velocity = match &self.system.described {
+            Some(described) => described.constrained_velocity(&self.parameters, q, v),
+            None => constrained_velocity(self, q, v),
+        };
+        if let (Some(i), Some(velocity)) = (self.constrained_coordinate(), velocity) {
+            v[i] = velocity;
+        }
+        Ok(())
+    }
+    fn check_lengths(&self, q: &[S], v: &[S]) -> Result<(), SystemError> {
+        let expected = self.coordinates;
+        match [q, v].into_iter().find(|x| x.len() != expected) {
+            Some(x) => Err(SystemError::State { system: self.system.name.to_string(), expected, found: x.len() }),
+            None => Ok(()),
+        }
+    }
+    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text says what is demanded.
+    ///
+    /// # Errors
+    /// The condition that the coordinates violate.
+    pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
+        self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
+    }
+    /// `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong
+    /// number of coordinates.
+    pub fn position_in_plane(&self, q: &[S]) -> Option<(f64, f64)> {
+        let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
+        Some((plane.point)(&leading(&self.parameters), &leading(q)))
+    }
+    /// The system's [`Conserved`](super::system::Conserved) vector at a state; `None` without one or for a state of the wrong
+    /// length.
+    pub fn conserved(&self, q: &[S], v: &[S]) -> Option<Vec<f64>> {
+        let conserved = self.system.conserved.filter(|_| self.check_lengths(q, v).is_ok())?;
+        Some((conserved.vector)(&leading(&self.parameters), &leading(q), &leading(v)))
+    }
+}
+
+/// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
+fn differentiated<S: Scalar>(
+    lagrangian: &ExpressionLagrangian,
+    friction: Option<Friction<S>>,
+    parameters: &[S],
+    q: &[S],
+    v: &[S],
+) -> Vec<S> {
+    let mut terms = Terms::default();
+    let (n, need) = (q.len(), Request::ACCELERATION);
+    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
+    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *coriolis, n)] {
+        field.resize(size, S::nan());
+    }
+    evaluate(
+        lagrangian,
+        parameters,
+        q,
+        v,
+        need,
+        &mut StateTerms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis },
+    );
+    if let Some(friction) = friction {
+        terms.force.resize(n, S::nan());
+        Rayleigh(friction).force(q, v, &mut terms.force);
+    }
+    // A row that fails has the acceleration NaN, which is all that can be reported for one state.
+    let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
+    terms.acceleration
+}
+
+fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {
+    x.iter().map(|x| x.to_f64()).collect()
+}
+
+fn unknown_system(name: &str) -> SystemError {
+    SystemError::UnknownSystem {
+        name: name.into(),
+        known: {
+            let constrained = constrained_descriptions().map(|description| description.name);
+            SYSTEMS.iter().map(|system| system.name.to_string()).chain(constrained).collect()
+        },
+    }
+}
+
+/// Reads the parameters of a system in the working precision; those not given take their defaults.
+///
+/// # Errors
+/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is not a number or out of range.
+pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
+    configure_system(resolve(name)?, given)
+}
+
+/// [`configure`] for a given system: one of the catalogue, or one made from a [description](super::Description).
+///
+/// # Errors
+/// [`SystemError`] for an unknown or repeated symbol, a value that is not a number or out of range.
+pub fn configure_system<S: Scalar>(
+    system: Cow<'static, System>,
+    given: &Given,
+) -> Result<SystemInstance<S>, SystemError> {
+    for (i, (symbol, _)) in given.iter().enumerate() {
+        require_symbol(&system, symbol)?;
+        if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
+            return Err(SystemError::Repeated { symbol: symbol.clone() });
+        }
+    }
+    let text = |symbol: &str| given.iter().find(|(s, _)| s == symbol).map(|(_, text)| text.trim());
+    assemble(
+        system,
+        |symbol| text(symbol).map(|text| (text.parse().ok(), text.to_string())),
+        |symbol| text(symbol).map(|text| (S::parse(text), text.to_string())),
+    )
+}
+
+/// As [`configure_system`], of values that are numbers already.
+///
+/// # Errors
+/// [`SystemError`] for an unknown symbol or a value out of range.
+pub fn configure_values<S: Scalar>(
+    system: Cow<'static, System>,
+    values: &BTreeMap<String, f64>,
+) -> Result<SystemInstance<S>, SystemError> {
+    values.keys().try_for_each(|symbol| require_symbol(&system, symbol))?;
+    let whole = |x: f64| (x >= 0.0 && x.fract() == 0.0).then_some(x as usize);
+    assemble(
+        system,
+        |symbol| values.get(symbol).map(|&x| (whole(x), x.to_string())),
+        |symbol| values.get(symbol).map(|&x| (Some(S::of_f64(x)), x.to_string())),
+    )
+}
+
+/// The Euler-Lagrange terms of a system with the given parameters.
+///
+/// # Errors
+/// As [`configure`].
+pub fn build<S: Scalar>(name: &str, given: &Given) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+    configure(name, given)?.build()
+}
+
+/// Refuses a symbol that the system does not have.
+fn require_symbol(system: &System, symbol: &str) -> Result<(), SystemError> {
+    let count = match system.size {
+        Size::Fixed(_) => None,
+        Size::Chosen { symbol, .. } => Some(symbol),
+    };
+    let known = system.parameters.iter().map(|p| p.symbol.as_ref()).chain(count);
+    if known.clone().any(|k| k == symbol) {
+        return Ok(());
+    }
+    let (system, known) = (system.name.to_string(), known.map(String::from).collect());
+    Err(SystemError::UnknownParameter { system, symbol: symbol.to_string(), known })
+}
+
+/// A system of the size and the values that are found by symbol, each with its text; those not found take their defaults.
+fn assemble<S: Scalar>(
+    system: Cow<'static, System>,
+    size: impl Fn(&str) -> Option<(Option<usize>, String)>,
+    value: impl Fn(&str) -> Option<(Option<S>, String)>,
+) -> Result<SystemInstance<S>, SystemError> {
+    let refused = |symbol: &str, demand: String, found: String| SystemError::Value {
+        system: system.name.to_string(),
+        symbol: symbol.to_string(),
+        demand,
+        found,
+    };
+    let coordinates = match system.size {
+        Size::Fixed(n) => n,
+        Size::Chosen { symbol, least, most, .. } => match size(symbol) {
+            None => system.size.default(),
+            Some((found, text)) => found
+                .filter(|n| (least..=most).contains(n))
+                .map(|n| system.size.coordinates(n))
+                .ok_or_else(|| refused(symbol, format!("an integer from {least} to {most}"), text))?,
+        },
+    };
+    let mut parameters = Vec::with_capacity(system.parameters.len());
+    for parameter in system.parameters.iter() {
+        let default = || (S::parse(&parameter.default), parameter.default.to_string());
+        let (found, text) = value(&parameter.symbol).unwrap_or_else(default);
+        let zero = S::of_f64(0.0);
+        let allowed = |value: &S| {
+            value.is_finite()
+                && match parameter.range {
+                    Range::Any => true,
+                    Range::AtLeastZero => *value >= zero,
+                    Range::Positive => *value > zero,
+                }
+        };
+        let demand = || parameter.range.text().to_string();
+        parameters.push(found.filter(allowed).ok_or_else(|| refused(&parameter.symbol, demand(), text))?);
+    }
+    Ok(SystemInstance { system, coordinates, parameters })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{configure, find};
+    use crate::scalar::Dd;
+
+    fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
+        list.iter().map(|&(s, t)| (s.into(), t.into())).collect()
+    }
+
+    #[test]
+    fn every_entry_is_complete() {
+        for system in systems() {
+            let n = system.size.default();
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            assert_eq!(configured.build().unwrap().coordinates(), n);
+            assert_eq!(system.coordinates(n).len(), n);
+            assert_eq!((system.columns(n).len(), system.units(n).len()), (2 * n, 2 * n));
+            let start = system.trajectory(n).start;
+            assert_eq!((start.positions.len(), start.velocities.len()), (n, n));
+            assert!(start.positions.iter().chain(&start.velocities).all(|b| b.0 <= b.1));
+            let fixed = configured.constrained_coordinate();
+            for bounds in [system.training(n), system.validation(n)] {
+                assert_eq!((bounds.positions.len(), bounds.velocities.len()), (n, n));
+                assert!(bounds.positions.iter().all(|b| b.0 < b.1), "{}", system.name);
+                assert!(bounds.velocities.iter().enumerate().all(|(i, b)| b.0 < b.1 || fixed == Some(i)));
+            }
+            let mut v: Vec<f64> = (0..n).map(|i| 0.1 * i as f64).collect();
+            let q: Vec<f64> = start.positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            let before = v.clone();
+            configured.impose_constraint(&q, &mut v).unwrap();
+            match fixed {
+                None => assert_eq!((v, system.constraint), (before, None)),
+                Some(i) => {
+                    assert!(v[i] > 0.0 && (0..n).all(|k| k == i || v[k] == before[k]));
+                    assert!(system.constraint.unwrap().starts_with(&format!("{} = ", system.columns(n)[n + i])));
+                }
+            }
+            let middle: Vec<f64> = system.training(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            assert_eq!(configured.check_domain(&middle), Ok(()));
+        }
+        let pendulum = find("double-pendulum").unwrap();
+        assert_eq!(pendulum.columns(2), ["theta1", "theta2", "theta1_dot", "theta2_dot"]);
+        assert_eq!(pendulum.labels(2)[1..3], ["theta2 [rad]", "theta1_dot [rad/s]"]);
+        assert_eq!(find("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
+        assert!(configure::<f64>("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(configure::<f64>("kepler", &[]).unwrap().check_domain(&[0.0, 0.0]).is_err());
+        assert!(configure::<f64>("ads2-geodesic", &[]).unwrap().check_domain(&[1.0, -1.0]).is_err());
+        // The horizon moves with the mass.
+        let hole = |mass: &str| configure::<f64>("schwarzschild-geodesic", &given(&[("M", mass)])).unwrap();
+        assert_eq!(hole("1").check_domain(&[0.0, 3.0, 1.0, 0.0]), Ok(()));
+        assert!(hole("1.5").check_domain(&[0.0, 3.0, 1.0, 0.0]).is_err());
+        assert!(hole("1").check_domain(&[0.0, 3.0, 0.0, 0.0]).is_err());
+        assert!(hole("1").impose_constraint(&[0.0, 3.0, 1.0], &mut [0.0; 4]).is_err());
+    }
+
+    #[test]
+    fn systems_are_where_they_should_be() {
+        let place = |name: &str, list: &[(&str, &str)], q: &[f64]| {
+            configure::<f64>(name, &given(list)).unwrap().position_in_plane(q).unwrap()
+        };
+        let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
+            // Sine and cosine to half a unit in the last place, angles as near as pi is.
+            assert!((x - a).abs().max((y - b).abs()) <= 4.0 * f64::EPSILON * size, "({x}, {y}) for ({a}, {b})");
+        };
+        use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, PI};
+        let root = 0.75f64.sqrt();
+        // One rod to the right, one up; then hanging; then three, the last up at an angle.
+        near(place("double-pendulum", &[("l1", "2"), ("l2", "0.5")], &[FRAC_PI_2, PI]), (2.0, 0.5), 2.5);
+        near(place("double-pendulum", &[], &[0.0, 0.0]), (0.0, -2.0), 2.0);
+        let rods = [("l1", "1"), ("l2", "2"), ("l3", "4")];
+        near(place("triple-pendulum", &rods, &[0.0, FRAC_PI_2, PI - FRAC_PI_6]), (4.0, 4.0 * root - 1.0), 7.0);
+        near(place("n-pendulum", &[("n", "5"), ("l", "2")], &[FRAC_PI_6; 5]), (5.0, -10.0 * root), 10.0);
+        near(place("n-pendulum", &[("n", "1")], &[-FRAC_PI_2]), (-1.0, 0.0), 1.0);
+        near(place("spring-pendulum", &[], &[3.0, FRAC_PI_3]), (3.0 * root, -1.5), 3.0);
+        near(place("sphere-geodesic", &[("R", "2")], &[FRAC_PI_3, PI]), (-2.0 * root, 1.0), 2.0);
+        near(place("schwarzschild-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+        near(place("kerr-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+        assert_eq!(place("kerr-cartesian", &[], &[7.0, 4.0, 1.0, 2.0]), (4.0, 1.0));
+        assert_eq!(place("kepler", &[], &[1.5, -2.0]), (1.5, -2.0));
+        assert_eq!(place("henon-heiles", &[], &[0.25, 0.5]), (0.25, 0.5));
+        assert_eq!(place("charged-particle", &[], &[1.0, 2.0, 3.0]), (1.0, 2.0));
+        assert_eq!(place("ads2-geodesic", &[], &[1.0, 2.0]), (1.0, 2.0));
+        assert_eq!(place("ads3-geodesic", &[], &[1.0, 2.0, 3.0]), (2.0, 3.0));
+        assert_eq!(place("ads4-geodesic", &[], &[1.0, 2.0, 3.0, 4.0]), (2.0, 4.0));
+        assert_eq!(configure::<f64>("kepler", &[]).unwrap().position_in_plane(&[1.0]), None);
+    }
+
+    #[test]
+    fn places_are_finite_and_no_larger_than_the_system() {
+        for system in systems() {
+            let n = system.size.default();
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            let bounds = system.training(n).positions;
+            let Some(plane) = system.plane else {
+                assert_eq!((n, configured.position_in_plane(&[0.5])), (1, None), "{}", system.name);
+                continue;
+            };
+            assert!(plane.labels.iter().all(|label| label.ends_with(" [m]")), "{}", system.name);
+            let size = match system.name.as_ref() {
+                "sphere-geodesic" => 1.0,
+                "double-pendulum" | "triple-pendulum" | "n-pendulum" => n as f64,
+                _ => f64::INFINITY,
+            };
+            for k in 0..1000 {
+                // A different fraction of each coordinate's range in every state.
+                let part = |i: usize| (0.618_034 * f64::from(k) * (1.0 + i as f64).sqrt()).fract();
+                let q: Vec<f64> = bounds.iter().enumerate().map(|(i, b)| b.0 + (b.1 - b.0) * part(i)).collect();
+                let (x, y) = configured.position_in_plane(&q).unwrap();
+                assert!(x.is_finite() && y.is_finite() && x.hypot(y) <= size * (1.0 + 1e-15 * n as f64), "{q:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn parameters_are_read_and_refused() {
+        let configured = configure::<Dd>("double-pendulum", &given(&[("l2", " 0.5 "), ("g", "0")])).unwrap();
+        let expected: Vec<Dd> = ["1", "1", "1", "0.5", "0"].iter().map(|t| Dd::parse(t).unwrap()).collect();
+        assert_eq!(configured.parameters, expected);
+        assert_eq!(configure::<f32>("n-pendulum", &given(&[("n", "7")])).unwrap().coordinates, 7);
+        let error = |name: &str, list: &[(&str, &str)]| configure::<f64>(name, &given(list)).unwrap_err();
+        let text = error("duble-pendulum", &[]).to_string();
+        assert_eq!(text, "unknown system \"duble-pendulum\", did you mean \"double-pendulum\"?");
+        let text = error("spring-pendulum", &[("L0", "1")]).to_string();
+        assert_eq!(text, "spring-pendulum: unknown parameter \"L0\", did you mean \"l0\"?");
+        assert!(matches!(error("n-pendulum", &[("N", "3")]), SystemError::UnknownParameter { .. }));
+        assert!(matches!(error("double-pendulum", &[("g", "1"), ("g", "2")]), SystemError::Repeated { .. }));
+        for bad in ["0", "-1", "nan", "inf", "1e999", "one", ""] {
+            assert!(
+                matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol, .. } if symbol == "m1")
+            );
+        }
+        for bad in ["0", "1001", "-1", "2.5", "18446744073709551616"] {
+            assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
+        }
+        assert!(matches!(
+            configure::<f64>("double-pendulum", &[]).unwrap().exact_acceleration(&[1.0], &[1.0, 2.0]),
+            Err(SystemError::State { expected: 2, found: 1, .. })
+        ));
+    }
+
+    #[test]
+    fn numbers_and_their_texts_configure_the_same() {
+        let system = || Cow::Borrowed(find("n-pendulum").unwrap());
+        let text =
+            |n: &str, g: &str| configure_system::<f64>(system(), &[("n".into(), n.into()), ("g".into(), g.into())]);
+        let number = |n: f64, g: f64| configure_values::<f64>(system(), &[("n".into(), n), ("g".into(), g)].into());
+        let (a, b) = (text("3", "0.1").unwrap(), number(3.0, 0.1).unwrap());
+        assert_eq!((a.coordinates, &a.parameters), (b.coordinates, &b.parameters));
+        for (n, g) in [(2.5, 9.81), (-1.0, 9.81), (1e9, 9.81), (2.0, f64::NAN)] {
+            assert_eq!(text(&n.to_string(), &g.to_string()).unwrap_err(), number(n, g).unwrap_err());
+        }
+        let other = configure_values::<f64>(system(), &[("mass".to_string(), 1.0)].into());
+        assert!(matches!(other, Err(SystemError::UnknownParameter { .. })));
+    }
+}

@@ -1,0 +1,166 @@
+//! Constraints by name and formula, as a fit finds or reads them and a model file keeps them.
+
+use super::{Constrained, ConstraintError, ExpressionConstraints, Manifold};
+use crate::lagrangian::expression::{is_name, is_reserved};
+use crate::lagrangian::{EulerLagrange, ExpressionError, Lagrangian, Mechanics};
+use crate::scalar::{Real, Scalar};
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+
+/// Most constraints.
+const MOST: usize = 256;
+
+/// Constraints by formulas over the coordinates of a model and their velocities, without parameters.
+#[derive(Clone, Debug)]
+pub struct FormulaConstraints {
+    formulas: BTreeMap<String, String>,
+    compiled: ExpressionConstraints,
+}
+
+/// Why formulas do not constrain a model.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum FormulaError {
+    /// No formula, or more than are taken.
+    Number(usize),
+    /// The name of a constraint that no message can show.
+    Name,
+    /// A coordinate that no formula can name.
+    Coordinate(String),
+    /// A mistake in a formula.
+    Formula {
+        /// Name of the constraint.
+        name: String,
+        /// The mistake.
+        error: ExpressionError,
+    },
+    /// Constraints that contradict each other, or leave no motion.
+    Constraints(ConstraintError),
+}
+
+impl core::fmt::Display for FormulaError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Number(found) => write!(f, "constraints: expected 1 to {MOST} formulas, found {found}"),
+            Self::Name => f.write_str("constraints: expected names of 1 to 100 characters on one line"),
+            Self::Coordinate(name) => write!(
+                f,
+                "constraints: the coordinate {name:?} cannot be a name in a formula: expected a letter or _, then letters, digits and _"
+            ),
+            Self::Formula { name, error } => write!(f, "constraints.{name}: {error}"),
+            Self::Constraints(error) => write!(f, "constraints: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for FormulaError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Constraints(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<ConstraintError> for FormulaError {
+    fn from(error: ConstraintError) -> Self {
+        Self::Constraints(error)
+    }
+}
+
+/// A point in space that nothing moves: what constraints are beside before there is a model.
+pub(super) struct Free(pub usize);
+
+impl Lagrangian for Free {
+    fn coordinates(&self) -> usize {
+        self.0
+    }
+    fn lagrangian<R: Real>(&self, _: &[R], _: &[R], v: &[R]) -> R {
+        v.iter().fold(R::zero(), |sum, v| sum + v.sqr())
+    }
+}
+
+impl FormulaConstraints {
+    /// Formulas that vanish, by the name of their constraint, over coordinates `NAME` and velocities `NAME_dot`.
+    ///
+    /// # Errors
+    /// [`FormulaError`].
+    pub fn new(coordinates: &[impl AsRef<str>], formulas: BTreeMap<String, String>) -> Result<Self, FormulaError> {
+        if formulas.is_empty() || formulas.len() > MOST {
+            return Err(FormulaError::Number(formulas.len()));
+        }
+        if formulas
+            .keys()
+            .any(|name| name.is_empty() || name.chars().count() > 100 || name.chars().any(char::is_control))
+        {
+            return Err(FormulaError::Name);
+        }
+        let names: Vec<&str> = coordinates.iter().map(AsRef::as_ref).collect();
+        if let Some(name) = names.iter().find(|name| !is_name(name) || is_reserved(name)) {
+            return Err(FormulaError::Coordinate(name.to_string()));
+        }
+        let rows: Vec<(&str, &str)> =
+            formulas.iter().map(|(name, formula)| (name.as_str(), formula.as_str())).collect();
+        let compiled = ExpressionConstraints::new(&names, &[], &rows)
+            .map_err(|(name, error)| FormulaError::Formula { name, error })?;
+        Ok(Self { formulas, compiled })
+    }
+
+    /// The same with those first that are written first.
+    #[must_use]
+    pub fn in_order(self, place: impl Fn(&str) -> usize) -> Self {
+        Self { compiled: self.compiled.in_order(place), ..self }
+    }
+
+    /// The formulas by name.
+    pub fn formulas(&self) -> &BTreeMap<String, String> {
+        &self.formulas
+    }
+
+    /// The formulas as functions of states.
+    pub(crate) fn compiled(&self) -> &ExpressionConstraints {
+        &self.compiled
+    }
+
+    /// A model under them.
+    ///
+    /// # Errors
+    /// [`ConstraintError::Shape`] for a model of other coordinates.
+    pub fn constrain<'a, S: Scalar>(
+        &self,
+        model: Box<dyn EulerLagrange<S> + 'a>,
+    ) -> Result<Box<dyn EulerLagrange<S> + 'a>, ConstraintError> {
+        Ok(Box::new(Constrained::new(model, self.compiled.clone(), [])?))
+    }
+
+    /// The states that they allow.
+    ///
+    /// # Errors
+    /// None, since the coordinates are their own.
+    pub fn manifold<S: Scalar>(&self) -> Result<impl Manifold<S> + use<S>, ConstraintError> {
+        self.alone()
+    }
+
+    /// Those of them that do not follow from others at any of some states, `(batch, n)` each, and the names of the others.
+    ///
+    /// # Errors
+    /// [`FormulaError::Constraints`] for constraints that contradict each other or leave no motion.
+    pub fn independent(mut self, q: &[f64], v: &[f64]) -> Result<(Self, Vec<String>), FormulaError> {
+        let kept = self.alone()?.independent(q, v)?;
+        let redundant = kept.redundant().to_vec();
+        if redundant.is_empty() {
+            return Ok((self, redundant));
+        }
+        self.formulas.retain(|name, _| !redundant.contains(name));
+        self.compiled = self.compiled.without(&redundant);
+        Ok((self, redundant))
+    }
+
+    fn alone<S: Scalar>(&self) -> Result<Constrained<Mechanics<Free, S>, ExpressionConstraints, S>, ConstraintError> {
+        use super::Constraints;
+        let free = Mechanics::new(Free(self.compiled.coordinates()), []);
+        Constrained::new(free, self.compiled.clone(), [])
+    }
+}

@@ -1,0 +1,387 @@
+//! User-defined systems: the contents of a system file, and the [`System`](super::system::System) made from it.
+//!
+//! The structures are those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of
+//! the header of a model file.
+
+mod chain;
+mod events;
+mod measured;
+#[cfg(feature = "serde")]
+pub mod pair;
+mod per_trajectory;
+mod quantity;
+#[cfg(feature = "serde")]
+mod read;
+mod system;
+
+use super::constraints::ExpressionConstraints;
+use super::expression::{ExpressionError, Formula};
+use super::formula_events::FormulaEvent;
+use super::formula_forces::FormulaForces;
+use super::formula_readings::FormulaReading;
+use super::recursion::Shape;
+use super::system::{Range, ShellAdvice};
+use super::{ExpressionLagrangian, Lagrangian};
+use crate::scalar::Real;
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+pub(crate) use chain::ShownLink;
+pub use chain::turned;
+use chain::{ChainDescription, LinkDescription};
+pub use chain::{inertia_symbols, loss_symbols};
+use events::EventDescription;
+use measured::MeasuredDescription;
+pub use per_trajectory::Per;
+pub use per_trajectory::PerTrajectory;
+use quantity::{Decimal, Quantity};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+pub use system::is_free_name;
+
+/// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
+pub struct Description {
+    /// Name: letters, digits, `-` and `_`; none of the catalogue's.
+    pub name: String,
+    /// Name in titles; the name if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub title: Option<String>,
+    /// Unit of the evolution parameter; if left out `s`, and none for a system with a time among its coordinates.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub time_unit: Option<String>,
+    /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub lagrangian: Option<String>,
+    /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub dissipation: Option<String>,
+    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names, of the time `t` and of inputs.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub forces: BTreeMap<String, String>,
+    /// Measured quantities in the forces, such as the voltage of a motor, and their units.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub inputs: BTreeMap<String, String>,
+    /// Inputs that do not change along a motion, so that all formulas may depend on them.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    marks: BTreeSet<String>,
+    /// Zeros of formulas that a roll-out finds, by name: of the same names and of the time `t`.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    events: BTreeMap<String, EventDescription>,
+    /// What sensors read, by name: formulas of the same names, of accelerations, of the time `t` and of inputs.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    measured: BTreeMap<String, MeasuredDescription>,
+    /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub(crate) coordinates: Vec<CoordinateDescription>,
+    /// Settings that all links share.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    chain: Option<ChainDescription>,
+    /// Links of a chain from its base on, each with the joint that moves it, one per coordinate; a Lagrangian and a dissipation function are
+    /// added to theirs.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    links: Vec<LinkDescription>,
+    /// Constants by name.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    #[doc(hidden)]
+    pub parameters: BTreeMap<String, ParameterDescription>,
+    /// Names for formulas; they may use each other in any order.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub definitions: BTreeMap<String, String>,
+    /// Formulas that vanish, by the names of the constraints: of coordinates, or linear in velocities.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
+    pub constraints: BTreeMap<String, String>,
+    /// Lines of the file with constraints of these names, if known.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    #[doc(hidden)]
+    pub constraint_lines: ConstraintLines,
+    /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub metric: Option<BTreeMap<String, String>>,
+    /// Bounds of training states by the names of their columns; the coordinates' own where left out.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
+    )]
+    pub training: BTreeMap<String, [Quantity; 2]>,
+    /// Bounds of the states on which errors are stated.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
+    )]
+    pub validation: BTreeMap<String, [Quantity; 2]>,
+    /// Motions on which a model is tried.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "TrajectoryDescription::is_empty"))]
+    pub(crate) trajectory: TrajectoryDescription,
+    /// Shell in which training states lie, of the metric of a field around a centre; those of the bounds if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub(crate) shell: Option<ShellDescription>,
+}
+
+/// Shell around a centre.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
+pub struct ShellDescription {
+    /// Names of the Cartesian coordinates around the centre.
+    pub(crate) coordinates: Vec<String>,
+    /// Lowest and highest distance from it.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "pair::one"))]
+    pub radius: [Quantity; 2],
+    /// Largest rapidity in a local frame; 1 if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub rapidity: Option<Quantity>,
+}
+
+/// A coordinate.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
+pub struct CoordinateDescription {
+    /// Name, also of its column; the velocity's is the name and `_dot`.
+    pub name: String,
+    /// Unit.
+    #[cfg_attr(feature = "serde", serde(default = "one"))]
+    pub unit: String,
+    /// An angle in radians: adding `2 pi` changes nothing.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
+    pub periodic: bool,
+    /// The coordinate that is a time, in a spacetime.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
+    pub time_like: bool,
+    /// Lowest and highest value of interest; one turn for a periodic coordinate if left out.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")
+    )]
+    pub bounds: Option<[Quantity; 2]>,
+    /// Lowest and highest velocity of interest; without them the velocity of the time-like coordinate of a metric follows from
+    /// `g(v, v) = -1`.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")
+    )]
+    pub velocity_bounds: Option<[Quantity; 2]>,
+}
+
+/// A constant: a number, or a table with more about it.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize))]
+pub struct ParameterDescription {
+    /// Value unless another one is given.
+    pub default: Decimal,
+    /// Unit.
+    pub unit: String,
+    /// Allowed values.
+    pub range: Range,
+    /// `true` if its value is to be found by the training.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "is_false"))]
+    pub learn: bool,
+    /// What has a value of its own; nothing for one value.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub per: Option<Per>,
+    /// Values that are known, by the names of the trajectories.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "BTreeMap::is_empty"))]
+    pub known: BTreeMap<String, Decimal>,
+}
+
+/// Motions on which a model is tried.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
+pub struct TrajectoryDescription {
+    /// End of the time span that starts at 0; 10 if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub t_end: Option<Quantity>,
+    /// Step of the output; a hundredth of the span if left out.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub dt: Option<Quantity>,
+    /// Bounds of the starts by columns; the middle half of the validation bounds where left out.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
+    )]
+    pub start: BTreeMap<String, [Quantity; 2]>,
+}
+
+impl TrajectoryDescription {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Description {
+    /// The same with other values of parameters, by name.
+    fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
+        let mut changed = self.clone();
+        for (name, value) in values {
+            if let Some(parameter) = changed.parameters.get_mut(*name) {
+                parameter.default = Decimal(format!("{value:?}"));
+            }
+        }
+        changed
+    }
+
+    /// A system of a Lagrangian and constraints; coordinates with units, bounds and those of their velocities, parameters with
+    /// defaults, units and ranges.
+    pub(super) fn of_parts<'a>(
+        (name, title, time_unit): (&str, &str, &str),
+        lagrangian: String,
+        coordinates: impl Iterator<Item = (&'a str, &'a str, (f64, f64), (f64, f64))>,
+        parameters: impl Iterator<Item = (&'a str, &'a str, &'a str, Range)>,
+        constraints: BTreeMap<String, String>,
+    ) -> Self {
+        let pair = |(low, high): (f64, f64)| Some([Quantity(low), Quantity(high)]);
+        let coordinate = |(name, unit, bounds, speeds): (&str, &str, _, _)| CoordinateDescription {
+            name: name.to_string(),
+            unit: unit.to_string(),
+            periodic: unit == "rad",
+            time_like: false,
+            bounds: pair(bounds),
+            velocity_bounds: pair(speeds),
+        };
+        let parameter = |(symbol, default, unit, range): (&str, &str, &str, Range)| {
+            let (default, unit) = (Decimal(default.to_string()), unit.to_string());
+            (
+                symbol.to_string(),
+                ParameterDescription { default, unit, range, learn: false, per: None, known: BTreeMap::new() },
+            )
+        };
+        Self {
+            name: name.to_string(),
+            title: Some(title.to_string()),
+            time_unit: Some(time_unit.to_string()),
+            lagrangian: Some(lagrangian),
+            dissipation: None,
+            forces: BTreeMap::new(),
+            inputs: BTreeMap::new(),
+            marks: BTreeSet::new(),
+            events: BTreeMap::new(),
+            measured: BTreeMap::new(),
+            coordinates: coordinates.map(coordinate).collect(),
+            chain: None,
+            links: Vec::new(),
+            parameters: parameters.map(parameter).collect(),
+            definitions: BTreeMap::new(),
+            constraints,
+            constraint_lines: ConstraintLines::default(),
+            metric: None,
+            training: BTreeMap::new(),
+            validation: BTreeMap::new(),
+            trajectory: TrajectoryDescription::default(),
+            shell: None,
+        }
+    }
+}
+
+/// Mistake in a description.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DescriptionError {
+    /// Path of the key, such as `metric.t,t`.
+    pub key: String,
+    /// The mistake, with the column for a formula.
+    pub problem: String,
+}
+
+impl core::fmt::Display for DescriptionError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { key, problem } = self;
+        if key.is_empty() { f.write_str(problem) } else { write!(f, "{key}: {problem}") }
+    }
+}
+
+impl core::error::Error for DescriptionError {}
+
+impl DescriptionError {
+    fn new(key: impl Into<String>, problem: impl core::fmt::Display) -> Self {
+        Self { key: key.into(), problem: problem.to_string() }
+    }
+    fn formula(key: impl Into<String>) -> impl FnOnce(ExpressionError) -> Self {
+        |error| Self::new(key, error)
+    }
+}
+
+/// Lines of constraints in a file by their names. They do not affect whether descriptions are equal.
+#[derive(Clone, Debug, Default)]
+pub struct ConstraintLines(pub BTreeMap<String, usize>);
+
+impl PartialEq for ConstraintLines {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// A description with its compiled Lagrangian.
+#[derive(Clone, Debug)]
+pub struct Described {
+    /// The description, links written out.
+    pub description: Description,
+    /// The description with its links, if it has any.
+    written: Option<Description>,
+    /// Its Lagrangian; parameters in the order of their names. If it or the forces depend on the time, this is a coordinate behind the others,
+    /// and inputs are coordinates behind the time.
+    pub lagrangian: ExpressionLagrangian,
+    /// Its dissipation function, if it has one; parameters as the Lagrangian's.
+    pub dissipation: Option<ExpressionLagrangian>,
+    /// Its forces, if there are any; parameters as the Lagrangian's.
+    pub(super) forces: Option<FormulaForces>,
+    /// Its events; parameters as the Lagrangian's.
+    pub(super) events: Arc<[FormulaEvent]>,
+    /// Its measured quantities; parameters as the Lagrangian's.
+    pub(super) readings: Arc<[FormulaReading]>,
+    /// Its constraints, if there are any; parameters as the Lagrangian's.
+    pub constraints: Option<ExpressionConstraints>,
+    /// `true` if these are known to be independent: nothing has to be examined.
+    pub independent: bool,
+    /// The links, if it has nothing else.
+    pub(super) chain: Option<Arc<Shape>>,
+    /// The velocity of the time-like coordinate on the mass shell.
+    shell: Option<Formula>,
+    /// Where training states lie, if not within their bounds.
+    pub around_centre: Option<ShellAdvice>,
+}
+
+impl Described {
+    /// `true` if the Lagrangian or forces depend on the time, or on inputs.
+    pub fn is_timed(&self) -> bool {
+        Lagrangian::coordinates(&self.lagrangian) > self.description.coordinates.len()
+    }
+
+    /// `true` if it was written as a chain of links.
+    pub fn is_chain(&self) -> bool {
+        self.written.is_some()
+    }
+
+    /// Number of the links that it was written with.
+    pub(crate) fn links(&self) -> usize {
+        self.written.as_ref().map_or(0, |written| written.links.len())
+    }
+
+    /// Its links as one can show them.
+    pub(crate) fn shown_links(&self) -> Vec<ShownLink<'_>> {
+        let names: Vec<&str> = self.description.coordinates.iter().map(|c| c.name.as_str()).collect();
+        self.written.as_ref().map_or_else(Vec::new, |written| written.shown_links(&names))
+    }
+
+    /// The description as it was given, with other values of parameters, by name.
+    pub fn with_defaults(&self, values: &[(&str, f64)]) -> Description {
+        let plain = self.description.with_defaults(values);
+        match &self.written {
+            Some(written) => Description { parameters: plain.parameters, ..written.clone() },
+            None => plain,
+        }
+    }
+
+    /// The velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the future;
+    /// what `v` holds in its place is not read. `None` for a system without mass shell.
+    pub fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
+        self.shell.as_ref().map(|shell| shell.evaluate(parameters, q, v))
+    }
+}
+
+fn one() -> String {
+    "1".to_string()
+}
+
+fn is_false(x: &bool) -> bool {
+    !x
+}

@@ -1,0 +1,294 @@
+//! Failures of the terms of a batch: what they are, how they are found, merged, and reported.
+
+use super::{Request, Terms};
+use crate::linalg::{Failure, Workspace};
+use crate::scalar::{Scalar, vectorized};
+use alloc::vec::Vec;
+
+/// Why terms could not be computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum MechanicsError {
+    /// A slice has the wrong length.
+    Shape {
+        /// Which argument.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// The mass matrix of a state cannot be solved with.
+    Singular {
+        /// Row of the batch.
+        row: usize,
+        /// Estimated 2-norm condition number (infinite if exactly singular).
+        condition: f64,
+    },
+    /// A constraint that depends on the others at a state, although it does not elsewhere: they leave open what carries the load.
+    Dependent {
+        /// Row of the batch.
+        row: usize,
+        /// Which constraint, from 0.
+        constraint: usize,
+    },
+    /// An acceleration that the constraints do not allow.
+    OffConstraints {
+        /// Row of the batch.
+        row: usize,
+        /// The constraint that is missed most, from 0.
+        constraint: usize,
+        /// Distance to the nearest one that they allow.
+        distance: f64,
+    },
+    /// Fewer drives than degrees of freedom, or a drive that is given twice.
+    Drives {
+        /// Degrees of freedom.
+        expected: usize,
+        /// Different drives.
+        found: usize,
+    },
+    /// A state that can move while the drives stand still.
+    Undriven {
+        /// Row of the batch.
+        row: usize,
+    },
+    /// A term is not finite.
+    NotFinite {
+        /// Row of the batch.
+        row: usize,
+        /// Which term.
+        what: &'static str,
+    },
+    /// A state at which the mass matrix is not certified, of a model that is to move where it is.
+    Uncertified {
+        /// Row of the batch.
+        row: usize,
+    },
+    /// A model that a flag has ended.
+    Interrupted,
+    /// A system that depends on the time, which a state does not tell.
+    Timed,
+    /// Derivatives that a model does not have.
+    Derivatives {
+        /// Of which term.
+        what: &'static str,
+    },
+}
+
+impl core::fmt::Display for MechanicsError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Shape { what, expected, found } => write!(f, "{what}: expected {expected} numbers, found {found}"),
+            Self::Singular { row, condition } => {
+                write!(f, "mass matrix of state {row} is singular (condition number {condition:.3e})")
+            }
+            Self::Dependent { row, constraint } => {
+                write!(f, "constraint {constraint} depends on the others at state {row}")
+            }
+            Self::OffConstraints { row, constraint, distance } => write!(
+                f,
+                "the acceleration of state {row} is {distance:.3e} away from what the constraints allow, most by constraint {constraint}"
+            ),
+            Self::Drives { expected, found } => write!(
+                f,
+                "drives: expected at least {expected} different coordinates, as many as degrees of freedom, found {found}"
+            ),
+            Self::Undriven { row } => {
+                write!(f, "state {row} can move while the drives stand still: their forces do not give its acceleration")
+            }
+            Self::NotFinite { row, what } => write!(f, "{what} of state {row} is not finite"),
+            Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
+            Self::Interrupted => f.write_str("interrupted"),
+            Self::Timed => f.write_str(
+                "this system depends on the time t, which a state does not tell: roll its motion out, or identify its constants",
+            ),
+            Self::Derivatives { what } => write!(f, "{what}: this model has no such derivatives"),
+        }
+    }
+}
+
+impl core::error::Error for MechanicsError {}
+
+impl MechanicsError {
+    /// Row of the state that failed; `None` of an error that is not about one state.
+    pub fn row(&self) -> Option<usize> {
+        match *self {
+            Self::Singular { row, .. }
+            | Self::Dependent { row, .. }
+            | Self::OffConstraints { row, .. }
+            | Self::Undriven { row }
+            | Self::NotFinite { row, .. }
+            | Self::Uncertified { row } => Some(row),
+            Self::Shape { .. } | Self::Drives { .. } | Self::Interrupted | Self::Timed | Self::Derivatives { .. } => {
+                None
+            }
+        }
+    }
+
+    /// The failure of the state, moved to another row.
+    pub(crate) fn at_row(mut self, to: usize) -> Self {
+        if let Self::Singular { row, .. }
+        | Self::Dependent { row, .. }
+        | Self::OffConstraints { row, .. }
+        | Self::Undriven { row }
+        | Self::NotFinite { row, .. }
+        | Self::Uncertified { row } = &mut self
+        {
+            *row = to;
+        }
+        self
+    }
+
+    /// A state whose acceleration cannot be solved for.
+    pub fn unsolved(row: usize, failure: Failure) -> Self {
+        match failure {
+            Failure::Singular { condition } => Self::Singular { row, condition },
+            Failure::NotFinite => Self::NotFinite { row, what: "acceleration" },
+        }
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// Adds failures to those that are there; one of a row is kept, and of `found` rather than of what is there.
+    pub fn prepend_failures(&mut self, mut found: Vec<MechanicsError>) {
+        if found.is_empty() {
+            return;
+        }
+        found.append(&mut self.failures);
+        // The sort is stable, so that the first of a row stays the first.
+        found.sort_by_key(MechanicsError::row);
+        found.dedup_by_key(|error| error.row());
+        self.failures = found;
+    }
+
+    /// The first failure, as the outcome of the batch.
+    ///
+    /// # Errors
+    /// That failure.
+    pub fn outcome(&self) -> Result<(), MechanicsError> {
+        self.failures.first().map_or(Ok(()), |&error| Err(error))
+    }
+
+    /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used. After a success none stands there, even
+    /// of a model that leaves the list alone.
+    pub fn record_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
+        if outcome.is_ok() {
+            self.failures.clear();
+        }
+        let first = self.failures.first().and_then(MechanicsError::row);
+        outcome.as_ref().err().is_none_or(|error| error.row().is_some() && error.row() == first)
+    }
+
+    /// Removes and returns the failures of the wrapped model.
+    ///
+    /// # Errors
+    /// `outcome`, if it does not belong to rows.
+    pub fn drain_failures(
+        &mut self,
+        outcome: Result<(), MechanicsError>,
+    ) -> Result<Vec<MechanicsError>, MechanicsError> {
+        if self.record_failures(&outcome) {
+            Ok(core::mem::take(&mut self.failures))
+        } else {
+            outcome.map(|()| Vec::new())
+        }
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// [`Terms::complete`] for a wrapper, which has drained the failures of the model inside before.
+    ///
+    /// # Errors
+    /// The first failure, of either.
+    pub(crate) fn complete_beside(
+        &mut self,
+        failures: Vec<MechanicsError>,
+        n: usize,
+        v: &[S],
+        request: Request,
+    ) -> Result<(), MechanicsError> {
+        if let Err(error @ MechanicsError::Shape { .. }) = self.complete(n, v, request, &mut Workspace::new()) {
+            return Err(error);
+        }
+        self.prepend_failures(failures);
+        self.outcome()
+    }
+}
+
+/// Adds the rows of a field `(batch, width)` that are not finite.
+#[inline]
+pub(super) fn not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, found: &mut Vec<MechanicsError>) {
+    if !all_finite(field) {
+        rows_not_finite(what, field, width, found);
+    }
+}
+
+#[cold]
+fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, found: &mut Vec<MechanicsError>) {
+    let rows = field.chunks(width.max(1)).enumerate().filter(|(_, row)| !all_finite(row));
+    found.extend(rows.map(|(row, _)| MechanicsError::NotFinite { row, what }));
+}
+
+/// `true` if every number is finite; no branch before the end.
+#[inline(always)]
+fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    if numbers.len() < WIDE {
+        finite(numbers)
+    } else {
+        vectorized(
+            #[inline(always)]
+            || finite(numbers),
+        )
+    }
+}
+
+/// From so many numbers on the widest vectors are worth a call.
+const WIDE: usize = 64;
+
+#[inline(always)]
+fn finite<S: Scalar>(numbers: &[S]) -> bool {
+    let mut all = true;
+    for x in numbers {
+        all &= x.is_finite();
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_is_found_once_with_its_first_reason() {
+        let mut field = vec![0.0; 300];
+        field[131] = f64::NAN;
+        field[129] = f64::INFINITY;
+        field[299] = f64::NAN;
+        let mut found = Vec::new();
+        not_finite("momentum", &field, 3, &mut found);
+        let bad = |row| MechanicsError::NotFinite { row, what: "momentum" };
+        assert_eq!(found, [bad(43), bad(99)]);
+        not_finite("momentum", &field[..129], 3, &mut found);
+        assert_eq!(found.len(), 2);
+        let mut terms = Terms::<f64>::default();
+        terms.prepend_failures(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
+        terms.prepend_failures(found);
+        assert_eq!(terms.failures, [MechanicsError::Uncertified { row: 7 }, bad(43), bad(99)]);
+        assert_eq!(terms.outcome(), Err(MechanicsError::Uncertified { row: 7 }));
+    }
+
+    #[test]
+    fn an_error_about_no_row_is_passed_on() {
+        let mut terms = Terms::<f64> { failures: vec![MechanicsError::Uncertified { row: 2 }], ..Terms::default() };
+        let other = Err(MechanicsError::Derivatives { what: "mass matrix" });
+        assert_eq!(terms.drain_failures(other), Err(MechanicsError::Derivatives { what: "mass matrix" }));
+        let failed = terms.drain_failures(Err(MechanicsError::Uncertified { row: 2 }));
+        assert_eq!(failed, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
+        assert_eq!(terms.outcome(), Ok(()));
+        // Remains of an earlier batch do not count.
+        terms.failures.push(MechanicsError::Uncertified { row: 2 });
+        assert_eq!(terms.drain_failures(Ok(())), Ok(Vec::new()));
+        assert_eq!(terms.outcome(), Ok(()));
+    }
+}

@@ -1,0 +1,288 @@
+//! Formulas as text: `m*l^2*theta_dot^2/2 + m*g*l*cos(theta)`.
+//!
+//! ```text
+//! sum     = product { ("+" | "-") product }
+//! product = sign { ("*" | "/") sign }
+//! sign    = "-" sign | power
+//! power   = atom [ "^" sign ]                     a^b^c = a^(b^c), -a^2 = -(a^2)
+//! atom    = number | "pi" | name | function "(" sum { "," sum } ")" | "(" sum ")"
+//! ```
+//!
+//! [`Expression`] is what a text says; [`Compiler`] gives its names a meaning and shares what occurs twice; [`Formula`] is
+//! the result, evaluated over any [`Real`](crate::scalar::Real): floats, forward numbers, tracers of a tape. Numbers keep their decimal text's
+//! value in the precision they are evaluated in.
+
+mod compile;
+mod parse;
+
+pub(super) use compile::{Compiler, Formula, Meaning, Value};
+pub(super) use parse::is_name;
+
+use crate::lagrangian::Lagrangian;
+use crate::ops::{Binary, Unary};
+use crate::scalar::Real;
+#[cfg(feature = "serde")]
+use crate::scalar::Scalar;
+use alloc::collections::BTreeMap;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// A mistake in the text of a formula.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExpressionError {
+    /// Character of the text where it is, from 1.
+    pub column: usize,
+    /// The mistake, and what was expected.
+    pub problem: String,
+}
+
+impl fmt::Display for ExpressionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { column, problem } = self;
+        write!(f, "column {column}: {problem}")
+    }
+}
+
+impl core::error::Error for ExpressionError {}
+
+impl ExpressionError {
+    pub(in crate::mechanics::lagrangian) fn new(column: usize, problem: impl Into<String>) -> Self {
+        Self { column, problem: problem.into() }
+    }
+}
+
+/// A part of a formula; operands are parts before it.
+#[derive(Clone, Debug, PartialEq)]
+enum Node {
+    /// A decimal number without sign.
+    Number(String),
+    /// The circle constant.
+    Pi,
+    /// A name and its column.
+    Name(String, usize),
+    /// A function of one number, or a minus sign.
+    Unary(Unary, u32),
+    /// A function of two numbers, or an operator; `^` is [`Binary::Powf`].
+    Binary(Binary, u32, u32),
+}
+
+/// A formula as a tree, written `m*l^2*theta_dot^2/2`; [`fmt::Display`] writes what reads back to the same formula.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expression {
+    /// Operands before what is made of them, the whole last.
+    nodes: Vec<Node>,
+}
+
+impl Expression {
+    /// The names of quantities in it, in order, each as often as it occurs.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.nodes.iter().filter_map(|node| match node {
+            Node::Name(name, _) => Some(name.as_str()),
+            _ => None,
+        })
+    }
+}
+
+/// Precedence of a part: sums, products, signs, powers, atoms.
+const SUM: u8 = 0;
+const PRODUCT: u8 = 1;
+const SIGN: u8 = 2;
+const POWER: u8 = 3;
+const ATOM: u8 = 4;
+
+impl fmt::Display for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Every part is an operand once: its text moves into the text of the whole.
+        let mut texts: Vec<(String, u8)> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let mut operand = |index: u32, least: u8| {
+                let (text, level) = core::mem::take(&mut texts[index as usize]);
+                if level < least { format!("({text})") } else { text }
+            };
+            let joined = |a: String, sign: &str, b: String| format!("{a}{sign}{b}");
+            let text = match node {
+                Node::Number(text) => (text.clone(), ATOM),
+                Node::Pi => (PI.to_string(), ATOM),
+                Node::Name(name, _) => (name.clone(), ATOM),
+                Node::Unary(Unary::Neg, a) => (format!("-{}", operand(*a, SIGN)), SIGN),
+                Node::Unary(function, a) => {
+                    (format!("{}({})", name_of(Function::One(*function)).unwrap_or("?"), operand(*a, SUM)), ATOM)
+                }
+                Node::Binary(Binary::Add, a, b) => (joined(operand(*a, SUM), " + ", operand(*b, PRODUCT)), SUM),
+                Node::Binary(Binary::Sub, a, b) => (joined(operand(*a, SUM), " - ", operand(*b, PRODUCT)), SUM),
+                Node::Binary(Binary::Mul, a, b) => (joined(operand(*a, PRODUCT), "*", operand(*b, SIGN)), PRODUCT),
+                Node::Binary(Binary::Div, a, b) => (joined(operand(*a, PRODUCT), "/", operand(*b, SIGN)), PRODUCT),
+                Node::Binary(Binary::Powf, a, b) => (joined(operand(*a, ATOM), "^", operand(*b, SIGN)), POWER),
+                Node::Binary(function, a, b) => {
+                    let name = name_of(Function::Two(*function)).unwrap_or("?");
+                    (format!("{name}({}, {})", operand(*a, SUM), operand(*b, SUM)), ATOM)
+                }
+            };
+            texts.push(text);
+        }
+        f.write_str(texts.last().map_or("", |(text, _)| text))
+    }
+}
+
+/// A function by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Function {
+    One(Unary),
+    Two(Binary),
+}
+
+/// All functions; of two names for the same one the first is written.
+const FUNCTIONS: [(&str, Function); 26] = [
+    ("sqrt", Function::One(Unary::Sqrt)),
+    ("exp", Function::One(Unary::Exp)),
+    ("expm1", Function::One(Unary::ExpM1)),
+    ("ln", Function::One(Unary::Ln)),
+    ("log", Function::One(Unary::Ln)),
+    ("ln1p", Function::One(Unary::Ln1p)),
+    ("sin", Function::One(Unary::Sin)),
+    ("cos", Function::One(Unary::Cos)),
+    ("tan", Function::One(Unary::Tan)),
+    ("asin", Function::One(Unary::Asin)),
+    ("acos", Function::One(Unary::Acos)),
+    ("atan", Function::One(Unary::Atan)),
+    ("sinh", Function::One(Unary::Sinh)),
+    ("cosh", Function::One(Unary::Cosh)),
+    ("tanh", Function::One(Unary::Tanh)),
+    ("erfc", Function::One(Unary::Erfc)),
+    ("logistic", Function::One(Unary::Logistic)),
+    ("softplus", Function::One(Unary::Softplus)),
+    ("abs", Function::One(Unary::Abs)),
+    ("recip", Function::One(Unary::Recip)),
+    ("arcsin", Function::One(Unary::Asin)),
+    ("arccos", Function::One(Unary::Acos)),
+    ("arctan", Function::One(Unary::Atan)),
+    ("atan2", Function::Two(Binary::Atan2)),
+    ("max", Function::Two(Binary::Max)),
+    ("min", Function::Two(Binary::Min)),
+];
+
+/// The circle constant.
+const PI: &str = "pi";
+
+/// The function of a name.
+fn function(name: &str) -> Option<Function> {
+    FUNCTIONS.iter().find(|(known, _)| *known == name).map(|(_, function)| *function)
+}
+
+/// The name of a function, which the operators do not have.
+fn name_of(function: Function) -> Option<&'static str> {
+    FUNCTIONS.iter().find(|(_, known)| *known == function).map(|(name, _)| *name)
+}
+
+/// `true` if a name means something in every formula.
+pub(super) fn is_reserved(name: &str) -> bool {
+    name == PI || function(name).is_some()
+}
+
+/// The value of a decimal number or of a formula of numbers, such as `2*pi`, in the precision of `S`.
+///
+/// # Errors
+/// A mistake in the formula, with its column.
+#[cfg(feature = "serde")]
+pub fn quantity<S: Scalar>(text: &str) -> Result<S, ExpressionError> {
+    if let Some(number) = S::parse(text.trim()) {
+        return Ok(number);
+    }
+    let expression: Expression = text.parse()?;
+    let mut compiler = Compiler::default();
+    let value = compiler.add(&expression, &BTreeMap::new(), true)?;
+    Ok(compiler.formula(value).evaluate::<S>(&[], &[], &[]))
+}
+
+/// A formula of numbers that it names, such as `0.3*cos(1.2*t)` of the number `t`.
+#[derive(Clone, Debug)]
+pub struct NamedFormula {
+    /// What it names, each once.
+    pub names: Vec<String>,
+    formula: Arc<Formula>,
+}
+
+impl NamedFormula {
+    /// Its value for those of its names.
+    pub fn value(&self, values: &[f64]) -> f64 {
+        self.formula.evaluate(values, &[], &[])
+    }
+}
+
+impl core::str::FromStr for NamedFormula {
+    type Err = ExpressionError;
+
+    fn from_str(text: &str) -> Result<Self, ExpressionError> {
+        let expression: Expression = text.parse()?;
+        let mut names: Vec<String> = expression.names().map(ToString::to_string).collect();
+        names.sort();
+        names.dedup();
+        let scope = names.iter().enumerate().map(|(i, name)| (name.clone(), Meaning::Parameter(i))).collect();
+        let mut compiler = Compiler::default();
+        let value = compiler.add(&expression, &scope, false)?;
+        Ok(Self { names, formula: Arc::new(compiler.formula(value)) })
+    }
+}
+
+/// `L(q, v; parameters)` by a formula such as `m*l^2*theta_dot^2/2 + m*g*l*cos(theta)`.
+///
+/// ```
+/// use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, Request, Terms};
+///
+/// let formula = "l^2*theta_dot^2/2 + g*l*cos(theta)";
+/// let pendulum = ExpressionLagrangian::new(&["theta"], &["l", "g"], formula).unwrap();
+/// let pendulum = Mechanics::new(pendulum, vec![2.0, 9.8]);
+/// let mut terms = Terms::default();
+/// pendulum.terms(&[0.5], &[1.0], Request::ALL, &mut terms).unwrap();
+/// assert_eq!(format!("{:.6}", terms.acceleration[0]), "-2.349185");
+/// ```
+#[derive(Clone, Debug)]
+pub struct ExpressionLagrangian {
+    coordinates: usize,
+    parameters: usize,
+    value: Arc<Formula>,
+}
+
+impl ExpressionLagrangian {
+    /// The Lagrangian of a formula over coordinates, their velocities `NAME_dot`, and parameters in the order in which they
+    /// will be given.
+    ///
+    /// # Errors
+    /// A mistake in the formula, with its column.
+    pub fn new(coordinates: &[&str], parameters: &[&str], formula: &str) -> Result<Self, ExpressionError> {
+        let expression: Expression = formula.parse()?;
+        let positions = coordinates.iter().enumerate().map(|(i, name)| (name.to_string(), Meaning::Position(i)));
+        let velocities = coordinates.iter().enumerate().map(|(i, name)| (format!("{name}_dot"), Meaning::Velocity(i)));
+        let count = parameters.len();
+        let parameters = parameters.iter().enumerate().map(|(i, name)| (name.to_string(), Meaning::Parameter(i)));
+        let scope: BTreeMap<String, Meaning> = parameters.chain(velocities).chain(positions).collect();
+        let mut compiler = Compiler::default();
+        let value = compiler.add(&expression, &scope, false)?;
+        Ok(Self::compiled((coordinates.len(), count), compiler.formula(value)))
+    }
+
+    /// The Lagrangian of so many coordinates and parameters whose value is a compiled formula.
+    pub(in crate::mechanics::lagrangian) fn compiled(
+        (coordinates, parameters): (usize, usize),
+        value: Formula,
+    ) -> Self {
+        Self { coordinates, parameters, value: Arc::new(value) }
+    }
+}
+
+impl Lagrangian for ExpressionLagrangian {
+    fn coordinates(&self) -> usize {
+        self.coordinates
+    }
+    fn parameter_count(&self) -> Option<usize> {
+        Some(self.parameters)
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        self.value.evaluate(parameters, q, v)
+    }
+}
+
+#[cfg(test)]
+mod tests;

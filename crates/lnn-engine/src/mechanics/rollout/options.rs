@@ -1,0 +1,307 @@
+//! Options of a roll-out.
+
+use super::{Event, RolloutError};
+use crate::scalar::{Real, Scalar};
+use serde::{Deserialize, Serialize};
+
+/// Integrators: explicit Runge-Kutta methods with step size control, and structure-preserving ones of fixed step.
+///
+/// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix:
+/// the energy error stays bounded over long times, where adaptive methods drift. See [`Options::step`]. A motion with
+/// friction has no energy to keep: [`Integrator::Variational`] refuses it, the Gauss methods keep their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Integrator {
+    /// Dormand and Prince (1980), order 5(4), interpolation of order 4.
+    Dopri5,
+    /// Hairer, Norsett and Wanner (1993), order 8(5,3), interpolation of order 7.
+    Dop853,
+    /// Implicit midpoint rule, order 2.
+    Midpoint,
+    /// Gauss collocation with two stages, order 4.
+    Gauss4,
+    /// Gauss collocation with three stages, order 6.
+    Gauss6,
+    /// Discrete Euler-Lagrange equations of the midpoint discrete Lagrangian, order 2.
+    Variational,
+}
+
+impl Integrator {
+    /// Every integrator.
+    pub const ALL: [Self; 6] =
+        [Self::Dopri5, Self::Dop853, Self::Midpoint, Self::Gauss4, Self::Gauss6, Self::Variational];
+
+    /// Its name, as in a configuration.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dopri5 => "dopri5",
+            Self::Dop853 => "dop853",
+            Self::Midpoint => "midpoint",
+            Self::Gauss4 => "gauss4",
+            Self::Gauss6 => "gauss6",
+            Self::Variational => "variational",
+        }
+    }
+
+    /// What it is, in a few words.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Dopri5 => "Dormand and Prince, order 5, error control",
+            Self::Dop853 => "Dormand and Prince, order 8, error control",
+            Self::Midpoint => "Implicit midpoint rule, order 2, symplectic",
+            Self::Gauss4 => "Gauss collocation, order 4, symplectic",
+            Self::Gauss6 => "Gauss collocation, order 6, symplectic",
+            Self::Variational => "Discrete Euler-Lagrange equations, order 2, symplectic",
+        }
+    }
+
+    /// `true` if steps are fixed and the motion is symplectic.
+    pub const fn is_structure_preserving(self) -> bool {
+        !matches!(self, Self::Dopri5 | Self::Dop853)
+    }
+}
+
+/// Box in which a trajectory must stay; the bounds of a training range or of a chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Domain<S> {
+    bounds: Vec<Option<(S, S)>>,
+}
+
+impl<S: Scalar> Domain<S> {
+    /// Bounds `(lower, upper)` of every component of `(q, v)`; `None` is unbounded, as periodic coordinates are.
+    pub fn new(bounds: Vec<Option<(S, S)>>) -> Self {
+        Self { bounds }
+    }
+
+    /// Number of components `2n`.
+    pub(crate) fn len(&self) -> usize {
+        self.bounds.len()
+    }
+
+    /// Bounds of every component of `(q, v)`.
+    pub fn bounds(&self) -> &[Option<(S, S)>] {
+        &self.bounds
+    }
+
+    /// First component of `(q, v)` outside its bounds, with the bounds.
+    pub fn violation(&self, state: &[S]) -> Option<(usize, S, S)> {
+        self.bounds.iter().zip(state).enumerate().find_map(|(index, (bounds, &x))| match *bounds {
+            Some((lower, upper)) if !(x >= lower && x <= upper) => Some((index, lower, upper)),
+            _ => None,
+        })
+    }
+
+    /// Bounded component of `(q, v)` nearest to a bound, relative to its width, with the bounds.
+    pub(super) fn tightest(&self, state: &[S]) -> Option<(usize, S, S)> {
+        let mut best: Option<(S, (usize, S, S))> = None;
+        for (index, (bounds, &x)) in self.bounds.iter().zip(state).enumerate() {
+            if let Some((lower, upper)) = *bounds {
+                let room = S::min(x - lower, upper - x) / (upper - lower);
+                if best.is_none_or(|(smallest, _)| room < smallest) {
+                    best = Some((room, (index, lower, upper)));
+                }
+            }
+        }
+        best.map(|(_, found)| found)
+    }
+}
+
+/// Options of a roll-out.
+///
+/// | Name | Default | Purpose | Range |
+/// |---|---|---|---|
+/// | `t0` | 0 | time of the start | finite |
+/// | `t_end` | given | time of the last sample; before `t0` integrates backwards | finite |
+/// | `dt` | given | distance of samples; its sign is ignored | finite, not 0, at most 10^8 samples |
+/// | `method` | `Dopri5` | integrator | |
+/// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0, not finer than the rounding of the state |
+/// | `step` | `dt` | longest step of the structure-preserving methods, cut to the distance of samples; `rtol` and `atol` mean nothing to them | finite, > 0 |
+/// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
+/// | `domain` | none | where the trajectory must stay | `2n` components |
+/// | `energy` | true | store `E` at every sample | |
+/// | `events` | none | zeros along the motion that are recorded, end it, or are impacts | |
+///
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options<S> {
+    /// Time of the start.
+    pub t0: S,
+    /// Time of the last sample.
+    pub t_end: S,
+    /// Distance of samples.
+    pub dt: S,
+    /// Integrator.
+    pub method: Integrator,
+    /// Relative tolerance.
+    pub rtol: S,
+    /// Absolute tolerance in the unit of each component.
+    pub atol: S,
+    /// Longest step of the structure-preserving methods: each distance of samples is cut into equal steps not above
+    /// it. `None`: one step per sample. Adaptive methods choose their own.
+    pub step: Option<S>,
+    /// Attempts allowed.
+    pub max_steps: usize,
+    /// Where the trajectory must stay.
+    pub domain: Option<Domain<S>>,
+    /// `true` to store the energy of every sample.
+    pub energy: bool,
+    /// Zeros along the motion that are recorded, end it, or are impacts.
+    pub events: Vec<Event<S>>,
+}
+
+/// More samples than this are refused: their memory would be in the tens of gigabytes.
+const MAX_SAMPLES: f64 = 1e8;
+
+impl<S: Scalar> Options<S> {
+    /// Learned motion as in the paper's tests: `Dopri5`, rtol 1e-6, atol 1e-8, from time 0.
+    pub fn new(t_end: S, dt: S) -> Self {
+        Self {
+            t0: <S as Real>::zero(),
+            t_end,
+            dt,
+            method: Integrator::Dopri5,
+            rtol: S::of_f64(1e-6),
+            atol: S::of_f64(1e-8),
+            step: None,
+            max_steps: 1_000_000,
+            domain: None,
+            energy: true,
+            events: Vec::new(),
+        }
+    }
+
+    /// Ground truth: `Dop853` with rtol = atol = 1e-12, or sixteen roundings where the scalar is coarser.
+    pub fn reference(t_end: S, dt: S) -> Self {
+        let tolerance = S::max(S::of_f64(1e-12), S::epsilon().ldexp(4));
+        Self { method: Integrator::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
+    }
+
+    /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
+    /// it steps shrink until they no longer advance the time, and never arrive.
+    pub fn least_tolerance() -> S {
+        S::of_f64(if S::epsilon().to_f64() > 1e-12 { 1e-6 } else { 2e-15 })
+    }
+
+    /// Refuses options that make no sense for `n` coordinates.
+    ///
+    /// # Errors
+    /// [`RolloutError::Invalid`] naming the option.
+    pub fn check(&self, n: usize) -> Result<(), RolloutError> {
+        let invalid = |what, problem: String| Err(RolloutError::Invalid { what, problem });
+        for (what, value) in [("t0", self.t0), ("t_end", self.t_end), ("dt", self.dt)] {
+            if !value.is_finite() {
+                return invalid(what, format!("{value} is not finite"));
+            }
+        }
+        if self.dt == <S as Real>::zero() {
+            return invalid("dt", "must not be 0".into());
+        }
+        let samples = ((self.t_end - self.t0) / self.dt).abs();
+        if samples.is_nan() || samples.to_f64() > MAX_SAMPLES {
+            return invalid(
+                "dt",
+                format!(
+                    "asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed",
+                    samples.to_f64().min(f64::MAX)
+                ),
+            );
+        }
+        if blur(self).to_f64() >= 0.5 {
+            let (dt, t) = (self.dt, S::max(self.t0.abs(), self.t_end.abs()));
+            return invalid("dt", format!("{dt} is too short to tell times near {t} apart in {}", S::NAME));
+        }
+        for (what, value) in [("rtol", self.rtol), ("atol", self.atol)] {
+            if !(value.is_finite() && value >= <S as Real>::zero()) {
+                return invalid(what, format!("{value} is not a finite number >= 0"));
+            }
+        }
+        if self.rtol + self.atol <= <S as Real>::zero() {
+            return invalid("rtol", "rtol and atol must not both be 0".into());
+        }
+        let least = Self::least_tolerance();
+        if !self.method.is_structure_preserving() && self.rtol > <S as Real>::zero() && self.rtol < least {
+            let rtol = self.rtol.to_f64();
+            let problem =
+                format!("{rtol:e} is finer than {} can keep, the least is {:e}", S::NAME, least.to_f64() as f32);
+            return invalid("rtol", problem);
+        }
+        if let Some(step) = self.step
+            && !(step.is_finite() && step > <S as Real>::zero())
+        {
+            return invalid("step", format!("{step} is not a finite number > 0"));
+        }
+        if self.max_steps == 0 {
+            return invalid("max_steps", "must be at least 1".into());
+        }
+        if self.method.is_structure_preserving() {
+            let shortest = self.step.map_or(self.dt.abs(), |step| S::min(step, self.dt.abs()));
+            // Rounding aside.
+            let steps = ((self.t_end - self.t0).abs() / shortest).to_f64() * (1.0 - 1e-6);
+            if steps > self.max_steps as f64 {
+                let what = if self.step.is_some_and(|step| step < self.dt.abs()) { "step" } else { "dt" };
+                let problem =
+                    format!("asks for {steps:.3e} steps of {shortest}, at most {} are allowed", self.max_steps);
+                return invalid(what, problem);
+            }
+        }
+        match &self.domain {
+            Some(domain) if domain.len() != 2 * n => {
+                invalid("domain", format!("expected {} components, found {}", 2 * n, domain.len()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Rounding of the quotient of time span and `dt`: one this close to a whole number is whole, for the times carry no more
+/// digits. From one half on the samples themselves cannot be distinguished.
+pub(super) fn blur<S: Scalar>(options: &Options<S>) -> S {
+    let span = options.t_end - options.t0;
+    S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nonsense_is_named() {
+        let good = Options::<f64>::new(1.0, 0.1);
+        assert!(good.check(1).is_ok());
+        let name = |options: Options<f64>| match options.check(1) {
+            Err(RolloutError::Invalid { what, .. }) => what,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(name(Options { dt: 0.0, ..good.clone() }), "dt");
+        assert_eq!(name(Options { dt: 1e-12, ..good.clone() }), "dt");
+        assert_eq!(name(Options { t_end: f64::INFINITY, ..good.clone() }), "t_end");
+        assert_eq!(name(Options { rtol: f64::NAN, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { atol: -1.0, ..good.clone() }), "atol");
+        assert_eq!(name(Options { rtol: 0.0, atol: 0.0, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { rtol: 1e-30, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { t0: 1e16, t_end: 1e16 + 10.0, ..good.clone() }), "dt");
+        let least = Options::<f64>::least_tolerance();
+        assert!(Options { rtol: least, ..good.clone() }.check(1).is_ok());
+        assert!(Options { rtol: 1e-30, method: Integrator::Gauss4, ..good.clone() }.check(1).is_ok());
+        assert!(Options::<f32>::new(1.0, 0.1).check(1).is_ok());
+        assert_eq!(name(Options { step: Some(0.0), ..good.clone() }), "step");
+        assert_eq!(name(Options { step: Some(f64::NAN), ..good.clone() }), "step");
+        assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");
+        let fixed = Options { method: Integrator::Gauss4, ..good.clone() };
+        assert!(Options { step: Some(1e-6), ..fixed.clone() }.check(1).is_ok());
+        assert_eq!(name(Options { step: Some(9e-7), ..fixed.clone() }), "step");
+        assert_eq!(name(Options { step: Some(1e-308), ..fixed.clone() }), "step");
+        assert_eq!(name(Options { dt: 1e-7, ..fixed.clone() }), "dt");
+        assert!(Options { dt: 1e-7, ..good.clone() }.check(1).is_ok());
+        assert_eq!(name(Options { max_steps: 9, ..fixed }), "dt");
+        assert_eq!(name(Options { domain: Some(Domain::new(vec![None])), ..good.clone() }), "domain");
+    }
+
+    #[test]
+    fn domain_reports_the_first_violation() {
+        let domain = Domain::new(vec![None, Some((-1.0, 1.0))]);
+        assert_eq!(domain.violation(&[1e9, 0.5]), None);
+        assert_eq!(domain.violation(&[0.0, 1.5]), Some((1, -1.0, 1.0)));
+        assert_eq!(domain.violation(&[0.0, f64::NAN]), Some((1, -1.0, 1.0)));
+    }
+}
