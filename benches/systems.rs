@@ -4,9 +4,9 @@
 mod ratio;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use lnn::cli::parse_system;
 use lnn::geometry::geometries;
 use lnn::lagrangian::{self, Accelerations, Linearizer, Request, Terms, Torques};
+use lnn::pipeline::parse_system;
 use lnn::scalar::Scalar;
 use nalgebra_of_num_dual::SVector;
 use num_dual::{Dual2SVec32, Dual2SVec64, DualNum, hessian};

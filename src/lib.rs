@@ -152,7 +152,7 @@
 //! their commands. The folder `examples/` holds programs that use the crate: solvers of other crates, parameter identification by
 //! argmin, nalgebra matrices, batches without allocation, a filmed pendulum.
 // What only higher floors use is dead without them; the default features tell what is dead for everybody.
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+#![cfg_attr(not(feature = "pipeline"), allow(dead_code, unused_imports))]
 #![cfg_attr(not(feature = "std"), no_std)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
@@ -177,9 +177,6 @@ mod physics;
 mod properties;
 
 // Users need not know the floors.
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub use app::cli;
 #[cfg(feature = "training")]
 #[doc(hidden)]
 pub use app::experiments;
@@ -215,7 +212,7 @@ pub use physics::{analysis, formula, identification};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
 
-#[cfg(all(any(doc, doctest), feature = "cli"))]
+#[cfg(all(any(doc, doctest), feature = "pipeline"))]
 #[cfg(any(doc, doctest))]
 pub mod docs;
 

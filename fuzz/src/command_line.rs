@@ -1,6 +1,6 @@
 //! Any arguments: understood, or refused with a usage error of one line. Zero bytes separate them; nothing is run.
 
-use lnn::cli::{Kind, check_arguments};
+use lnn_cli::{Kind, check_arguments};
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 

@@ -1,9 +1,9 @@
 //! Any text as the configuration of a training: refused with a message, or in range and written back as the same
 //! configuration.
 
-use lnn::cli::parse_config;
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
+use lnn_cli::parse_config;
 
 /// Reads the bytes.
 pub fn run(bytes: &[u8]) {

@@ -1,7 +1,7 @@
 //! Any text as the configuration of a fit: refused with a message, or written back as the same configuration.
 
-use lnn::cli::parse_config;
 use lnn::pipeline::FitConfig;
+use lnn_cli::parse_config;
 
 /// Reads the bytes.
 pub fn run(bytes: &[u8]) {

@@ -1,9 +1,9 @@
 //! The formula that is found of a random polynomial Lagrangian of one coordinate: its system file is read, and moves as the Lagrangian.
 
 use super::bytes::Bytes;
-use lnn::cli::parse_system;
 use lnn::formula::{FormulaOptions, formula_of_model};
 use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, configure_system};
+use lnn::pipeline::parse_system;
 use std::borrow::Cow;
 
 /// Makes the Lagrangian of the bytes and looks for it.

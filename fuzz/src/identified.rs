@@ -1,7 +1,7 @@
 //! Any text as the file of a system whose constants were identified: with other values it is written, and read again as the same system
 //! with these values. The bytes of the text make the values.
 
-use lnn::cli::parse_system;
+use lnn::pipeline::parse_system;
 
 /// Reads the bytes.
 pub fn run(bytes: &[u8]) {

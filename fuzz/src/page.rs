@@ -1,9 +1,9 @@
 //! Any text as the file of a system of two coordinates: its page computes what the library computes, and has no acceleration where that has
 //! none. Without node nothing is compared.
 
-use lnn::cli::parse_system;
 use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure_system};
 use lnn::network::{ModelFile, NetworkLagrangian};
+use lnn::pipeline::parse_system;
 use lnn::report::page;
 use serde_json::{Value, json};
 use std::borrow::Cow;

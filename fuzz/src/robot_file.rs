@@ -1,8 +1,8 @@
 //! Any text as the file of a robot: refused with a line and a message, or a system whose description is written back as the same one; and the
 //! same text if it is written with the constants that it has.
 
-use lnn::cli::parse_system;
 use lnn::lagrangian::configure_system;
+use lnn::pipeline::parse_system;
 use lnn::pipeline::{parse_robot, rewrite_robot};
 use std::borrow::Cow;
 

@@ -1,8 +1,8 @@
 //! Any bytes as a CSV of states: refused with an error of one line, or finite numbers for every column, which their
 //! own text gives again.
 
-use lnn::cli::{States, parse_states};
 use lnn::scalar::{Dd, Scalar};
+use lnn_cli::{States, parse_states};
 
 /// Reads the bytes in every precision.
 pub fn run(bytes: &[u8]) {

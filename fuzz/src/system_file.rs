@@ -1,8 +1,8 @@
 //! Any text as the file of a system: refused with a line and a message, or a system whose description is written back as
 //! the same one and whose Lagrangian is the same in a batch and for one state.
 
-use lnn::cli::parse_system;
 use lnn::lagrangian::{EulerLagrange, Request, Terms, configure_system};
+use lnn::pipeline::parse_system;
 use std::borrow::Cow;
 
 /// Reads the bytes.

@@ -5,10 +5,7 @@
 //! | [`experiments`] | sets of runs as data: records, rows of tables, sweeps |
 //! | [`report`] | plots in SVG, tables, HTML |
 //! | [`pipeline`] | trainings, fits, evaluations and experiments from configuration to report |
-//! | [`cli`] | arguments to calls of the library |
 
-#[cfg(feature = "cli")]
-pub mod cli;
 #[cfg(feature = "training")]
 pub mod experiments;
 #[cfg(feature = "pipeline")]

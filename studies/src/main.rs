@@ -62,14 +62,14 @@ enum Study {
 fn main() -> ExitCode {
     let program = match Program::try_parse() {
         Ok(program) => program,
-        Err(error) => return lnn::cli::answer(&error),
+        Err(error) => return lnn_cli::answer(&error),
     };
     match program.study {
         Study::Constraints(args) => constraints::run(args),
         Study::Formula(args) => formula::run(args),
         Study::Measured(args) => measured::run(args),
         Study::OpenTables(args) => open_tables::run(args),
-        Study::Experiment(args) => return lnn::cli::ended(|| experiment::run(&args)),
+        Study::Experiment(args) => return lnn_cli::ended(|| experiment::run(&args)),
         Study::Identify(args) => return ended(identify::run(args)),
         Study::Rates(args) => return ended(rates::run(args)),
         Study::Watch(args) => return ended(watch::run(args)),

@@ -1,8 +1,9 @@
 //! What several studies set up.
 
 use crate::Outcome;
-use lnn::cli::{CliError, parse_system};
 use lnn::lagrangian::{SystemInstance, configure, configure_system};
+use lnn::pipeline::parse_system;
+use lnn_cli::CliError;
 use std::borrow::Cow;
 use std::path::Path;
 

@@ -239,7 +239,7 @@ mod tests {
             if command.starts_with("lnn-studies ") {
                 crate::Program::try_parse_from(words).unwrap_or_else(|error| panic!("{command}: {error}"));
             } else {
-                lnn::cli::check_arguments(words.map(Into::into)).unwrap_or_else(|error| panic!("{command}: {error}"));
+                lnn_cli::check_arguments(words.map(Into::into)).unwrap_or_else(|error| panic!("{command}: {error}"));
             }
         }
     }

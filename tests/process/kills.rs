@@ -1,5 +1,5 @@
 //! The program killed at random moments: at most one interval is lost, and the end is the same to the last byte.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;

@@ -1,5 +1,4 @@
 //! Motion of any length is written and read in the memory of what is kept of it.
-#![cfg(feature = "cli")]
 
 use crate::alone;
 use crate::counting::peak;
@@ -15,7 +14,8 @@ use std::process::ExitCode;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-const MODEL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/double_pendulum.safetensors");
+const MODEL: &str =
+    concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/data/double_pendulum.safetensors");
 
 #[test]
 fn a_rollout_takes_the_same_memory_however_long_it_is() {
@@ -61,7 +61,7 @@ fn a_rollout_takes_the_same_memory_however_long_it_is() {
         "--overwrite",
     ];
     let arguments: Vec<OsString> = line.iter().map(OsString::from).collect();
-    let bytes = peak(|| assert_eq!(lnn::cli::main(arguments), ExitCode::SUCCESS));
+    let bytes = peak(|| assert_eq!(lnn_cli::main(arguments), ExitCode::SUCCESS));
     let size = std::fs::metadata(&out).unwrap().len() as usize;
     println!("program: {bytes} bytes for a file of {size}");
     assert!(3 * bytes < size, "{bytes} bytes for a file of {size}");

@@ -49,7 +49,7 @@ fn threads_are_the_callers_choice() {
     }
     let before = threads();
     let file = ModelFile::<f64>::load(
-        &Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors"),
+        &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/data/double_pendulum.safetensors"),
     )
     .unwrap();
     let architecture = file.header.architecture.clone();

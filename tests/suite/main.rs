@@ -13,6 +13,7 @@ mod program;
 mod recording;
 mod repo;
 mod rollout;
+mod running;
 mod stress;
 mod symmetry;
 mod training;

@@ -44,19 +44,19 @@ impl fmt::Debug for Checkpoints {
 
 impl Checkpoints {
     /// Checkpoints in a directory, of a training that starts again.
-    pub(crate) fn new(directory: &Path, every: CheckpointInterval) -> Self {
+    pub fn new(directory: &Path, every: CheckpointInterval) -> Self {
         let (files, directory) = (Arc::new(Disk), directory.to_path_buf());
         Self { files, directory, every, begin: Begin::Anew, identity: None }
     }
 
     /// The same for a training that begins elsewhere.
-    pub(crate) fn beginning(self, begin: Begin) -> Self {
+    pub fn beginning(self, begin: Begin) -> Self {
         Self { begin, ..self }
     }
 
     /// The same with a text that is kept in every checkpoint and must be the same when the training continues, instead of the
     /// configuration.
-    pub(crate) fn identified_by(self, text: String) -> Self {
+    pub fn identified_by(self, text: String) -> Self {
         Self { identity: Some(text), ..self }
     }
 

@@ -163,12 +163,12 @@ pub enum PipelineError {
 
 impl PipelineError {
     /// A file that could not be written or removed.
-    pub(crate) fn output(path: &Path, problem: impl fmt::Display) -> Self {
+    pub fn output(path: &Path, problem: impl fmt::Display) -> Self {
         Self::Output { path: path.to_path_buf(), problem: problem.to_string() }
     }
 
     /// `true` if the configuration is at fault, and not data, files or the machine.
-    pub(crate) fn is_configuration(&self) -> bool {
+    pub fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations | Self::NoForces => true,
             Self::Constraints(_) => true,

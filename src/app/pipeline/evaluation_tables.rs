@@ -32,7 +32,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// [`PipelineError::Output`].
-    pub(crate) fn write(
+    pub fn write(
         &self,
         system: &SystemInstance<f64>,
         (name, header, network): (&str, &Header, &NetworkLagrangian<f64>),
@@ -143,7 +143,7 @@ impl Evaluation {
     }
 
     /// Headline and tables, of a model of the system called `title`.
-    pub(crate) fn findings(&self, title: &str) -> Findings {
+    pub fn findings(&self, title: &str) -> Findings {
         let mut findings = self.headline(title);
         findings.append(self.tables());
         findings

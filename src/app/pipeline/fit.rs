@@ -35,7 +35,7 @@ pub struct FitReport {
     /// Reason for which learning ended.
     pub stop: StopReason,
     /// What an interruption after the training of the model left out, in words.
-    pub(crate) unfinished: Option<String>,
+    pub unfinished: Option<String>,
     /// Header of the model's file.
     pub header: Header,
     /// The network with its best weights.
@@ -76,7 +76,7 @@ impl FitReport {
 }
 
 /// Name of the force conjugate to a coordinate where the data gave it none.
-pub(crate) fn usual_force(coordinate: &str) -> String {
+pub fn usual_force(coordinate: &str) -> String {
     format!("{coordinate}_force")
 }
 

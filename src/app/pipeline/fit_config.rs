@@ -189,7 +189,7 @@ fn positive(x: &f64) -> bool {
 }
 
 /// Column and unit of `column=unit`.
-pub(crate) fn unit(text: &str) -> Option<(String, String)> {
+pub fn unit(text: &str) -> Option<(String, String)> {
     let (column, unit) = text.split_once('=')?;
     let (column, unit) = (column.trim(), unit.trim());
     (!column.is_empty() && !unit.is_empty()).then(|| (column.to_string(), unit.to_string()))
@@ -197,7 +197,7 @@ pub(crate) fn unit(text: &str) -> Option<(String, String)> {
 
 impl FitColumns {
     /// The meaning of the columns.
-    pub(crate) fn meaning(&self) -> Columns {
+    pub fn meaning(&self) -> Columns {
         let Self {
             coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, units, columns, ..
         } = self.clone();
@@ -254,14 +254,14 @@ impl FitConfig {
     }
 
     /// The same of files that may have other names.
-    pub(crate) fn without_files(&self) -> Self {
+    pub fn without_files(&self) -> Self {
         let mut other = self.clone();
         other.recording.files.clear();
         other
     }
 
     /// Every value out of range, for `n` coordinates. What the data alone decide is not looked at.
-    pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
+    pub fn faults(&self, n: usize) -> Vec<ConfigError> {
         let mut faults = Faults::default();
         // The training's own come with what its keys decide together.
         Self { training: Config::default(), ..self.clone() }.ranges("", &mut faults);

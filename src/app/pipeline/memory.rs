@@ -8,7 +8,7 @@ use crate::storage::available_memory;
 ///
 /// # Errors
 /// [`PipelineError::Memory`] with both figures.
-pub(crate) fn require(work: &str, needed: Option<u64>) -> Result<(), PipelineError> {
+pub fn require(work: &str, needed: Option<u64>) -> Result<(), PipelineError> {
     check(work, needed, available_memory())
 }
 

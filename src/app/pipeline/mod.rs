@@ -69,7 +69,8 @@ mod judging;
 mod learned_functions;
 mod losses;
 mod members;
-pub(crate) mod memory;
+#[doc(hidden)]
+pub mod memory;
 mod model;
 mod output;
 mod physics;
@@ -82,47 +83,43 @@ mod run_table;
 mod start;
 mod sweep;
 mod tables;
-pub(crate) mod text;
+#[doc(hidden)]
+pub mod text;
 mod time_steps;
 mod train;
 mod watch;
 
-pub(crate) use checkpoints::{Begin, Checkpoints};
 pub use error::PipelineError;
-pub(crate) use evaluation::RTOL;
 pub use evaluation::{Evaluation, EvaluationOptions, evaluate};
-#[doc(hidden)]
-pub use experiment::Experiment;
-pub(crate) use experiment::{KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment};
-#[doc(hidden)]
-pub use experiment_directory::{ExperimentDirectory, LockedDirectory};
-pub(crate) use experiment_report::ExperimentReport;
-#[doc(hidden)]
-pub use experiment_report::{Additions, Results};
-pub(crate) use file_names::{CAPTIONS, LEARNED, MODEL, PLAY, RECORD, SUMMARY};
 pub use first_look::{FirstLook, NextStep};
 pub use fit::FitReport;
-pub(crate) use fit::fit;
 pub use fit_builder::Fit;
-pub(crate) use fit_config::unit;
 pub use fit_config::{FitColumns, FitConfig, FitConstraints, FitOptions};
 pub use force_errors::ForceError;
 pub use hold_out::{CoordinatePredictions, HoldOut, UsefulTime};
 pub use judging::Unjudged;
-#[doc(hidden)]
-pub use model::CONSTRAINTS_UNSUPPORTED;
 pub use model::{model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
-pub(crate) use prepared_fit::PreparedFit;
 pub use robot::{parse_robot, rewrite_robot};
-pub(crate) use start::StartModel;
 pub use sweep::{Sweep, Swept, sweep};
 pub use text::parse_system;
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
 pub use watch::{Event, Watch};
 
-pub(crate) use fit::usual_force;
-pub(crate) use model::all_parameters;
-pub(crate) use prepared_fit::shorten;
-pub(crate) use robot::is_robot;
-pub(crate) use tables::from_table;
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    checkpoints::{Begin, Checkpoints},
+    evaluation::RTOL,
+    experiment::{Experiment, KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment},
+    experiment_directory::{ExperimentDirectory, LockedDirectory},
+    experiment_report::{Additions, ExperimentReport, Results},
+    file_names::{CAPTIONS, LEARNED, MODEL, PLAY, RECORD, SUMMARY},
+    fit::{fit, usual_force},
+    fit_config::unit,
+    model::{CONSTRAINTS_UNSUPPORTED, all_parameters},
+    prepared_fit::{PreparedFit, shorten},
+    robot::is_robot,
+    start::StartModel,
+    tables::from_table,
+};

@@ -34,7 +34,7 @@ pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
 }
 
 /// Values of all parameters of a system, its size among them.
-pub(crate) fn all_parameters(system: &SystemInstance<f64>) -> BTreeMap<String, f64> {
+pub fn all_parameters(system: &SystemInstance<f64>) -> BTreeMap<String, f64> {
     let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
     let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
     if let Size::Chosen { symbol, layout, .. } = system.system.size {

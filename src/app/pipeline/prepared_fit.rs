@@ -17,9 +17,11 @@ use std::time::Instant;
 /// Recorded motion with its derivatives, divided into training, validation and test states.
 #[derive(Debug)]
 pub struct PreparedFit<'a> {
-    pub(crate) reading: &'a LoadedRecording,
+    /// What was read.
+    pub reading: &'a LoadedRecording,
     pub(crate) options: FitOptions,
-    pub(crate) measured: RecordingSplit,
+    /// Its smoothed states, divided.
+    pub measured: RecordingSplit,
     pub(crate) targets: Targets,
     /// Constraints that hold the motion.
     pub(crate) held: Option<FitHeld>,
@@ -73,7 +75,7 @@ impl<'a> PreparedFit<'a> {
     }
 
     /// Targets that are learned from.
-    pub(crate) fn targets(&self) -> Targets {
+    pub fn targets(&self) -> Targets {
         self.targets
     }
 
@@ -81,7 +83,7 @@ impl<'a> PreparedFit<'a> {
     ///
     /// # Errors
     /// The range that the held-out motion has.
-    pub(crate) fn check_horizon(&self, horizon: Option<f64>) -> Result<(), ConfigError> {
+    pub fn check_horizon(&self, horizon: Option<f64>) -> Result<(), ConfigError> {
         let (Some(found), Some((least, most))) = (horizon, horizons(&self.measured.test)) else { return Ok(()) };
         // The last sample may be early or late by a rounding error of the times.
         if (least * (1.0 - 1e-9)..=most * (1.0 + 1e-9)).contains(&found) {
@@ -96,7 +98,7 @@ impl<'a> PreparedFit<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Smooth`] for motion without derivatives.
-    pub(crate) fn survey(&self) -> Result<Survey, PipelineError> {
+    pub fn survey(&self) -> Result<Survey, PipelineError> {
         let FitOptions { held_out: validation, seed, .. } = self.options;
         let smooth = self.options.preparation().smoothing;
         Ok(survey(self.reading, &SurveyOptions { smooth, validation, seed })?)
@@ -116,7 +118,7 @@ impl<'a> PreparedFit<'a> {
     }
 
     /// The configuration of this fit with these parts.
-    pub(crate) fn config(
+    pub fn config(
         &self,
         training: Config,
         horizon: Option<f64>,
@@ -141,7 +143,7 @@ impl<'a> PreparedFit<'a> {
     }
 
     /// The supervised training that suits the data.
-    pub(crate) fn suggest_training(&self, name: &str, precision: Precision) -> Result<Config, PipelineError> {
+    pub fn suggest_training(&self, name: &str, precision: Precision) -> Result<Config, PipelineError> {
         match precision {
             Precision::F32 => self.suggest_in::<f32>(name),
             Precision::F64 => self.suggest_in::<f64>(name),
@@ -154,7 +156,7 @@ impl<'a> PreparedFit<'a> {
 }
 
 /// Shortens a supervised training that multiple shooting follows to a third.
-pub(crate) fn shorten(training: &mut Config) {
+pub fn shorten(training: &mut Config) {
     let phase = &mut training.phases[0];
     phase.epochs = phase.epochs.div_ceil(3);
     phase.t_max = phase.epochs as f64;

@@ -29,7 +29,7 @@ impl StartModel {
     }
 
     /// Gives a configuration the model's shape and precision.
-    pub(crate) fn shape(&self, config: &mut Config) {
+    pub fn shape(&self, config: &mut Config) {
         let model = &self.header.architecture;
         let network = &mut config.network;
         network.hidden.clone_from(&model.hidden);
@@ -60,7 +60,7 @@ impl StartModel {
     ///
     /// # Errors
     /// [`PipelineError::OtherShape`] naming everything that differs.
-    pub(crate) fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
+    pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
         let columns = self.header.columns.iter().take(periodic.len()).map(String::as_str);
         let mut asked = config.architecture_with(columns, periodic, self.header.architecture.scale.clone())?;
         asked.form.sizes.clone_from(&self.header.architecture.form.sizes);

@@ -7,7 +7,7 @@ use toml::Value;
 ///
 /// # Errors
 /// The path of the key that is refused, such as `phase[0].rate`, and what is wrong there.
-pub(crate) fn from_table<T: DeserializeOwned>(table: Value) -> Result<T, (String, String)> {
+pub fn from_table<T: DeserializeOwned>(table: Value) -> Result<T, (String, String)> {
     // A date would be read as text.
     if let Some(path) = date(&table) {
         return Err((path, "no key accepts a date or a time".to_string()));

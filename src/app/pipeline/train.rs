@@ -78,7 +78,8 @@ pub struct RunOptions {
     /// Fraction of the time span of the trajectory test.
     pub span: f64,
     /// Checkpoints, if they are wanted.
-    pub(crate) checkpoints: Option<Checkpoints>,
+    #[doc(hidden)]
+    pub checkpoints: Option<Checkpoints>,
 }
 
 impl Default for RunOptions {

@@ -91,7 +91,7 @@ pub fn grid_figures(comparison: &GridComparison) -> Option<Figure> {
 
 /// A quantity over two coordinates.
 #[derive(Clone, Debug)]
-pub(crate) struct QuantityMap {
+pub struct QuantityMap {
     /// Symbol, such as `R`.
     pub quantity: String,
     /// Heading of the picture, such as `Curvature scalar R of the metric`.
@@ -135,7 +135,7 @@ fn difference_panel(labels: &[String; 2], grid: &Grid) -> HeatMap {
 
 /// Learned map, the exact one unless it is constant, and the difference; none if there is nothing finite to show. Colours leave
 /// out the lowest and the highest hundredth of the values.
-pub(crate) fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
+pub fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
     let all = |grid: &Grid| Spread::of(&grid.values);
     let (learned, exact) = (all(&map.learned), map.exact.as_ref().map(all));
     let constant = exact.filter(|exact| exact.high - exact.low <= 1e-9 * exact.median.abs());

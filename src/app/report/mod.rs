@@ -11,16 +11,16 @@ mod plane;
 mod plot;
 mod table;
 
-pub(crate) use constraints::found_constraint_figures;
+pub use constraints::found_constraint_figures;
 pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};
 pub use experiment::groups;
-pub(crate) use experiment::{experiment_table, experiment_view, loss_figures};
+pub use experiment::{experiment_table, experiment_view, loss_figures};
 pub use grids::{Fit, GridComparison, grid_figures};
-pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
+pub use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
-pub(crate) use identification::{formula_figures, identification_figures};
+pub use identification::{formula_figures, identification_figures};
 pub use page::{PageError, page};
-pub(crate) use plane::Polar;
+pub use plane::Polar;
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,
@@ -59,12 +59,12 @@ pub fn figure(
 }
 
 /// A quantity with its unit, if it has one.
-pub(crate) fn with_unit(quantity: &str, unit: &str) -> String {
+pub fn with_unit(quantity: &str, unit: &str) -> String {
     if ["", "1"].contains(&unit) { quantity.to_string() } else { format!("{quantity} [{unit}]") }
 }
 
 /// Units, each with the places that have it, in their order.
-pub(crate) fn by_unit(units: &[String]) -> Vec<(String, Vec<usize>)> {
+pub fn by_unit(units: &[String]) -> Vec<(String, Vec<usize>)> {
     let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
     for (i, unit) in units.iter().enumerate() {
         match groups.iter_mut().find(|(known, _)| known == unit) {

@@ -4,7 +4,7 @@ use super::{Series, Trace, with_unit};
 
 /// A radius and the angles that go with it, among the coordinates of a motion.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Polar {
+pub struct Polar {
     radius: usize,
     angle: usize,
     /// The angle from the axis of spherical coordinates, of which the plane of the equator is seen.

@@ -54,17 +54,17 @@ impl Scaling {
 }
 
 /// Epochs of a phase or of multiple shooting at most, and iterations of L-BFGS: years.
-pub(crate) const MOST_EPOCHS: usize = 1 << 24;
+pub const MOST_EPOCHS: usize = 1 << 24;
 /// States of a set, or of a step, at most; their memory is looked at beside.
 const MOST_STATES: usize = 1 << 30;
 /// Largest weight of a penalty: beside it single precision has no digit of the loss left.
 const MOST_LAMBDA: f64 = 1e12;
 /// Weight of a penalty, if no other one is chosen.
-pub(crate) const PENALTY: f64 = 100.0;
+pub const PENALTY: f64 = 100.0;
 /// Highest learning rate.
-pub(crate) const MOST_RATE: f64 = 1000.0;
+pub const MOST_RATE: f64 = 1000.0;
 /// Largest seed: TOML has no larger whole number.
-pub(crate) const MOST_SEED: u64 = i64::MAX as u64;
+pub const MOST_SEED: u64 = i64::MAX as u64;
 
 table! {
     /// A complete training run. Keys that are left out have the values of a black box by the preset `quick`; others are refused.
@@ -324,7 +324,7 @@ table! {
 }
 
 /// Units of a learned friction, if no other number is chosen: the example of its key.
-pub(crate) const FRICTION_UNITS: usize = 16;
+pub const FRICTION_UNITS: usize = 16;
 
 /// The known part of a grey box: a file, as a user writes it, or what it says, as a run keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -454,7 +454,7 @@ impl Config {
     }
 
     /// Every value out of range, bounds that are missing among them, for a training on states drawn of a system.
-    pub(crate) fn sampling_faults(&self, system: &SystemInstance<f64>) -> Vec<ConfigError> {
+    pub fn sampling_faults(&self, system: &SystemInstance<f64>) -> Vec<ConfigError> {
         let mut faults = Faults::default();
         self.ranges("", &mut faults);
         self.common_faults(system.coordinates, true, &mut faults);

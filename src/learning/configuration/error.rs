@@ -19,11 +19,7 @@ pub struct ConfigError {
 ///
 /// # Errors
 /// A name that is none of them.
-pub(crate) fn place<'a>(
-    field: &str,
-    name: &str,
-    coordinates: impl Iterator<Item = &'a str>,
-) -> Result<usize, ConfigError> {
+pub fn place<'a>(field: &str, name: &str, coordinates: impl Iterator<Item = &'a str>) -> Result<usize, ConfigError> {
     let names: Vec<&str> = coordinates.collect();
     names.iter().position(|known| *known == name).ok_or_else(|| ConfigError {
         field: field.to_string(),
@@ -34,7 +30,7 @@ pub(crate) fn place<'a>(
 
 /// Values out of range, as they are found.
 #[derive(Debug, Default)]
-pub(crate) struct Faults(pub Vec<ConfigError>);
+pub struct Faults(pub Vec<ConfigError>);
 
 impl Faults {
     /// Notes a value unless it is as expected; whether it is comes back.

@@ -3,12 +3,17 @@
 mod config;
 mod error;
 mod penalty;
-pub(crate) mod table;
+#[doc(hidden)]
+pub mod table;
 
-pub(crate) use config::MOST_SEED;
 pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phase, Precision, Scaling, Shell};
-pub(crate) use config::{FRICTION_UNITS, MOST_EPOCHS, MOST_RATE, PENALTY};
 pub use error::ConfigError;
-pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};
-pub(crate) use table::{Key, Ranges, join};
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    config::{FRICTION_UNITS, MOST_EPOCHS, MOST_RATE, MOST_SEED, PENALTY},
+    error::{Faults, place},
+    table::{Key, Ranges, join},
+};

@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 
 /// A key of a configuration file.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Key {
+pub struct Key {
     /// Its name.
     pub name: &'static str,
     /// Documentation of its field.
@@ -42,7 +42,7 @@ pub(crate) struct Key {
 
 /// What stands below a key.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Below {
+pub enum Below {
     /// A value.
     Value,
     /// A table with these keys, or a list of such tables.
@@ -88,7 +88,7 @@ impl Key {
 }
 
 /// The key of a path such as `phase[0].rate`; indices are passed over.
-pub(crate) fn find_key(keys: &'static [Key], path: &str) -> Option<&'static Key> {
+pub fn find_key(keys: &'static [Key], path: &str) -> Option<&'static Key> {
     let (first, rest) = path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)));
     let name = first.split('[').next().unwrap_or(first);
     let key = keys.iter().find(|key| key.name == name)?;
@@ -99,7 +99,7 @@ pub(crate) fn find_key(keys: &'static [Key], path: &str) -> Option<&'static Key>
 }
 
 /// `below.name`, or the name alone at the top of a file.
-pub(crate) fn join(path: &str, name: &str) -> String {
+pub fn join(path: &str, name: &str) -> String {
     if path.is_empty() { name.to_string() } else { format!("{path}.{name}") }
 }
 
@@ -114,7 +114,7 @@ pub(crate) fn from_zero(x: &f64) -> bool {
 }
 
 /// A value that may be out of range, element by element.
-pub(crate) trait Leaves {
+pub trait Leaves {
     /// Type of an element.
     type Leaf;
     /// Visits every element with its path and its text.
@@ -148,7 +148,7 @@ impl<T: Leaves> Leaves for Vec<T> {
 }
 
 /// A table whose keys have ranges.
-pub(crate) trait Ranges {
+pub trait Ranges {
     /// Notes every value out of its range; the table stands at `path`.
     fn ranges(&self, _path: &str, _faults: &mut Faults) {}
 }
@@ -217,7 +217,7 @@ macro_rules! table {
 
         impl $Name {
             /// Its keys, in the order of a file.
-            pub(crate) const KEYS: &'static [$crate::configuration::Key] = &[
+            pub const KEYS: &'static [$crate::configuration::Key] = &[
                 $(
                     $crate::configuration::Key::new(stringify!($field), concat!($($doc, "\n"),*))
                         $(.values($values) $(.example($example))? $(.flag($flag))?)?

@@ -9,12 +9,14 @@ mod shell;
 
 pub(crate) use dataset::Weighting;
 pub use dataset::{Dataset, DatasetError, Datasets};
-#[doc(hidden)]
-pub use dataset::{Noise, StateEstimate};
 pub(crate) use force_sizes::{force_spreads, sizes};
 pub use recording_split::RecordingSplitError;
-pub(crate) use recording_split::Split;
-#[doc(hidden)]
-pub use recording_split::{PrepareOptions, RecordingSplit};
 pub use sampling::{SamplingError, sample, sample_all};
 pub(crate) use sampling::{boxes, sample_all_until};
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    dataset::{Noise, StateEstimate},
+    recording_split::{PrepareOptions, RecordingSplit, Split},
+};

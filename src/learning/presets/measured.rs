@@ -17,7 +17,7 @@ const STEPS_BY_FORCES: usize = 10_000;
 const BY_FORCES: ([usize; 3], f64) = ([64; 3], 0.3);
 
 /// Changes the structure of a configuration that suits recorded motion: a black box in place of another one has its usual penalty.
-pub(crate) fn restructure(config: &mut Config, structure: Structure) {
+pub fn restructure(config: &mut Config, structure: Structure) {
     if structure == Structure::BlackBox && config.network.structure != Structure::BlackBox {
         config.penalty = Config::default().penalty;
     }

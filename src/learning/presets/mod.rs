@@ -13,7 +13,8 @@ mod measured;
 mod preset;
 mod trainer;
 
-pub(crate) use measured::restructure;
+#[doc(hidden)]
+pub use measured::restructure;
 pub use measured::suggested;
 pub use preset::Preset;
 pub use trainer::{Learned, Trainer, TrainerError};

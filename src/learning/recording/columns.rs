@@ -48,10 +48,10 @@ pub struct Columns {
 pub struct ColumnsError(pub Vec<String>);
 
 /// Name of the time in formulas of forces, whatever its column is called.
-pub(crate) const TIME: &str = "t";
+pub const TIME: &str = "t";
 
 /// The formula of a force that is one instead of a column.
-pub(crate) fn formula_in(text: &str) -> Option<&str> {
+pub fn formula_in(text: &str) -> Option<&str> {
     text.strip_prefix('=')
 }
 

@@ -22,19 +22,17 @@ mod heading;
 mod held;
 mod hermite;
 mod hold_out;
-#[cfg(feature = "data")]
-pub(crate) mod read;
+#[doc(hidden)]
+pub mod read;
 mod reading;
-pub(crate) mod smooth;
+#[doc(hidden)]
+pub mod smooth;
 mod statistics;
 pub(crate) mod survey;
 mod track;
 mod units;
 
-pub(crate) use clock::Clock;
 pub use columns::{Columns, ColumnsError};
-#[cfg(feature = "pipeline")]
-pub(crate) use columns::{TIME, formula_in};
 pub use guess::{ColumnGuess, Guess, guess};
 pub(crate) use held::{Filled, filled, marks};
 pub(crate) use hermite::hermite;
@@ -45,7 +43,13 @@ pub use reading::{Bridged, Cut, Dropped, LoadedRecording, Rows, Targets};
 pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};
-#[doc(hidden)]
-pub use survey::{FirstOrder, Survey, SurveyOptions, survey};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub use units::factor;
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    clock::Clock,
+    columns::{TIME, formula_in},
+    survey::{FirstOrder, Survey, SurveyOptions, survey},
+};

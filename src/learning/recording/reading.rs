@@ -110,12 +110,12 @@ pub struct LoadedRecording {
     /// Meaning of the columns, which have the names of the first file's header without units; without files it is empty.
     pub columns: Columns,
     /// What was recognised in every file.
-    pub(crate) formats: Vec<FileFacts>,
+    pub formats: Vec<FileFacts>,
 }
 
 impl LoadedRecording {
     /// SI units of the coordinates as far as the description or the first file's header gives them, empty texts otherwise.
-    pub(crate) fn coordinate_units(&self) -> Vec<String> {
+    pub fn coordinate_units(&self) -> Vec<String> {
         let header = self.formats.first().map(|facts| &facts.units);
         let unit = |name: &String| {
             let given = self.columns.units.iter().find(|(column, _)| column == name).map(|(_, unit)| unit);

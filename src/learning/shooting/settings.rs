@@ -63,7 +63,7 @@ impl Shooting {
     /// Settings of a small network beside a known Lagrangian whose constants are learned: longer and bolder, for a constant
     /// has a longer way to go than a weight; with more weight decay, which leaves the constants alone; and with segments joined
     /// as closely as samples are followed, for constants are known by the long run.
-    pub(crate) fn grey_box() -> Self {
+    pub fn grey_box() -> Self {
         let (method, rate, epochs, weight_decay, continuity) = (Method::Soap, 0.01, 400, 3e-3, 1.0);
         Self { method, rate, epochs, weight_decay, continuity, ..Self::default() }
     }

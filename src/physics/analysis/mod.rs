@@ -30,8 +30,6 @@ mod trajectories;
 mod tube;
 
 pub(crate) use determination::{Decay, decay};
-#[doc(hidden)]
-pub use determination::{Determination, Estimate, MOST_MISFIT, Observed, constants, determination, misfit};
 pub(crate) use distance::{
     CoordinateError, VALID, ValidTime, ValidTimes, coordinate_error, spread, valid_time, velocity_error,
 };
@@ -48,8 +46,6 @@ pub(crate) use lyapunov::REGULAR;
 pub use lyapunov::{Lyapunov, lyapunov};
 pub use prediction::PredictionError;
 pub(crate) use prediction::follow;
-#[doc(hidden)]
-pub use prediction::{Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error};
 pub(crate) use prediction::{coordinate_errors, window_valid_times};
 pub use statistics::ErrorDistribution;
 pub(crate) use statistics::training_instability;
@@ -57,9 +53,13 @@ pub(crate) use statistics::{Statistics, statistics, stretches};
 pub(crate) use terms::wrong_signatures;
 pub(crate) use terms::{AffineFit, affine_fit, element_factor, matrices_at_rest, nearest_factor};
 pub use terms::{MassMatrixError, mass_matrix_error};
-#[doc(hidden)]
-pub use terms::{acceleration_errors, mass_matrix_error_within};
 pub(crate) use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
+
+// For the packages of this repository.
 #[doc(hidden)]
-pub use tube::Tube;
-pub(crate) use tube::TubeError;
+pub use {
+    determination::{Determination, Estimate, MOST_MISFIT, Observed, constants, determination, misfit},
+    prediction::{Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error},
+    terms::{acceleration_errors, mass_matrix_error_within},
+    tube::{Tube, TubeError},
+};

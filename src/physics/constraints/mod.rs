@@ -18,9 +18,8 @@ mod says;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use examine::ExaminedLagrangian;
 #[doc(hidden)]
-pub use examine::{EXAMINED_STATES, examine};
+pub use examine::{EXAMINED_STATES, ExaminedLagrangian, examine};
 pub use samples::MotionSamples;
 
 use crate::cancellation::Cancelled;

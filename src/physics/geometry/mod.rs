@@ -30,28 +30,33 @@
 //! ```
 
 mod orbits;
-#[cfg(feature = "cli")]
+#[cfg(feature = "serde")]
 mod point_report;
 mod surfaces;
 mod tensors;
 
 pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn, TurningPoint};
-#[cfg(feature = "cli")]
-pub(crate) use point_report::{PointReport, Value, depends_on_velocity, point_reports};
 pub use surfaces::{Change, Character, Surface, surfaces};
+pub use tensors::{Connection, Curvature, Metric};
+
+// For the packages of this repository.
+#[cfg(feature = "serde")]
+#[doc(hidden)]
+pub use point_report::{PointReport, Value, depends_on_velocity, point_reports};
 #[doc(hidden)]
 pub use surfaces::{characters, grid};
-pub use tensors::{Connection, Curvature, Metric};
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};
 use crate::scalar::Scalar;
 use alloc::vec::Vec;
 
 /// Coordinates of a metric whose curvature is computed, at most: a tensor has `n^4` numbers, a point takes 190 MB.
-pub(crate) const MOST_COORDINATES: usize = 32;
+#[doc(hidden)]
+pub const MOST_COORDINATES: usize = 32;
 
 /// Number of points, for a number of coordinates, whose geometry is kept at a time: about a million numbers of a tensor.
-pub(crate) fn at_once(n: usize) -> usize {
+#[doc(hidden)]
+pub fn at_once(n: usize) -> usize {
     ((1 << 20) / n.pow(4).max(1)).max(1)
 }
 

@@ -15,7 +15,7 @@ const DIGITS: usize = 7;
 const ROUNDINGS: f64 = 64.0;
 
 /// What is known of the geometry at a point.
-pub(crate) struct PointReport<'a, S> {
+pub struct PointReport<'a, S> {
     /// Names of the coordinates.
     pub names: &'a [String],
     /// In the order in which they are reported.
@@ -27,7 +27,7 @@ pub(crate) struct PointReport<'a, S> {
 }
 
 /// A tensor or a number at a point.
-pub(crate) struct Quantity<S> {
+pub struct Quantity<S> {
     /// Name in files; empty if it is for people alone.
     pub key: &'static str,
     /// Name for people, with the indices; empty if it is for files alone.
@@ -43,7 +43,7 @@ pub(crate) struct Quantity<S> {
 }
 
 /// The value of a quantity.
-pub(crate) enum Value<S> {
+pub enum Value<S> {
     /// The point does not have it.
     Missing,
     /// A number.
@@ -73,7 +73,7 @@ fn two_pairs(at: &[usize]) -> bool {
 const LETTERS: [&str; 4] = ["\\mu", "\\nu", "\\rho", "\\sigma"];
 
 /// `true` if the mass matrix of a point is another one at another velocity, beyond rounding.
-pub(crate) fn depends_on_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> bool {
+pub fn depends_on_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> bool {
     let n = q.len();
     let moved = v.iter().enumerate().map(|(i, &v)| v + S::of_f64(0.25 / (i + 1) as f64));
     let both: Vec<S> = v.iter().copied().chain(moved).collect();
@@ -91,7 +91,7 @@ pub(crate) fn depends_on_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[
 ///
 /// # Errors
 /// Those of [`geometries`].
-pub(crate) fn point_reports<'a, S: Scalar>(
+pub fn point_reports<'a, S: Scalar>(
     model: &dyn EulerLagrange<S>,
     names: &'a [String],
     points: &[S],

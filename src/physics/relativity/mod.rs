@@ -35,20 +35,22 @@ mod two_sided;
 
 pub use camera::{Camera, Observer};
 pub use coordinates::{CentralCoordinates, Chart};
-#[doc(hidden)]
-pub use coordinates::{depends_on_time, time_moves_alone};
-#[doc(hidden)]
-pub use orbits::orbits;
-pub(crate) use rays::TOLERANCES;
 pub use rays::{Ray, RayOutcome, Tracing};
 #[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
 pub use says::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary, picture, views};
 pub use shadow::{Edge, Outline, Shadow, outline, shadow};
-#[doc(hidden)]
-pub use sky::difference_image;
 pub use sky::{Image, Sky};
 pub use two_sided::TwoSided;
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    coordinates::{depends_on_time, time_moves_alone},
+    orbits::orbits,
+    rays::TOLERANCES,
+    sky::difference_image,
+};
 
 use crate::geometry::GeometryError;
 use crate::lagrangian::MechanicsError;

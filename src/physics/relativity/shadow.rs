@@ -73,7 +73,7 @@ impl Shadow {
     }
 
     /// Number of rays that were followed to an end.
-    pub(crate) fn finished(&self) -> usize {
+    pub fn finished(&self) -> usize {
         self.rays.len() - self.unfinished()
     }
 

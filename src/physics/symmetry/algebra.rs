@@ -27,7 +27,7 @@ pub struct Algebra {
 }
 
 /// Largest number of fields whose algebra is computed: beyond, their commutators take minutes.
-pub(crate) const MOST_FIELDS: usize = 200;
+pub const MOST_FIELDS: usize = 200;
 /// Largest number of states at which commutators are computed, and of products of numbers, which take seconds.
 const STATES: (usize, usize) = (400, 10_000_000_000);
 

@@ -87,7 +87,7 @@ impl FromStr for Degrees {
 }
 
 /// Unknown coefficients of a search, at most.
-pub(crate) const MOST_UNKNOWNS: usize = 4000;
+pub const MOST_UNKNOWNS: usize = 4000;
 /// Most unknown coefficients of a search over the default basis: it takes seconds.
 const USUAL: usize = 1300;
 /// Unknown coefficients times states, at most; a search holds up to about eight times as many numbers, two gigabytes.

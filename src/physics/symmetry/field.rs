@@ -240,7 +240,7 @@ pub fn charges(
 ///
 /// # Errors
 /// As [`charges`].
-pub(crate) fn drifts(
+pub fn drifts(
     (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
     basis: &Basis,
     fields: &[Field],

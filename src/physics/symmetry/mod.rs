@@ -45,26 +45,26 @@ mod sample;
 mod says;
 
 pub use algebra::Algebra;
-pub(crate) use algebra::MOST_FIELDS;
-pub(crate) use basis::MOST_UNKNOWNS;
 pub use basis::{Basis, Chart, Degrees};
-#[doc(hidden)]
-pub use basis::{most_states, unknowns};
 pub use canonical::{Canonical, CanonicalForm};
 pub use compare::{Comparison, compare};
-pub(crate) use conserved::quadratic_unknowns;
 pub use conserved::{Conserved, Quadratic, quadratic};
-pub(crate) use field::drifts;
 pub use field::{Charge, Field, charges};
 pub use find::{EXACT, Symmetries, symmetries};
 pub use null_space::Separation;
-pub(crate) use null_space::TOLERANCES;
-#[doc(hidden)]
-pub use null_space::{bases, enough, most_symmetries};
-#[doc(hidden)]
-pub use sample::middle;
 pub use sample::{Invariant, Region};
 pub use says::{ComparisonSummary, QuadraticSummary, SymmetrySummary};
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    algebra::MOST_FIELDS,
+    basis::{MOST_UNKNOWNS, most_states, unknowns},
+    conserved::quadratic_unknowns,
+    field::drifts,
+    null_space::{TOLERANCES, bases, enough, most_symmetries},
+    sample::middle,
+};
 
 use crate::lagrangian::MechanicsError;
 

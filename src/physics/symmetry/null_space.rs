@@ -26,7 +26,7 @@ const NOISE: f64 = 1e-3;
 const ABOVE: f64 = 30.0;
 /// Tolerances by which values can be judged: from the rounding of a number near 1 to the part below which a function may be
 /// meant to be zero.
-pub(crate) const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
+pub const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
 
 /// Refuses a tolerance outside [`TOLERANCES`].
 ///

@@ -250,7 +250,7 @@ const REFUSED: usize = 100;
 
 impl Region {
     /// The range of a column, coordinates before velocities.
-    pub(crate) fn range(&self, column: usize) -> [f64; 2] {
+    pub fn range(&self, column: usize) -> [f64; 2] {
         let n = self.position.len();
         if column < n { self.position[column] } else { self.velocity[column - n] }
     }

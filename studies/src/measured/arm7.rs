@@ -2,12 +2,12 @@
 //! Denavit and Hartenberg being known.
 
 use super::arm::{Faults, JOINTS, Motion, RATE, constants, log, mass_matrix, names, torques};
-use lnn::cli::parse_system;
 use lnn::identification::{IdentifyOptions, identify};
 use lnn::lagrangian::{EulerLagrange, Request, Terms, configure_system, inverse_dynamics};
 use lnn::linalg::{Workspace, eigenvalues};
 use lnn::network::Structure;
 use lnn::pipeline::Fit;
+use lnn::pipeline::parse_system;
 use lnn::recording::{Columns, Targets, read_recording};
 use lnn::scalar::Scalar;
 use std::borrow::Cow;

@@ -2,19 +2,13 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 
 pub mod accuracy;
-#[cfg(feature = "cli")]
 pub mod arm;
 pub mod damped;
-#[cfg(feature = "cli")]
 pub mod forms;
-#[cfg(feature = "cli")]
 pub mod kinds;
 pub mod matrices;
 pub mod nested;
-#[cfg(feature = "cli")]
 pub mod penalties;
-#[cfg(feature = "cli")]
-pub mod program;
 #[path = "../../../crates/lnn-engine/src/properties.rs"]
 mod properties;
 

@@ -1,8 +1,8 @@
 //! Spaces whose curvature is known, as text files, with their invariants written down.
 
-use lnn::cli::parse_system;
 use lnn::geometry::{Geometry, geometries};
 use lnn::lagrangian::{EulerLagrange, configure_system};
+use lnn::pipeline::parse_system;
 use lnn::scalar::{Dd, Real, Scalar};
 use std::borrow::Cow;
 

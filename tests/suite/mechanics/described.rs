@@ -1,10 +1,10 @@
 //! Systems described in text: their numbers against the catalogue's closed forms, and what is wrong in a description.
 
 use crate::common::accuracy::{cast, configure, input_conditions, largest, outputs, random_state, recast};
-use lnn::cli::parse_system;
 use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Request, SystemInstance, Terms, configure_system};
 use lnn::linalg::{self, Workspace};
 use lnn::network::Structure;
+use lnn::pipeline::parse_system;
 use lnn::presets::Preset;
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Scalar};

@@ -1,7 +1,6 @@
 //! Certificates of signature from the command line.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn};
+use crate::running::{Folder, lnn};
 use serde_json::Value;
 use std::fs;
 

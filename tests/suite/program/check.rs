@@ -1,7 +1,6 @@
 //! `lnn check`: what recorded motion is good for, and which files are refused how.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn};
+use crate::running::{Folder, Run, lnn};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -259,7 +258,8 @@ fn contradicting_arguments_are_refused() {
 /// a pixel, 400 frames a second.
 #[test]
 fn a_filmed_pendulum_is_known_to_a_pixel() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ibm-double-pendulum");
+    let folder =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("../shared/data/ibm-double-pendulum");
     let files: Vec<String> = (0..3).map(|k| folder.join(format!("{k}.csv")).display().to_string()).collect();
     if !folder.is_dir() {
         println!("skipped: {} is not there", folder.display());

@@ -1,10 +1,10 @@
 //! Closed chains: their constants from motion and from forces, and the forces of their drives.
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::fs;
 
-const SYSTEM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/slider_crank.toml");
+const SYSTEM: &str = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/slider_crank.toml");
 const POINTS: &str = r#"
 name = "slider-by-points"
 lagrangian = "m1*(x1_dot^2 + y1_dot^2)/2 - m1*g*y1 + m2*x2_dot^2/2"

@@ -1,17 +1,16 @@
 //! Configurations that are printed, completed, changed and found wrong, from outside.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, piped, text};
-use lnn::cli::parse_config;
+use crate::running::{Folder, lnn, piped, text};
 use lnn::configuration::{Config, Regularizer};
 use lnn::network::ModelFile;
+use lnn_cli::parse_config;
 use std::fs;
 
 /// A training so small that it takes a moment.
 const SMALL: &str = "[data]\ntraining = 256\nvalidation = 64\ntest = 64\n[network]\nhidden = [8, 8]\n";
 
 /// Lines of a run that found mistakes.
-fn mistakes(run: &crate::common::program::Run) -> Vec<&str> {
+fn mistakes(run: &crate::running::Run) -> Vec<&str> {
     assert_eq!((run.code, run.stdout.as_str()), (Some(2), ""), "{}", run.stderr);
     run.stderr.lines().map(|line| line.strip_prefix("error: ").unwrap()).collect()
 }

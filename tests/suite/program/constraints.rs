@@ -1,7 +1,7 @@
 //! Constraints from outside: in system files, in roll-outs, found in data.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;

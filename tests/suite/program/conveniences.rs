@@ -1,8 +1,7 @@
 //! What makes the program easy to use, from outside: fine-tuning, models by directory, standard input and output, pictures
 //! of roll-outs, completions and manual pages.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, model, piped, text};
+use crate::running::{Folder, lnn, model, piped, text};
 use lnn::network::ModelFile;
 use serde_json::Value;
 use std::fs;

@@ -1,7 +1,6 @@
 //! The program with a model of a user's own system that loses energy.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, model, text};
+use crate::running::{Folder, lnn, model, text};
 use lnn::network::{Layout, ModelFile, NetworkLagrangian};
 use lnn::rollout::{Integrator, Options, rollout};
 use serde_json::Value;

@@ -1,7 +1,6 @@
 //! Systems with forces as formulas: rolled out, identified, and refused where no time is known.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn, text};
+use crate::running::{Folder, Run, lnn, text};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

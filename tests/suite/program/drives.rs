@@ -1,7 +1,6 @@
 //! `lnn formula` of systems with a periodic drive, and with friction that depends on the position.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use lnn::random::RngStream;
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;

@@ -1,7 +1,6 @@
 //! Systems with events: found by roll-outs, written, refused, and left alone by other commands.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn, text};
+use crate::running::{Folder, Run, lnn, text};
 
 /// A ball that is thrown and bounces.
 const BALL: &str = r#"name = "ball"

@@ -1,7 +1,6 @@
 //! First runs of a new user: a file as people have it, `lnn check`, and the command that it prints; no second attempt is needed.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn};
+use crate::running::{Folder, Run, lnn};
 use std::fmt::Write;
 
 /// An angle of a pendulum of 0.62 m every 10 ms, from rest at `start` rad, with the rounding of its file as noise.

@@ -1,8 +1,7 @@
 //! `lnn fit` from outside: recorded swings of a pendulum, learned by networks small enough for a test.
-#![cfg(feature = "cli")]
 
 use crate::common::damped;
-use crate::common::program::{Folder, Run, joined, lead, lnn, text};
+use crate::running::{Folder, Run, joined, lead, lnn, text};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::ModelFile;
 use lnn::rollout::{Integrator, Options, rollout};

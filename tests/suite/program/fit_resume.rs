@@ -1,8 +1,8 @@
 //! Fits that are stopped and gone on with, from outside.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, command, lnn, text};
 use crate::program::fit::{COLUMNS, pendulum};
+use crate::running::{Folder, command, lnn, text};
 use lnn::training::{LATEST, PREVIOUS};
 use serde_json::Value;
 use std::fs;

@@ -1,7 +1,6 @@
 //! An arm with motors from outside: learned with its torques, judged with them, rolled out under them, asked for them.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn, model, text};
+use crate::running::{Folder, Run, lnn, model, text};
 use lnn::configuration::Penalty;
 use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::configure;

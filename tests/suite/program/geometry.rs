@@ -1,6 +1,6 @@
 //! `lnn geometry` from outside.
 
-use crate::common::program::{Folder, lnn, model};
+use crate::running::{Folder, lnn, model};
 use serde_json::Value;
 
 const KEYS: [&str; 11] = [
@@ -110,7 +110,7 @@ fn a_point_is_given_by_the_names_of_its_coordinates() {
 #[test]
 fn space_times_in_files_have_their_curvature() {
     let of = |file: &str, param: &str, at: &str| {
-        let system = format!("{}/examples/systems/{file}", env!("CARGO_MANIFEST_DIR"));
+        let system = format!("{}/examples/systems/{file}", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
         lnn(&["geometry", "--system", &system, "--param", param, "--at", at, "--json"]).objects().remove(0)
     };
     for (b, l) in [(1.5f64, -2.0f64), (0.5, 0.25)] {

@@ -36,9 +36,9 @@
 //! | symbolic link, FIFO, /dev/zero, directory as input | `only_regular_files_are_read` |
 //!
 //! The fuzz targets (`fuzz/`) go further with the same readers.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, HEADER, Run, command, inspect, lnn, model, text};
+use crate::running::{Folder, HEADER, Run, command, inspect, lnn, model, text};
 use lnn::lagrangian::configure;
 use lnn::network::ModelFile;
 use lnn::presets::Preset;

@@ -1,13 +1,13 @@
 //! `lnn identify`: constants of systems in files, from recorded motion.
 
 use crate::common::arm::{self, Faults, JOINTS};
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 
-const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
-const SYSTEM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/damped_pendula.toml");
+const DATA: &str = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/data/pendulum.csv");
+const SYSTEM: &str = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/damped_pendula.toml");
 
 #[test]
 fn constants_and_friction_of_the_example_are_found_and_written() {
@@ -189,7 +189,7 @@ fn a_listed_system_serves_and_what_is_wrong_is_named() {
     }
 }
 
-const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/seven_joints.toml");
+const ARM: &str = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/seven_joints.toml");
 
 #[test]
 fn links_move_as_the_recursion_of_newton_and_euler_says() {

@@ -1,7 +1,6 @@
 //! The program from outside: results, exit codes and the one line that says what is wrong.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, HEADER, inspect, lnn, model, text};
+use crate::running::{Folder, HEADER, inspect, lnn, model, text};
 use serde_json::Value;
 use std::process::Command;
 

@@ -1,7 +1,7 @@
 //! Bounds of numbers: every number that a user can type is refused or gives a result within seconds and in little memory.
-#![cfg(all(feature = "cli", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 
-use crate::common::program::{Folder, Run, command, lnn, model, text};
+use crate::running::{Folder, Run, command, lnn, model, text};
 use std::process::Command;
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,6 @@
 //! Measured quantities that are not coordinates: rolled out, identified, and refused where the file says nothing sensible.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn, text};
+use crate::running::{Folder, Run, lnn, text};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -54,7 +53,10 @@ default = 1
 "#;
 
 fn star() -> String {
-    text(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/systems/star_in_projection.toml"))
+    text(
+        &std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+            .join("examples/systems/star_in_projection.toml"),
+    )
 }
 
 /// A motion of a system, with parameters other than the file's: its columns by name.

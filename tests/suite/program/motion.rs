@@ -1,7 +1,7 @@
 //! `lnn rollout`: steps, long motions written as they go.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, command, lnn, model, text};
+use crate::running::{Folder, command, lnn, model, text};
 use serde_json::Value;
 use std::fs;
 use std::process::{Command, Stdio};
@@ -77,10 +77,10 @@ fn a_motion_says_what_it_conserves() {
         run.stdout
     };
     let facts = |system: &str, state: &str| serde_json::from_str::<Value>(&moved(system, state, &["--json"])).unwrap();
-    let swinging = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/pendulum.toml");
+    let swinging = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/pendulum.toml");
     let pendulum = facts(swinging, "0.5,0");
     assert_eq!((&pendulum["conserved"]["quantity"], &pendulum["time_unit"]), (&"energy".into(), &"s".into()));
-    let universe = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/expanding_universe.toml");
+    let universe = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/expanding_universe.toml");
     // Slower than light, and light, at a(10) = 1.
     for (state, square) in [("10,0,0,0,1.25,0.75,0,0", -1.0), ("10,0,0,0,1,0.6,0.8,0", 0.0)] {
         let found = facts(universe, state);

@@ -1,8 +1,7 @@
 //! What is there already is not lost: models, evaluations, motions, data.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, command, lnn, text};
 use crate::program::fit::{COLUMNS, pendulum};
+use crate::running::{Folder, Run, command, lnn, text};
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use std::fs;
@@ -109,7 +108,7 @@ fn without_a_directory_a_number_is_found() {
 #[test]
 fn a_motion_never_takes_the_place_of_its_model() {
     let folder = Folder::new();
-    let file = folder.file("m", crate::common::program::model().to_bytes().unwrap());
+    let file = folder.file("m", crate::running::model().to_bytes().unwrap());
     let bytes = fs::read(&file).unwrap();
     let path = |name: &str| text(&folder.path(name));
     fs::create_dir(path("d")).unwrap();

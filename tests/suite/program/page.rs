@@ -1,7 +1,7 @@
 //! `lnn page` from outside: the numbers of its JavaScript, where node is, beside those of the program.
 
 use crate::common::kinds;
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -55,7 +55,9 @@ console.log(JSON.stringify({ written, pictures }));
 #[test]
 fn a_page_has_axes_and_plays_at_once_unless_its_reader_wants_no_motion() {
     let folder = Folder::new();
-    let model = text(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors"));
+    let model = text(
+        &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/data/double_pendulum.safetensors"),
+    );
     let page = text(&folder.path("play.html"));
     lnn(&["page", &model, "--out", &page]).succeeded();
     if !node() {
@@ -139,7 +141,9 @@ fn a_page_computes_what_the_program_computes_for_every_kind_of_model() {
 #[test]
 fn the_exact_motion_runs_beside_the_learned_one() {
     let folder = Folder::new();
-    let model = text(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors"));
+    let model = text(
+        &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/data/double_pendulum.safetensors"),
+    );
     let page = text(&folder.path("play.html"));
     lnn(&["page", &model, "--out", &page]).succeeded();
     let html = fs::read_to_string(&page).unwrap();

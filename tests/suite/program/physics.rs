@@ -1,7 +1,7 @@
 //! Physics of a model in the files of `lnn train`, `lnn evaluate` and `lnn fit`.
 
 use super::fit::{COLUMNS, pendulum};
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::fs;
 

@@ -1,7 +1,7 @@
 //! Standard streams: readers that go away, no colours for those that are no terminals, the filter of the log.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, HEADER, Run, command, lnn, text};
+use crate::running::{Folder, HEADER, Run, command, lnn, text};
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use serde_json::Value;

@@ -1,9 +1,8 @@
 //! What `lnn fit` states about how well the data determine a model, and what it does not state.
-#![cfg(feature = "cli")]
 
 use crate::common::arm::{self, Faults, JOINTS, Motion};
-use crate::common::program::{Folder, Run, lnn, text};
 use crate::program::fit::{COLUMNS, pendulum};
+use crate::running::{Folder, Run, lnn, text};
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -118,8 +117,8 @@ fn friction_of_one_coordinate_is_asked_for_where_there_is_some() {
 #[test]
 fn constants_of_a_known_part_have_ranges() {
     let folder = Folder::new();
-    let known = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/grey_pendula.toml");
-    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
+    let known = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/grey_pendula.toml");
+    let data = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/data/pendulum.csv");
     let columns = ["--coords", "theta1,theta2", "--periodic", "theta1,theta2", "--trajectory", "run", "--friction"];
     let more = ["--known", known, "--shooting-epochs", "60"];
     let (run, found) = fitted(&folder, data, "out", &[&columns[..], &more].concat());

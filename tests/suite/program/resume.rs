@@ -1,5 +1,5 @@
 //! Trainings that are stopped and gone on with, from outside.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;

@@ -1,6 +1,6 @@
 //! Robots in URDF files: listed, rolled out, identified from torques, and written back.
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use lnn::random::RngStream;
 use rand::Rng;
 use rand_distr::StandardNormal;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::fs;
 
-const PICKER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/picker.urdf");
+const PICKER: &str = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/picker.urdf");
 
 /// A tree of so many links, two on each from the root on, with joints about all axes.
 fn tree(links: usize) -> String {

@@ -1,10 +1,9 @@
 //! What stands on the screen: lines that a terminal holds, headers with units, numbers that a person reads.
-#![cfg(feature = "cli")]
 
 use super::fit::swings;
 use crate::common::damped;
-use crate::common::program::{Folder, Run, command, lnn};
-use lnn::cli::check_arguments;
+use crate::running::{Folder, Run, command, lnn};
+use lnn_cli::check_arguments;
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
@@ -77,7 +76,7 @@ fn readable(name: &str, run: &Run) -> usize {
 #[test]
 fn lines_fit_headers_have_units_and_numbers_are_plain() {
     let folder = Folder::new();
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data");
+    let data = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/data");
     for file in ["double_pendulum.safetensors", "double_pendulum.toml"] {
         fs::copy(data.join(file), folder.path(file)).unwrap();
     }

@@ -1,13 +1,14 @@
 //! `lnn shadow` from outside.
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use lnn::lagrangian::configure;
 use lnn::network::{Header, Layout, ModelFile, StoredPrecision};
 use serde_json::Value;
 use std::fs;
 
 /// A black hole in Cartesian coordinates, by its metric as text.
-const WRITTEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/black_hole_cartesian.toml");
+const WRITTEN: &str =
+    concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/black_hole_cartesian.toml");
 
 /// Width and height of a PNG.
 fn size(folder: &Folder, name: &str) -> (u32, u32) {
@@ -103,7 +104,7 @@ fn learned_and_exact_stand_side_by_side() {
 #[test]
 fn a_wormhole_has_a_second_sky() {
     let folder = Folder::new();
-    let system = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/wormhole.toml");
+    let system = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/wormhole.toml");
     let out = text(&folder.path("sky.png"));
     let seen = ["--distance", "4", "--param", "b=2", "--width", "24", "--edges", "4", "--json"];
     let found = lnn(&[&["shadow", "--system", system, "--out", &out], &seen[..]].concat()).objects().remove(0);

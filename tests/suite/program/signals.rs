@@ -1,7 +1,7 @@
 //! SIGTERM, as batch systems send it, and disks that fill up: what was learned is kept.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, Run, command, lnn, text, wait_for, wait_until};
+use crate::running::{Folder, Run, command, lnn, text, wait_for, wait_until};
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
@@ -60,7 +60,7 @@ fn a_batch_system_ends_a_training_with_everything_kept() {
 #[test]
 fn a_motion_ends_with_the_samples_that_it_has() {
     let folder = Folder::new();
-    let model = folder.file("m", crate::common::program::model().to_bytes().unwrap());
+    let model = folder.file("m", crate::running::model().to_bytes().unwrap());
     let out_file = folder.path("out.csv");
     let out = text(&out_file);
     let state = ["--state", "1,1,0,0", "--t-end", "900", "--dt", "0.00001", "--beyond-range"];
@@ -225,7 +225,7 @@ fn searches_show_life_and_end_at_once() {
         format!("{t}{}\n", q.collect::<String>())
     };
     let data = folder.file("arm.csv", format!("t,q1,q2,q3,q4,q5,q6,q7\n{}", (0..6000).map(row).collect::<String>()));
-    let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/seven_joints.toml");
+    let arm = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/seven_joints.toml");
     let out = text(&folder.path("found.toml"));
     let columns = ["--coords", "q1,q2,q3,q4,q5,q6,q7"];
     let identify = ["identify", &data, "--system", arm, "--targets", "motion", "--threads", "1", "--out", &out];

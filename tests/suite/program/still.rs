@@ -1,7 +1,6 @@
 //! Data from which nothing can be learned: coordinates that stand still, samples that are absurd.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn};
+use crate::running::{Folder, lnn};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -1,7 +1,6 @@
 //! `summary.json` and `evaluation.json` have the keys that the page of documentation lists, and no others.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -17,7 +16,8 @@ struct Documented {
 
 /// The cells of the tables of the page under a heading.
 fn table(heading: &str) -> Vec<Vec<String>> {
-    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/summary.md")).unwrap();
+    let page =
+        std::fs::read_to_string(concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/docs/summary.md")).unwrap();
     let (_, rest) = page.split_once(&format!("\n## {heading}\n")).unwrap();
     let rows = rest.split("\n## ").next().unwrap().lines().filter(|line| line.starts_with('|')).skip(2);
     rows.map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().replace('`', "")).collect()).collect()
@@ -93,7 +93,7 @@ fn every_key_of_a_summary_is_documented_and_every_documented_key_is_there() {
     let evaluated = lnn(&["evaluate", &out, "--json"]);
     evaluated.succeeded();
     hold('E', &evaluated.stdout);
-    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
+    let data = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/data/pendulum.csv");
     let columns = ["fit", data, "--coords", "theta1,theta2", "--periodic", "theta1,theta2", "--trajectory", "run"];
     let of_fit = text(&folder.path("fitted"));
     let more = ["--targets", "smoothed", "--out", &of_fit];

@@ -1,7 +1,6 @@
 //! `lnn sweep`: all combinations run, whole or in shares, and the tables are numbers.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, lnn, text};
+use crate::running::{Folder, Run, lnn, text};
 use serde_json::Value;
 use std::fs;
 

@@ -1,6 +1,6 @@
 //! `lnn symmetries`, `lnn compare` and `lnn rollout --charges` from outside.
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 
 fn object(arguments: &[&str]) -> Value {
@@ -106,7 +106,7 @@ fn a_degenerate_lagrangian_is_called_so() {
 #[test]
 fn a_model_has_no_symmetry_that_its_system_has_not() {
     // The network was trained on a double pendulum, which has none; nothing of its errors may look like one.
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/double_pendulum.safetensors");
+    let path = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/data/double_pendulum.safetensors");
     let found = object(&["symmetries", "--model", path, "--json"]);
     assert!(found["count"].is_null() || found["count"] == 0, "{found}");
     assert_eq!((found["fields"].as_array().unwrap().len(), found["name"].as_str()), (0, None));

@@ -1,7 +1,7 @@
 //! Systems in files of one's own, from outside.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::fs;
 
@@ -69,7 +69,7 @@ fn a_run_goes_on_with_its_own_system_alone() {
 #[test]
 fn a_file_is_inspected_in_every_precision() {
     let folder = Folder::new();
-    let two = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/two_pendula.toml");
+    let two = concat!(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), "/examples/systems/two_pendula.toml");
     let states = folder.file("s.csv", "theta1,theta2,theta1_dot,theta2_dot\n0.1,0.2,0.3,0.4\n3,-2,1,5\n");
     for precision in ["f32", "f64", "dd"] {
         let look = |system: &str| {

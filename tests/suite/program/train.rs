@@ -1,7 +1,6 @@
 //! Training, roll-out and evaluation from outside, on networks too small to learn much.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{joined, lead, said_by};
+use crate::running::{joined, lead, said_by};
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::network::ModelFile;
@@ -321,7 +320,7 @@ fn ctrl_c_keeps_the_best_model() {
     let second = lnn_when_locked(&config, &folder.path("out"));
     refused(&second, 1, &["another run"]);
     // The second checkpoint is written when an epoch has ended.
-    crate::common::program::wait_for(&folder.path("out/checkpoint.previous.safetensors"));
+    crate::running::wait_for(&folder.path("out/checkpoint.previous.safetensors"));
     let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(signalled.success());
     let output = child.wait_with_output().unwrap();
@@ -336,6 +335,6 @@ fn ctrl_c_keeps_the_best_model() {
 fn lnn_when_locked(config: &str, out: &Path) -> Output {
     // The file says who has locked it once it is locked.
     let locked = || std::fs::metadata(out.join(".lnn.lock")).is_ok_and(|file| file.len() > 0);
-    crate::common::program::wait_until("the lock", locked);
+    crate::running::wait_until("the lock", locked);
     lnn(&["train", "--config", config, "--out", &text(out)])
 }

@@ -1,8 +1,7 @@
 //! `--tube` of `lnn rollout`: a tube from motion that a fit held out, or from other recordings.
-#![cfg(feature = "cli")]
 
 use super::fit::{COLUMNS, pendulum};
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::fs;
 

@@ -1,8 +1,7 @@
 //! The tutorials and the page of limits, followed as by a reader: their files are written, their commands run in order, and what comes out is what
 //! the pages quote and what the recordings were made with.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, Run, command, text};
+use crate::running::{Folder, Run, command, text};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -104,7 +103,7 @@ fn has_json(words: &[String]) -> bool {
 
 /// Follows a page of `docs`; `change` makes a command small.
 fn follow(page: &str, change: impl Fn(&mut Vec<String>)) -> Followed {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let content = fs::read_to_string(root.join("docs").join(page)).unwrap();
     let mut followed = Followed { folder: Folder::new(), steps: Vec::new(), quoted: 0 };
     let mut latest = 0;
@@ -264,7 +263,9 @@ fn a_urdf_becomes_that_of_the_arm_that_was_built() {
     let [drawn, built] = ["inspect --system examples", "inspect --system built"].map(|part| torque(arm.step(part)));
     assert!((built - truth).abs() < 0.01 * (drawn - truth).abs(), "{built} and {drawn}, not {truth}");
     // Every byte beside numbers of bodies and friction stays.
-    let drawings = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/systems/six_joints.urdf"));
+    let drawings = fs::read_to_string(
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/systems/six_joints.urdf"),
+    );
     let written = fs::read_to_string(arm.folder.path("built.urdf")).unwrap();
     let kept = |text: &str| -> Vec<String> {
         let own = ["<inertia ", "<mass ", "<dynamics ", "<origin "];

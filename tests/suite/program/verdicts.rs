@@ -1,8 +1,7 @@
 //! What the program says where the right answer is "no" or "not yet": motion that is no motion, factors that no motion determines, quantities that
 //! are not conserved.
-#![cfg(feature = "cli")]
 
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

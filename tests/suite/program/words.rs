@@ -1,11 +1,11 @@
 //! Messages name the line, the key or the option that is wrong, and the option that helps.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
-use crate::common::program::{Folder, HEADER, inspect, lnn, model, text};
-use lnn::cli::{check_arguments, parse_config};
+use crate::running::{Folder, HEADER, inspect, lnn, model, text};
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
+use lnn_cli::{check_arguments, parse_config};
 use std::ffi::OsString;
 
 /// Every value of every key of a whole configuration, replaced by what it cannot be, is refused by line and key.

@@ -1,7 +1,7 @@
 //! README and pages of `docs`: length, links, commands, options, keys. `LNN_WRITE_DOCS=1` writes the generated part anew.
 
-use crate::common::program::{Folder, lnn};
-use lnn::cli::check_arguments;
+use crate::running::{Folder, lnn};
+use lnn_cli::check_arguments;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fs;
@@ -16,7 +16,7 @@ const OF_A_FIT: [&str; 2] =
     ["<!-- generated from src/app/pipeline/fit_config.rs -->\n\n", "<!-- end of the generated part of fits -->\n"];
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
 fn read(path: &str) -> String {
@@ -357,7 +357,7 @@ fn the_configuration_reference_is_that_of_the_types() {
     let toml: Vec<&str> =
         lines(&page).1.into_iter().filter(|(language, _)| *language == "toml").map(|(_, line)| line).collect();
     let config: lnn::configuration::Config =
-        lnn::cli::parse_config(&toml.join("\n")).expect("the example is a configuration");
+        lnn_cli::parse_config(&toml.join("\n")).expect("the example is a configuration");
     config.validate(2).unwrap();
 }
 

@@ -302,7 +302,8 @@ fn a_film_becomes_a_csv_of_angles() {
 /// Films of a real double pendulum, where they lie beside the project.
 #[test]
 fn the_arms_of_a_real_pendulum_are_rigid() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ibm-double-pendulum");
+    let folder =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("../shared/data/ibm-double-pendulum");
     for name in ["0.csv", "1.csv", "2.csv"] {
         let Ok(text) = std::fs::read_to_string(folder.join(name)) else {
             eprintln!("skipped: {} is not there", folder.join(name).display());

@@ -61,7 +61,7 @@ pub(super) fn sources() -> Vec<(String, String)> {
         }
     }
     let mut found = Vec::new();
-    for root in SOURCES.map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)) {
+    for root in SOURCES.map(|folder| Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(folder)) {
         gather(&root, &root, &mut found);
     }
     found

@@ -1,5 +1,5 @@
 //! Every fuzz target on its committed seeds and on mutations of them, the same ones in every run.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
 // The library of the targets, compiled as a part of this test: the fuzzing engine is not needed.
 #[path = "../../../fuzz/src/lib.rs"]
@@ -10,7 +10,7 @@ use targets::bytes::Random;
 
 /// The seeds of a target, by name of the file.
 fn seeds(target: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(target);
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("fuzz/corpus").join(target);
     let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert!(!files.is_empty(), "{} is empty", folder.display());

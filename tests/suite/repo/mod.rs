@@ -8,6 +8,5 @@ mod floors;
 mod fuzz_seeds;
 mod model_format;
 mod properties;
-#[cfg(feature = "cli")]
 mod python;
 mod ratchets;

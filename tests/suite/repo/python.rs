@@ -1,7 +1,7 @@
 //! The reader of model files in Python, `python/lnn/reader`, beside the program.
 
 use crate::common::kinds;
-use crate::common::program::{Folder, lnn, text};
+use crate::running::{Folder, lnn, text};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 const STATES: &str = "theta1_dot,theta1,theta2,theta2_dot\n0.1,0.5,-3,2\n-4,7,1.5,3\n0,0,0,0\n2.5,-20,4,-0.5\n";
 
 fn at(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(name)
 }
 
 fn shipped() -> String {

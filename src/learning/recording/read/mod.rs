@@ -27,10 +27,9 @@ pub use encoding::Encoding;
 pub use error::{DataError, Problem};
 pub use facts::{FileFacts, FileKind};
 pub(crate) use pieces::LEAST;
-pub(crate) use table::RawTable;
+pub use table::RawTable;
 pub use text::Separator;
-#[cfg(feature = "cli")]
-pub(crate) use text::{comment, line_end, names_in, split};
+pub use text::{comment, line_end, names_in, split};
 
 use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, Recording};

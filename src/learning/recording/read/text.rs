@@ -22,7 +22,7 @@ impl Separator {
     /// The separator of a line: the first of `;`, `,`, tab and `|` that stands outside of double quotes, or blanks
     /// between words. A comma is none if other separators stand between what commas separate, or if blanks stand between numbers
     /// with decimal commas.
-    pub(crate) fn of(line: &str) -> Self {
+    pub fn of(line: &str) -> Self {
         let outside: String =
             line.split('"').enumerate().map(|(k, part)| if k % 2 == 0 { part } else { "q" }).collect();
         let (line, known) = (outside.trim(), [(';', Self::Semicolon), ('\t', Self::Tab), ('|', Self::Bar)]);
@@ -38,7 +38,7 @@ impl Separator {
     }
 
     /// Words that a message adds to "fields"; nothing for commas.
-    pub(crate) fn named(self) -> &'static str {
+    pub fn named(self) -> &'static str {
         match self {
             Self::Comma => "",
             Self::Semicolon => " separated by semicolons",
@@ -86,7 +86,7 @@ pub(crate) fn with_point(text: &str) -> Option<f64> {
 }
 
 /// The byte that ends the lines of a text that begins so: LF (with a CR before it or not), or CR alone where there is no LF.
-pub(crate) fn line_end(beginning: &[u8]) -> u8 {
+pub fn line_end(beginning: &[u8]) -> u8 {
     if beginning.contains(&b'\r') && !beginning.contains(&b'\n') { b'\r' } else { b'\n' }
 }
 
@@ -119,7 +119,7 @@ impl<'a> Iterator for Fields<'a> {
 }
 
 /// Text of a comment behind its `#`, if the line is one.
-pub(crate) fn comment(line: &[u8]) -> Option<&[u8]> {
+pub fn comment(line: &[u8]) -> Option<&[u8]> {
     line.starts_with(b"#").then(|| {
         let marks = line.iter().take_while(|byte| **byte == b'#').count();
         line[marks..].trim_ascii()
@@ -127,14 +127,14 @@ pub(crate) fn comment(line: &[u8]) -> Option<&[u8]> {
 }
 
 /// The names of columns that the last comment above the numbers gives, if it gives as many as there are columns.
-pub(crate) fn names_in(comment: &str, width: usize) -> Option<Vec<String>> {
+pub fn names_in(comment: &str, width: usize) -> Option<Vec<String>> {
     let names: Vec<&str> = split(comment, Separator::of(comment));
     let good = names.len() == width && names.iter().all(|name| !name.is_empty() && name.parse::<f64>().is_err());
     good.then(|| names.iter().map(ToString::to_string).collect())
 }
 
 /// The fields of a line of text without the spaces and quotes around them.
-pub(crate) fn split(line: &str, separator: Separator) -> Vec<&str> {
+pub fn split(line: &str, separator: Separator) -> Vec<&str> {
     // A separator is one byte of ASCII: what stands between two of them is text as the line is.
     separator.fields(line.as_bytes()).map(|field| unquoted(std::str::from_utf8(field).unwrap_or_default())).collect()
 }

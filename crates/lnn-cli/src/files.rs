@@ -1,0 +1,158 @@
+//! Which path leads to which file, and the one rule by which commands write files: none that is read is overwritten, none that holds
+//! something without `--overwrite`.
+
+use crate::input::is_standard;
+use crate::{CliError, output};
+use lnn::storage::{check_target, write_atomically, write_new};
+use std::path::Path;
+use std::{fs, io};
+
+/// `true` if two paths lead to the same file: by links, by other spellings, by hard links.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    let (Ok(a), Ok(b)) = (fs::canonicalize(a), fs::canonicalize(b)) else { return false };
+    a == b || same_node(&a, &b)
+}
+
+#[cfg(unix)]
+fn same_node(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let node = |path: &Path| fs::metadata(path).ok().map(|data| (data.dev(), data.ino()));
+    node(a).is_some() && node(a) == node(b)
+}
+
+#[cfg(not(unix))]
+fn same_node(_: &Path, _: &Path) -> bool {
+    false
+}
+
+/// `true` if there is a regular file with something in it, be it by a link.
+pub fn holds_something(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() > 0)
+}
+
+/// Refuses to write to a file that the command reads, and to one that holds something unless it may be replaced.
+///
+/// # Errors
+/// A data error naming the file.
+pub fn require_free(path: &Path, inputs: &[&Path], overwrite: bool) -> Result<(), CliError> {
+    if let Some(input) = inputs.iter().find(|input| same_file(path, input)) {
+        let same = if *path == **input { String::new() } else { format!(", which is {}", input.display()) };
+        return Err(CliError::file(path, format_args!("this command reads it{same} and never overwrites it")));
+    }
+    if !overwrite && holds_something(path) {
+        return Err(CliError::file(path, "there is a file already; --overwrite replaces it"));
+    }
+    Ok(())
+}
+
+/// A file that a command will write when its work is done, found free and writable before; `-` is standard output.
+#[derive(Clone, Copy, Debug)]
+pub struct OutputFile<'a> {
+    path: &'a Path,
+    overwrite: bool,
+}
+
+impl<'a> OutputFile<'a> {
+    /// The file, by the rule of [`require_free`].
+    ///
+    /// # Errors
+    /// A data error naming the file.
+    pub fn claim(path: &'a Path, inputs: &[&Path], overwrite: bool) -> Result<Self, CliError> {
+        if !is_standard(path) {
+            require_free(path, inputs, overwrite)?;
+            check_target(path).map_err(|e| cannot_write(path, e))?;
+        }
+        Ok(Self { path, overwrite })
+    }
+
+    /// As [`claim`](Self::claim), for a system file.
+    ///
+    /// # Errors
+    /// A usage error for another name than `*.toml` or `-`.
+    pub fn claim_system(path: &'a Path, inputs: &[&Path], overwrite: bool) -> Result<Self, CliError> {
+        if !is_standard(path) && path.extension().is_none_or(|end| end != "toml") {
+            return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", path.display())));
+        }
+        Self::claim(path, inputs, overwrite)
+    }
+
+    /// Writes it whole or not at all; what another program put there meanwhile stays.
+    ///
+    /// # Errors
+    /// A data error naming the file.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), CliError> {
+        if is_standard(self.path) {
+            return output::print_bytes(bytes);
+        }
+        let written = if self.overwrite { write_atomically(self.path, bytes) } else { write_new(self.path, bytes) };
+        written.map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => {
+                let problem = "another program wrote it meanwhile; --overwrite replaces it";
+                CliError::file(self.path, format_args!("cannot write: {problem}"))
+            }
+            _ => cannot_write(self.path, error),
+        })
+    }
+
+    /// Prints what the command has to say beside: on standard error if the file itself goes to standard output.
+    ///
+    /// # Errors
+    /// As of [`output::print`].
+    pub fn print(this: Option<Self>, text: &str) -> Result<(), CliError> {
+        if this.is_some_and(|out| is_standard(out.path)) {
+            text.lines().filter(|line| !line.trim().is_empty()).for_each(output::note);
+            return Ok(());
+        }
+        output::print(text)
+    }
+}
+
+/// A file that cannot be written.
+pub fn cannot_write(path: &Path, error: io::Error) -> CliError {
+    CliError::file(path, format_args!("cannot write: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_writers_the_second_finds_the_file_of_the_first() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a");
+        let [first, second] = [(); 2].map(|()| OutputFile::claim(&path, &[], false).unwrap());
+        first.write(b"1").unwrap();
+        assert!(second.write(b"2").unwrap_err().to_string().contains("cannot write: another program"));
+        assert!(OutputFile::claim(&path, &[], false).is_err());
+        OutputFile::claim(&path, &[], true).unwrap().write(b"3").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), fs::read_dir(directory.path()).unwrap().count()), (b"3".to_vec(), 1));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn files_are_known_under_all_their_names() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        fs::write(path("a"), "x").unwrap();
+        fs::write(path("b"), "x").unwrap();
+        fs::create_dir(path("d")).unwrap();
+        std::os::unix::fs::symlink(path("a"), path("link")).unwrap();
+        std::os::unix::fs::symlink(directory.path(), path("d/up")).unwrap();
+        fs::hard_link(path("a"), path("hard")).unwrap();
+        for same in ["a", "./a", "d/../a", "link", "d/up/a", "d/up/link", "hard"] {
+            assert!(same_file(&path("a"), &path(same)), "{same}");
+            let refusal = require_free(&path(same), &[&path("a")], true).unwrap_err().to_string();
+            assert!(refusal.contains("never overwrites"), "{refusal}");
+        }
+        for other in ["b", "c", "d"] {
+            assert!(!same_file(&path("a"), &path(other)), "{other}");
+        }
+        assert!(require_free(&path("b"), &[&path("a")], false).unwrap_err().to_string().contains("--overwrite"));
+        require_free(&path("b"), &[&path("a")], true).unwrap();
+        // Nothing is lost with an empty file or a device.
+        fs::write(path("c"), "").unwrap();
+        for free in [path("c"), path("none"), "/dev/null".into()] {
+            require_free(&free, &[&path("a")], false).unwrap();
+        }
+    }
+}

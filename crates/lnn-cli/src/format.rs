@@ -1,0 +1,105 @@
+//! Results of states, one after the other, as JSON or text.
+
+use crate::{CliError, json};
+use lnn::lagrangian::MechanicsError;
+use lnn::names::pluralize;
+use lnn::scalar::Scalar;
+
+/// States evaluated together; bounds the memory whatever the length of the file.
+pub const CHUNK: usize = 256;
+
+/// The same of `n` coordinates, whose matrices have `n^2` numbers: those of a chunk have at most a million.
+pub fn chunk(n: usize) -> usize {
+    ((1 << 20) / (n * n).max(1)).clamp(1, CHUNK)
+}
+
+/// Form of a result that has no table of numbers alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum TableOrJson {
+    /// Text.
+    Table,
+    /// One object, or one per line.
+    Json,
+}
+
+/// Form in which results are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// One object per line.
+    Json,
+    /// Text.
+    Table,
+    /// Numbers separated by commas.
+    Csv,
+}
+
+/// The first of the rows that failed, and how many more there are.
+///
+/// # Errors
+/// A data error if there is any.
+pub fn report_failures(place: &str, failures: &[(usize, String)]) -> Result<(), CliError> {
+    match failures {
+        [] => Ok(()),
+        [(row, problem)] => Err(CliError::data(format_args!("{place}: row {row}: {problem}"))),
+        [(row, problem), rest @ ..] => {
+            let more = pluralize(rest.len(), "more row", "more rows");
+            Err(CliError::data(format_args!("{place}: row {row}: {problem} (and {more})")))
+        }
+    }
+}
+
+/// The reason without the batch row, which means nothing to a reader of the file.
+pub fn explain(error: MechanicsError) -> String {
+    match error {
+        MechanicsError::Singular { condition, .. } => {
+            format!("the mass matrix is singular (condition number {condition:.3e})")
+        }
+        MechanicsError::NotFinite { what, .. } => format!("{what} is not finite"),
+        MechanicsError::Undriven { .. } => "it can move while the drives stand still".to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// A named result: its numbers and the length of a row if it is a matrix.
+pub struct Field<'a, S> {
+    pub name: &'static str,
+    pub values: &'a [S],
+    pub shape: Shape,
+}
+
+/// Arrangement of the numbers of a result.
+pub enum Shape {
+    Number,
+    Vector,
+    Matrix,
+}
+
+/// One state as a line of JSON or a block of text; a failed acceleration is `null`.
+pub fn show<S: Scalar>(format: Format, row: usize, fields: &[Field<'_, S>], problem: Option<&str>) -> String {
+    let n = fields.iter().find(|f| matches!(f.shape, Shape::Vector)).map_or(1, |f| f.values.len());
+    let mut parts: Vec<(&str, String)> = fields
+        .iter()
+        .map(|field| {
+            let lost = field.values.is_empty() || (problem.is_some() && field.values.iter().any(|x| !x.is_finite()));
+            let text = match field.shape {
+                _ if lost => "null".to_string(),
+                Shape::Number => field.values.iter().map(|x| json::number(*x)).collect(),
+                Shape::Vector => json::vector(field.values),
+                Shape::Matrix => json::matrix(field.values, n),
+            };
+            (field.name, text)
+        })
+        .collect();
+    parts.extend(problem.map(|text| ("error", json::string(text))));
+    match format {
+        Format::Json => {
+            let parts: Vec<String> = parts.iter().map(|(name, text)| format!("\"{name}\":{text}")).collect();
+            format!("{{{}}}\n", parts.join(","))
+        }
+        Format::Table | Format::Csv => {
+            let width = parts.iter().map(|(name, _)| name.len() + 1).fold(13, usize::max);
+            let lines: String = parts.iter().map(|(name, text)| format!("  {name:<width$}{text}\n")).collect();
+            format!("row {row}\n{lines}")
+        }
+    }
+}

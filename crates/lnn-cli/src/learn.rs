@@ -1,0 +1,125 @@
+//! Common parts of `lnn train` and `lnn fit` around the training: directory, checkpoints, results on standard output, end.
+
+use crate::folder::Folder;
+use crate::learned::model_file;
+use crate::number::threads;
+use crate::output_dir::{self, Wanted};
+use crate::results::Writer;
+use crate::resume::{forget, how_to_go_on, keeping};
+use crate::run_args::RunArgs;
+use crate::watch::watch;
+use crate::{CliError, interrupt, output};
+use lnn::configuration::Config;
+use lnn::data::SamplingError;
+use lnn::findings::Findings;
+use lnn::names::pluralize;
+use lnn::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, Watch};
+use lnn::shooting::ShootingError;
+use lnn::training::{StopReason, TrainingError};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A result, as the command prints it.
+pub struct Learned {
+    /// Text of `summary.json`.
+    pub json: String,
+    /// Headline and tables.
+    pub findings: Findings,
+    /// Reason for which learning ended.
+    pub stop: StopReason,
+    /// Epochs that were run.
+    pub epochs: usize,
+    /// What an interruption after the training left out, in words.
+    pub unfinished: Option<String>,
+}
+
+/// Opens the directory of a run that begins; `inputs` are the files that it reads beside the model it starts from.
+///
+/// # Errors
+/// As of [`output_dir::open`].
+pub fn open(args: &RunArgs, config: &Config, inputs: &[&Path]) -> Result<Folder, CliError> {
+    let usual = PathBuf::from("runs").join(&config.system);
+    let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
+    let inputs: Vec<&Path> = inputs.iter().copied().chain(start.as_deref()).collect();
+    let (out, overwrite, writer) = (args.out.as_deref(), args.overwrite, Writer::Learner);
+    output_dir::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
+}
+
+/// A run that learns in a directory.
+pub struct Session<'a> {
+    args: &'a RunArgs,
+    stop: Arc<AtomicBool>,
+    /// The directory.
+    pub folder: Folder,
+    /// Threads and checkpoints.
+    pub options: RunOptions,
+}
+
+impl<'a> Session<'a> {
+    /// Watches for signals and keeps checkpoints, with `identity` in them instead of the configuration.
+    ///
+    /// # Errors
+    /// Signals that cannot be watched for.
+    pub fn new(args: &'a RunArgs, folder: Folder, begin: Begin, identity: Option<String>) -> Result<Self, CliError> {
+        let stop = interrupt::flag().map_err(CliError::signals)?;
+        let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(begin);
+        let checkpoints = Some(match identity {
+            Some(identity) => checkpoints.identified_by(identity),
+            None => checkpoints,
+        });
+        let mut options = RunOptions::default();
+        (options.threads, options.checkpoints) = (threads(args.threads), checkpoints);
+        Ok(Self { args, stop, folder, options })
+    }
+
+    /// Receiver of progress, with the flag of the signals.
+    pub fn watch(&self) -> Watch {
+        watch(&self.stop)
+    }
+
+    /// Prints the results, removes the checkpoints of a finished run, and reports how it ended.
+    ///
+    /// # Errors
+    /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
+    pub fn conclude(self, learned: Result<Learned, PipelineError>) -> Result<(), CliError> {
+        let path = self.folder.path();
+        let Learned { json, findings, stop, epochs, unfinished } = match learned {
+            Ok(learned) => learned,
+            Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
+                let on = how_to_go_on(path);
+                return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
+            }
+            // There is no model, and nothing to continue from.
+            Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
+            Err(error) => return Err(keeping(path)(error.into())),
+        };
+        if stop != StopReason::Interrupted {
+            forget(path)?;
+        }
+        if self.args.json {
+            output::print(&json)?;
+        } else {
+            output::print(&format!("{findings}\nreport: {}\n", self.folder.file("report.html").display()))?;
+        }
+        let kept = format!("the best of {} is in {}", pluralize(epochs, "epoch", "epochs"), path.display());
+        match stop {
+            StopReason::Interrupted => {
+                let what = unfinished.map_or(String::new(), |what| format!("{what}; "));
+                Err(CliError::interrupted(format_args!("interrupted, {what}{kept}{}", how_to_go_on(path))))
+            }
+            StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// `true` if learning ended before there was a model.
+fn is_empty(error: &PipelineError) -> bool {
+    matches!(
+        error,
+        PipelineError::Sampling(SamplingError::Interrupted)
+            | PipelineError::Training(TrainingError::NothingLearned(_))
+            | PipelineError::Shooting(ShootingError::Training(TrainingError::NothingLearned(_)))
+    )
+}

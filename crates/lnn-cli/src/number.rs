@@ -1,0 +1,224 @@
+//! Values of the command line: numbers with their ranges, choices by name.
+
+use crate::CliError;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use lnn::lagrangian::quantity;
+use lnn::names::unknown;
+use lnn::rollout::Options;
+use lnn::scalar::Scalar;
+use lnn::storage::MOST_THREADS;
+
+/// Precision that a command computes in.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Precision {
+    /// Single, 9 digits.
+    F32,
+    /// Double, 17 digits.
+    F64,
+    /// Double-double, about 32 digits.
+    Dd,
+}
+
+/// A parser of one value of a type by its name; the help says of each what it is.
+pub fn choice<T: Copy + Send + Sync>(
+    all: &'static [T],
+    name: fn(T) -> &'static str,
+    about: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    let values = all.iter().map(|&value| PossibleValue::new(name(value)).help(about(value)));
+    PossibleValuesParser::new(values)
+        .try_map(move |text| all.iter().copied().find(|&x| name(x) == text).ok_or("not named"))
+}
+
+/// A finite decimal number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err("expected a finite number".to_string()),
+    }
+}
+
+/// A finite decimal number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a finite number above 0".to_string())
+}
+
+/// A finite decimal number of at least 0.
+pub fn weight(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "expected a finite number of at least 0".to_string())
+}
+
+/// A parser of numbers from `least` to `most`.
+pub fn number(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let refused = || format!("expected a number from {} to {}", digits(least), digits(most));
+        finite(text).ok().filter(|x| (least..=most).contains(x)).ok_or_else(refused)
+    }
+}
+
+/// A bound, every digit of it.
+fn digits(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
+}
+
+/// A parser of whole numbers from `least` to `most`.
+pub fn whole(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let refused = || format!("expected a whole number from {least} to {most}");
+        text.trim().parse().ok().filter(|n| (least..=most).contains(n)).ok_or_else(refused)
+    }
+}
+
+/// A relative tolerance of an integration in double precision: not finer than rounding, not coarser than 1.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    number(Options::<f64>::least_tolerance(), 1.0)(text)
+}
+
+/// A time in seconds over which a command may work: up to a day.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    const DAY: f64 = 86_400.0;
+    positive(text).ok().filter(|x| *x <= DAY).ok_or_else(|| format!("expected a number above 0, at most {DAY}"))
+}
+
+/// Samples per second of a recording.
+pub fn rate(text: &str) -> Result<f64, String> {
+    number(1e-9, 1e12)(text)
+}
+
+/// A seed: a configuration holds none that is larger.
+pub fn seed(text: &str) -> Result<u64, String> {
+    let refused = || format!("expected a whole number from 0 to {}", i64::MAX);
+    text.trim().parse().ok().filter(|seed| i64::try_from(*seed).is_ok()).ok_or_else(refused)
+}
+
+/// Two finite decimal numbers, the lower first: `LOW:HIGH`.
+pub fn bounds(text: &str) -> Result<(f64, f64), String> {
+    let pair = text.split_once(':').and_then(|(low, high)| Some((finite(low).ok()?, finite(high).ok()?)));
+    pair.filter(|(low, high)| low <= high && (high - low).is_finite())
+        .ok_or_else(|| "expected LOW:HIGH, two finite numbers in order".to_string())
+}
+
+/// A whole number above 0.
+pub fn count(text: &str) -> Result<usize, String> {
+    text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
+}
+
+/// A finite number for each of `names`, separated by commas, read in the precision of `S`; `option` is the option that they are read for.
+///
+/// # Errors
+/// A usage error that says how many were expected of what.
+pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec<S>, CliError> {
+    let numbers: Option<Vec<S>> = text.split(',').map(|x| S::parse(x.trim()).filter(|x| x.is_finite())).collect();
+    let expected = format!("expected {} finite numbers ({})", names.len(), names.join(","));
+    let numbers = numbers.ok_or_else(|| CliError::usage(format_args!("{option}: {expected}, found {text:?}")))?;
+    match numbers.len() {
+        found if found == names.len() => Ok(numbers),
+        found => Err(CliError::usage(format_args!("{option}: {expected}, found {found}"))),
+    }
+}
+
+/// A value for each of `names` from `NAME=VALUE,..` in any order, numbers or formulas of numbers, read in the precision of `S`;
+/// `option` is the option that they are read for.
+///
+/// # Errors
+/// A usage error that names an unknown, repeated or missing name, or a value that is not a finite number.
+pub fn named<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec<S>, CliError> {
+    let refused = |problem: String| CliError::usage(format_args!("{option}: {problem}"));
+    let mut values: Vec<Option<S>> = vec![None; names.len()];
+    for part in outer_parts(text) {
+        let Some((name, value)) = part.split_once('=') else {
+            return Err(refused(format!("expected NAME=VALUE, found {:?}", part.trim())));
+        };
+        let (name, value) = (name.trim(), value.trim());
+        let place = names.iter().position(|known| known == name);
+        let place = place.ok_or_else(|| refused(unknown("coordinate", name, names.iter().map(String::as_str))))?;
+        let number = quantity::<S>(value).map_err(|error| refused(format!("{name}: {error}")))?;
+        if !number.is_finite() {
+            return Err(refused(format!("{name}: expected a finite number, found {value:?}")));
+        }
+        if values[place].replace(number).is_some() {
+            return Err(refused(format!("{name} is given twice")));
+        }
+    }
+    let missing: Vec<&str> =
+        names.iter().zip(&values).filter(|(_, value)| value.is_none()).map(|(name, _)| name.as_str()).collect();
+    if !missing.is_empty() {
+        return Err(refused(format!("expected a value of {}, missing {}", names.join(", "), missing.join(", "))));
+    }
+    Ok(values.into_iter().flatten().collect())
+}
+
+/// The parts of a text between the commas that stand outside of parentheses.
+fn outer_parts(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0_i32;
+    text.split(move |c: char| {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        c == ',' && depth <= 0
+    })
+}
+
+/// A number of threads.
+pub fn thread_count(text: &str) -> Result<usize, String> {
+    whole(1, MOST_THREADS)(text)
+}
+
+/// Number of threads: as asked for, or all there are.
+pub fn threads(asked: Option<usize>) -> usize {
+    let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    asked.unwrap_or_else(all).min(MOST_THREADS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_kept() {
+        assert_eq!(finite("-1.5e3"), Ok(-1500.0));
+        for bad in ["nan", "inf", "1e999", "", "x", "1,5"] {
+            assert!(finite(bad).is_err() && positive(bad).is_err() && count(bad).is_err(), "{bad}");
+        }
+        for bad in ["0", "-1", "-0.0"] {
+            assert!(positive(bad).is_err() && count(bad).is_err(), "{bad}");
+        }
+        assert_eq!((weight("0"), weight("2.5")), (Ok(0.0), Ok(2.5)));
+        assert!(weight("-1").is_err() && weight("nan").is_err());
+        assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
+        assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
+        assert_eq!((tolerance("2e-15"), seed("9223372036854775807")), (Ok(2e-15), Ok(i64::MAX as u64)));
+        assert!(["nan", "0", "-1e-6", "1e-30", "1.1", "1e308"].iter().all(|bad| tolerance(bad).is_err()));
+        assert!(tolerance("1e-30").unwrap_err().contains("2e-15"), "the bound is said");
+        assert_eq!((whole(2, 5)("5"), number(-1.0, 2.5)("-1"), seconds("86400")), (Ok(5), Ok(-1.0), Ok(86_400.0)));
+        assert!(["1", "6", "2.0", "-3", "18446744073709551616"].iter().all(|bad| whole(2, 5)(bad).is_err()));
+        assert!(["-1.1", "2.6", "nan", "inf"].iter().all(|bad| number(-1.0, 2.5)(bad).is_err()));
+        assert!(["0", "86401", "nan"].iter().all(|bad| seconds(bad).is_err()));
+        assert_eq!((thread_count("256"), rate("100")), (Ok(256), Ok(100.0)));
+        assert!(["0", "257", "4294967296"].iter().all(|bad| thread_count(bad).is_err()));
+        assert!(threads(None) >= 1 && threads(Some(7)) == 7);
+        assert!(["-1", "1.5", "", "9223372036854775808"].iter().all(|bad| seed(bad).is_err()));
+        assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
+        for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2", "-1e308:1e308"] {
+            assert!(bounds(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn named_values_are_read_in_any_order() {
+        let names = ["t", "r", "phi"].map(String::from);
+        let read = |text: &str| named::<f64>("--at", text, &names).map_err(|error| error.to_string());
+        assert_eq!(read("phi = pi/2, t=-1,r=max(2,3)").unwrap(), [-1.0, 3.0, std::f64::consts::FRAC_PI_2]);
+        for (bad, parts) in [
+            ("r=1", ["missing", "t, phi"]),
+            ("r=1,t=1,phi=1,r=2", ["r", "twice"]),
+            ("r=1,t=1,ph=1", ["\"ph\"", "\"phi\""]),
+            ("r=1,t=1,phi=1/0", ["phi", "finite"]),
+            ("r=1,t=1,phi=inf", ["phi", "finite"]),
+            ("r=1,t=1,phi=x", ["phi", "\"x\""]),
+            ("r=1,t=1,phi", ["NAME=VALUE", "phi"]),
+            ("", ["NAME=VALUE", "\"\""]),
+        ] {
+            let problem = read(bad).unwrap_err();
+            assert!(parts.iter().all(|part| problem.contains(part)), "{bad}: {problem}");
+        }
+    }
+}

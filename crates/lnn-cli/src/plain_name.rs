@@ -1,0 +1,42 @@
+//! Names that become names of directories.
+
+/// Longest name, in bytes.
+const LONGEST: usize = 100;
+
+/// A plain name: letters, digits, `-`, `_`, `.` and spaces within, the first a letter or digit. What leads elsewhere as a
+/// part of a path, or nowhere, is none.
+///
+/// # Errors
+/// A description of plain names.
+pub fn plain_name(text: &str) -> Result<String, String> {
+    let known = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+    let begins = text.starts_with(char::is_alphanumeric) && !text.ends_with([' ', '.']);
+    if begins && text.len() <= LONGEST && text.chars().all(known) {
+        Ok(text.to_string())
+    } else {
+        Err("expected a plain name: letters, digits, - _ . and spaces within, a letter or digit first".to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lnn::lagrangian::systems;
+
+    #[test]
+    fn plain_names_stay_where_they_are_put() {
+        for good in ["measured", "Arm 2", "x", "m_1-b.3", "Pendel-gedämpft"] {
+            assert_eq!(plain_name(good).as_deref(), Ok(good));
+        }
+        let long = "x".repeat(LONGEST + 1);
+        for bad in ["", " ", ".", "..", "../evil", "a/b", "/tmp/x", "a\\b", ".hidden", "-x", "a\nb", "a.", "c:", &long]
+        {
+            assert!(plain_name(bad).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn systems_have_plain_names() {
+        assert!(systems().len() > 10 && systems().iter().all(|system| plain_name(&system.name).is_ok()));
+    }
+}

@@ -1,0 +1,208 @@
+//! Runs that `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
+
+use crate::differences::differences;
+use crate::folder::Folder;
+use crate::{CliError, Kind, config, output};
+use lnn::storage::{Disk, read_regular};
+use lnn::training::{CheckpointError, LATEST, PREVIOUS, remove_checkpoints, saved};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Command that learns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Learner {
+    /// `lnn train`.
+    Train,
+    /// `lnn fit`.
+    Fit,
+}
+
+impl Learner {
+    /// The command.
+    pub fn verb(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Fit => "fit",
+        }
+    }
+}
+
+/// A directory of a training or a fit.
+enum Found {
+    /// It can continue; the contents of its checkpoint.
+    Unfinished(String),
+    /// It has finished; `config.toml` and `summary.json`.
+    Finished(String, String),
+}
+
+/// The text of an existing run.
+#[derive(Clone, Copy, Debug)]
+pub enum Text<'a> {
+    /// That of its checkpoint.
+    Checkpoint(&'a str),
+    /// Its `config.toml`.
+    Configuration(&'a str),
+}
+
+/// Opens the directory of a run to continue with, and what `read` makes of its text; `None` if there is nothing left to do, which is
+/// said then.
+///
+/// # Errors
+/// A data error if there is no such run, if it ended with an error, if it is of the other kind, or if what is there is damaged; as
+/// of `read`.
+pub fn reopen<T>(
+    directory: &Path,
+    learner: Learner,
+    json: bool,
+    read: impl FnOnce(Text<'_>) -> Result<T, CliError>,
+) -> Result<Option<(Folder, T)>, CliError> {
+    // Looked for before anything is created, and again when no other process can write.
+    find(directory, learner)?;
+    let folder = Folder::open(directory)?;
+    match find(directory, learner)? {
+        Found::Unfinished(text) => Ok(Some((folder, read(Text::Checkpoint(&text))?))),
+        Found::Finished(text, summary) => {
+            read(Text::Configuration(&text))?;
+            let said = format!("{}: this training has finished\n", directory.display());
+            output::print(if json { &summary } else { &said })?;
+            Ok(None)
+        }
+    }
+}
+
+/// `true` if a directory holds a training that can continue.
+pub fn has_checkpoint(directory: &Path) -> bool {
+    [LATEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
+}
+
+/// Looks for a run of this kind to continue with.
+///
+/// # Errors
+/// A data error if there is none, if it ended with an error, if it is of the other kind, or if what is there is damaged.
+fn find(directory: &Path, learner: Learner) -> Result<Found, CliError> {
+    if !directory.is_dir() {
+        return Err(CliError::file(directory, "no such directory"));
+    }
+    let (found, kind) = match saved(&Disk, directory) {
+        Ok(found) => {
+            let kind = kind_of(&found.content.config);
+            (Found::Unfinished(found.content.config), kind)
+        }
+        Err(CheckpointError::Missing) => finished(directory)?,
+        Err(error) => return Err(CliError::file(directory, error)),
+    };
+    if kind != learner {
+        let problem = format!("this is a run of lnn {}, not of lnn {}", kind.verb(), learner.verb());
+        return Err(CliError::file(directory, problem));
+    }
+    Ok(found)
+}
+
+/// Command that wrote the text of a checkpoint: that of a fit has a table of this name.
+fn kind_of(text: &str) -> Learner {
+    let is_fit = text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("fit"));
+    if is_fit { Learner::Fit } else { Learner::Train }
+}
+
+/// The run that left its summary and no checkpoint.
+fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
+    /// The part of `summary.json` that describes the end.
+    #[derive(Deserialize)]
+    struct Summary {
+        ended: String,
+        /// Where recorded motion was learned from.
+        #[serde(default)]
+        targets: Option<String>,
+    }
+    let read = |name: &str| String::from_utf8(read_regular(&directory.join(name), 1 << 26).ok()?).ok();
+    let summary = read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?, json)));
+    match (summary, read("config.toml")) {
+        (Some((Summary { ended, targets }, json)), Some(text)) if ended == "finished" => {
+            Ok((Found::Finished(text, json), if targets.is_some() { Learner::Fit } else { Learner::Train }))
+        }
+        (Some((Summary { ended, .. }, _)), _) if ended != "interrupted" => {
+            Err(CliError::file(directory, format_args!("this training has ended: {ended}")))
+        }
+        _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({LATEST}) to continue from"))),
+    }
+}
+
+/// The contents of the text of a run.
+///
+/// # Errors
+/// A data error naming the file.
+pub fn parse<T: DeserializeOwned>(directory: &Path, name: &str, text: &str) -> Result<T, CliError> {
+    config::parse(text).map_err(|(line, problem)| {
+        CliError::file(&directory.join(name), format_args!("configuration, line {line}: {problem}"))
+    })
+}
+
+/// Refuses to continue with another configuration than that of the directory.
+///
+/// # Errors
+/// A usage error naming what differs.
+pub fn require_same<T: Serialize>(directory: &Path, saved: &T, asked: &T) -> Result<(), CliError> {
+    let text = |config: &T| toml::to_string(config).map_err(CliError::data);
+    match differences(&text(saved)?, &text(asked)?) {
+        none if none.is_empty() => Ok(()),
+        found => Err(CliError::usage(format_args!("--resume {}: {found}", directory.display()))),
+    }
+}
+
+/// The command that continues with the run whose checkpoint is in a directory.
+pub fn command(directory: &Path) -> String {
+    let learner = saved(&Disk, directory).map_or(Learner::Train, |found| kind_of(&found.content.config));
+    let (verb, text) = (learner.verb(), directory.display().to_string());
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
+    if !text.is_empty() && !text.starts_with('-') && text.chars().all(plain) {
+        format!("lnn {verb} --resume {text}")
+    } else {
+        format!("lnn {verb} --resume='{}'", text.replace('\'', r"'\''"))
+    }
+}
+
+/// The end of a message about a run that was stopped.
+pub fn how_to_go_on(directory: &Path) -> String {
+    if has_checkpoint(directory) {
+        format!("; continue with: {}", command(directory))
+    } else {
+        "; there is no checkpoint".to_string()
+    }
+}
+
+/// An error that ended a run which has learned something, such as a full disk: its checkpoint is still there, and the
+/// message says so.
+pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
+    |error| {
+        if error.kind() == Kind::Data && has_checkpoint(directory) {
+            let learned = "the model so far is kept; when the cause is removed";
+            CliError::data(format_args!("{error} ({learned}, continue with: {})", command(directory)))
+        } else {
+            error
+        }
+    }
+}
+
+/// Removes the checkpoints of a training that is over.
+///
+/// # Errors
+/// A data error naming the directory.
+pub fn forget(directory: &Path) -> Result<(), CliError> {
+    let cannot = |e| CliError::file(directory, format_args!("cannot remove checkpoints: {e}"));
+    remove_checkpoints(&Disk, directory).map_err(cannot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_what_a_shell_takes() {
+        let of = |text: &str| command(Path::new(text));
+        assert_eq!(of("runs/double-pendulum"), "lnn train --resume runs/double-pendulum");
+        assert_eq!(of("my runs"), "lnn train --resume='my runs'");
+        assert_eq!(of("-x"), "lnn train --resume='-x'");
+        assert_eq!(of("it's"), r"lnn train --resume='it'\''s'");
+    }
+}

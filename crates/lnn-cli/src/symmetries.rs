@@ -1,0 +1,91 @@
+//! `lnn symmetries`: what a Lagrangian conserves.
+
+use crate::format::TableOrJson;
+use crate::probe::{Bound, Probe, bound, tolerance};
+use crate::source::SystemOrModel;
+use crate::{CliError, number, output};
+use lnn::symmetry::{Degrees, EXACT, MOST_UNKNOWNS, SymmetrySummary, quadratic, quadratic_unknowns, unknowns};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    subject: SystemOrModel,
+    /// Functions that fields are made of, by family and total degree: polynomial, trigonometric, hyperbolic; chosen by the
+    /// coordinates if not given.
+    #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
+    basis: Option<Degrees>,
+    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or the middle of
+    /// those the model was trained on, if not given.
+    #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
+    region: Vec<Bound>,
+    /// States that are examined; two for every unknown coefficient, at least 400 for a system
+    /// and 1000 for a model, if not given.
+    #[arg(long, value_name = "N", value_parser = number::count)]
+    points: Option<usize>,
+    /// Seed of the states.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = number::seed)]
+    seed: u64,
+    /// Singular values up to this one count as zero, 0.1 at most; 1e-8 for a system, the largest gap for a model, if not given.
+    #[arg(long, value_name = "T", value_parser = tolerance)]
+    tolerance: Option<f64>,
+    /// Look for conserved quantities of second degree in the momenta as well.
+    #[arg(long)]
+    quadratic: bool,
+    /// Text, or one JSON object.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
+    format: TableOrJson,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+}
+
+/// Degrees of families of functions.
+///
+/// # Errors
+/// The form that was expected.
+pub fn degrees(text: &str) -> Result<Degrees, String> {
+    text.parse()
+}
+
+/// Finds symmetries and prints them.
+///
+/// # Errors
+/// A usage error for a wrong system or region, a data error for a bad model or terms that are not finite.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let mut probe = args.subject.read(Probe::model, Probe::system)?;
+    probe.narrow(&args.region)?;
+    let (basis, _) = probe.basis(args.basis)?;
+    let n = probe.model.coordinates();
+    let own = unknowns(n, basis.len());
+    // Of quadratic quantities cyclic coordinates leave fewer functions than this.
+    let second = |most: usize| if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(most)) } else { own };
+    let points = probe.points(args.points, probe.enough(second(MOST)), second(MOST_UNKNOWNS))?;
+    announce(own, points, args.quadratic);
+    let (q, v) = probe.states(points, args.seed)?;
+    let tolerance = args.tolerance.or(probe.exact.then_some(EXACT));
+    let model = probe.model.as_ref();
+    let (found, families) = probe.symmetries(args.basis, (&q, &v), args.tolerance)?;
+    let second = match args.quadratic {
+        true => Some(quadratic(model, &found.basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?),
+        false => None,
+    };
+    let found = found.summary(&probe.name, families, args.seed, second);
+    let json = args.json || args.format == TableOrJson::Json;
+    output::print(&output::shown(&found, json, SymmetrySummary::findings)?)
+}
+
+/// Unknown coefficients of quadratic quantities for which states are drawn, at most.
+const MOST: usize = 1300;
+/// Unknown coefficients squared times states from which a search takes some seconds.
+const LONG: f64 = 3e9;
+
+/// Says so before a long search, which is silent.
+fn announce(unknowns: usize, points: usize, quadratic: bool) {
+    if (unknowns as f64).powi(2) * points as f64 > LONG {
+        let more = if quadratic { ", and more for quadratic quantities" } else { "" };
+        output::note(&format!(
+            "{unknowns} unknown coefficients at {points} states{more}: this takes a while; a smaller --basis is faster"
+        ));
+    }
+}

@@ -1,0 +1,76 @@
+//! The system that a command is about: one of the catalogue by its name, or another one by its file.
+
+use crate::{CliError, config, output};
+use lnn::lagrangian::system::System;
+use lnn::lagrangian::{SystemInstance, find, resolve};
+use lnn::network::file::Header;
+use lnn::pipeline::{is_robot, parse_robot, parse_system};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Largest file of a robot that is read, in bytes.
+const MAX_ROBOT: u64 = 1 << 24;
+
+/// `true` if an argument is the file of a system, not a name of the catalogue.
+pub fn is_file(system: &str) -> bool {
+    let path = Path::new(system);
+    is_robot(path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
+}
+
+/// The system of a name, or of a file whose name ends in `.toml`, or in `.urdf` or `.xml` for a robot.
+///
+/// # Errors
+/// A usage error for an unknown name and for a mistake in a file, a data error for a file that cannot be read.
+pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
+    let path = Path::new(system);
+    if is_robot(path) {
+        let (system, notes) = from_robot(path, parse_robot)?;
+        notes.iter().for_each(|note| output::note(&format!("{}: {note}", path.display())));
+        return Ok(Cow::Owned(system));
+    }
+    if is_file(system) {
+        let (name, text) = config::read_text(path)?;
+        let refused = |(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}"));
+        return parse_system(&text).map(Cow::Owned).map_err(refused);
+    }
+    resolve(system).map_err(|error| {
+        let file = if Path::new(system).is_file() {
+            "; a file of a system ends in .toml, of a robot in .urdf or .xml"
+        } else {
+            ""
+        };
+        CliError::usage(format_args!("{error}{file}"))
+    })
+}
+
+/// What is made of the text of a robot's file.
+///
+/// # Errors
+/// A usage error with file and line, a data error for a file that cannot be read.
+pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, String)>) -> Result<T, CliError> {
+    let (name, text) = config::read_text_within(path, MAX_ROBOT)?;
+    make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
+}
+
+/// The system that a model learned, if it is known: of one that was only recorded there is nothing to know.
+///
+/// # Errors
+/// A description that has no system, or a name that the catalogue does not have.
+pub fn learned_system(header: &Header) -> Result<Cow<'static, System>, String> {
+    match &header.description {
+        Some(description) => description.system().map(Cow::Owned).map_err(|error| error.to_string()),
+        None => find(&header.system).map(Cow::Borrowed).map_err(|error| error.to_string()),
+    }
+}
+
+/// Says of a system with impacts that nothing learns them.
+pub fn note_impacts(system: &SystemInstance<f64>) {
+    let events = system.events();
+    let impacts = events.iter().filter(|given| given.event.is_impact()).map(|given| format!("`{}`", given.event.name));
+    let names = impacts.collect::<Vec<_>>().join(", ");
+    if !names.is_empty() {
+        output::note(&format!(
+            "impacts ({names}) are not learned, only the motion between them; cut recordings where one happens"
+        ));
+    }
+}

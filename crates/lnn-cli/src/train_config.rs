@@ -1,0 +1,264 @@
+//! Arguments of `lnn train` and the resulting configuration.
+
+use crate::flags::Flags;
+use crate::layers::{Entry, Layers, Mistake};
+use crate::number::finite;
+use crate::print_config::{PrintFormat, commented, training_reference};
+use crate::run_args::{RunArgs, fill_periods, imply, structure};
+use crate::{CliError, output, source, system_arg};
+use lnn::configuration::Config;
+use lnn::data::SamplingError;
+use lnn::lagrangian::system::System;
+use lnn::lagrangian::{Description, DescriptionError, SystemError, SystemInstance, configure_values, find, resolve};
+use lnn::network::Initialization;
+use lnn::pipeline::{StartModel as Start, all_parameters};
+use lnn::presets::Preset;
+use serde::Deserialize;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A system by name (`lnn systems` lists them), or by the file that describes it, FILE.toml [default: that of the
+    /// configuration or of the model].
+    #[arg(required_unless_present_any = ["config", "resume", "from"])]
+    system: Option<String>,
+    /// A configuration that ships with the program [default: quick].
+    #[arg(long, value_enum, value_name = "NAME")]
+    preset: Option<PresetName>,
+    /// A parameter of the system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
+    param: Vec<(String, String)>,
+    #[command(flatten)]
+    flags: Flags<Config>,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum PresetName {
+    /// A minute on two cores.
+    Quick,
+    /// Wider and longer: five minutes on two cores.
+    Best,
+    /// The paper's budget and choices: hours.
+    Paper,
+}
+
+impl Args {
+    /// The configuration: the preset's or the model's, the file's and the options' over it, every value in range. Beside a
+    /// `saved` one of a checkpoint this is the base where the arguments name no other.
+    ///
+    /// # Errors
+    /// Usage errors naming everything that is wrong, or a data error for a file that cannot be read.
+    pub fn resolve(&self, saved: Option<&Config>) -> Result<(Config, SystemInstance<f64>), CliError> {
+        let mut options = self.flags.entries.clone();
+        for (symbol, text) in &self.param {
+            let value = finite(text).map_or_else(|_| text.as_str().into(), toml::Value::from);
+            options.push(Entry::option(format!("--param {symbol}"), &format!("parameters.{symbol}"), value));
+        }
+        let mut layers = Layers::new(Config::KEYS, self.run.config.as_deref(), options)?;
+        let start = layers.text("from").map(Start::read).transpose()?;
+        let goes_on = saved.filter(|_| self.run.config.is_none() && self.preset.is_none() && start.is_none());
+        let Named { name, description } = self.named(&layers, start.as_ref(), saved)?;
+        if let Some(saved) = goes_on.filter(|saved| saved.system != name) {
+            return Ok((Config { system: name, ..saved.clone() }, self.check(saved)?));
+        }
+        let system = match &description {
+            Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
+            None => resolve(&name).map_err(Unusable::System),
+        };
+        // A system of the catalogue that is formulas itself, such as one under constraints, keeps them with what was learned, and links
+        // are written out.
+        let description = system.as_ref().ok().and_then(|system| system.description().cloned()).or(description);
+        let mut parameters = match (&start, goes_on) {
+            (_, Some(saved)) => saved.parameters.clone(),
+            (Some(start), _) if start.header.system == name => start.header.parameters.clone(),
+            _ => BTreeMap::new(),
+        };
+        parameters.extend(layers.numbers("parameters"));
+        let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
+        // For an unknown system, the other keys are checked with a known one.
+        let usable = match system {
+            Ok(system) => system,
+            Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
+            Err(error) => return Err(CliError::usage(error)),
+        };
+        let configured = if mistakes.is_empty() { &parameters } else { &BTreeMap::new() };
+        let configured = configure_values::<f64>(usable.clone(), configured).or_else(|error| {
+            mistakes.extend(wrong_parameters(&usable, &parameters, &error));
+            configure_values::<f64>(usable.clone(), &BTreeMap::new())
+        });
+        let (system, known) = (configured.map_err(CliError::usage)?, mistakes.is_empty());
+        let base = match goes_on {
+            Some(saved) => saved.clone(),
+            None => self.base(&system, &layers, start.as_ref())?,
+        };
+        let timed = layers.has("network.time_like") || base.network.time_like.is_some();
+        imply(&mut layers, "", timed);
+        let (mut config, wrong) = layers.over(&base)?;
+        (config.system, config.description) = (name, description);
+        fill_periods(&mut config, &layers, "");
+        mistakes.extend(wrong);
+        if known {
+            mistakes.extend(config.sampling_faults(&system).into_iter().map(Mistake::from));
+            mistakes.extend(config.penalty().err().map(|error| match error {
+                SamplingError::Config(fault) => Mistake::from(fault),
+                other => Mistake::new("", other),
+            }));
+        }
+        layers.check(mistakes)?;
+        self.run.finish(&mut config)?;
+        let system = self.check(&config)?;
+        if let Some(start) = &start {
+            let coordinates = system.system.coordinates(system.coordinates);
+            start.require(&config, coordinates.iter().map(|c| c.periodic).collect())?;
+        }
+        Ok((config, system))
+    }
+
+    /// The configuration below all layers: the preset's, in the shape of a model to start from.
+    fn base(&self, system: &SystemInstance<f64>, layers: &Layers, start: Option<&Start>) -> Result<Config, CliError> {
+        let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
+            PresetName::Quick => (Preset::Quick, "quick"),
+            PresetName::Best => (Preset::Best, "best"),
+            PresetName::Paper => (Preset::Paper, "paper"),
+        };
+        let config = match structure(layers, "") {
+            Some(structure) => preset.config_of(system, structure),
+            None => preset.config(system),
+        };
+        let mut config = config.ok_or_else(|| {
+            let name = &system.system.name;
+            CliError::usage(format_args!("--preset {known}: {name} has no such preset, use quick or --config"))
+        })?;
+        config.parameters = all_parameters(system);
+        if layers.has("network.known") {
+            (config.network.alpha, config.network.initialization) = (0.0, Initialization::NearZero);
+        }
+        if let Some(start) = start {
+            start.shape(&mut config);
+        }
+        Ok(config)
+    }
+
+    /// Files that are read.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let system = self.system.as_deref().filter(|system| system_arg::is_file(system)).map(Path::new);
+        self.run.config.iter().map(PathBuf::as_path).chain(system).collect()
+    }
+
+    /// The system that the arguments name; whether there is one of this name is found out later.
+    fn requested(&self) -> Result<Option<Named>, CliError> {
+        let Some(argument) = self.system.as_deref() else { return Ok(None) };
+        if !system_arg::is_file(argument) {
+            return Ok(Some(Named { name: argument.to_string(), description: None }));
+        }
+        let system = system_arg::system(argument)?;
+        let description = system.described.as_ref().map(|described| described.description.clone());
+        Ok(Some(Named { name: system.name.to_string(), description }))
+    }
+
+    /// The configuration's system; every value is in range.
+    ///
+    /// # Errors
+    /// Usage errors naming everything that is wrong.
+    pub fn check(&self, config: &Config) -> Result<SystemInstance<f64>, CliError> {
+        let system = config.system().map_err(CliError::usage)?;
+        CliError::all_usage(config.sampling_faults(&system).into_iter().map(|fault| fault.to_string()))?;
+        Ok(system)
+    }
+
+    /// Prints the configuration or its reference.
+    ///
+    /// # Errors
+    /// As [`Args::resolve`]; standard output that cannot be written.
+    pub fn print(&self, format: PrintFormat) -> Result<(), CliError> {
+        let (config, system) = self.resolve(None)?;
+        if format == PrintFormat::Markdown {
+            return output::print(&training_reference());
+        }
+        let described = crate::systems::parameters(&system.system);
+        let remark = |name: &str| {
+            let [_, default, unit, range] = described.iter().find(|[symbol, ..]| symbol == name)?;
+            let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
+            Some(format!("{range}{unit}; {default} unless set"))
+        };
+        let table = toml::Table::try_from(&config).map_err(CliError::data)?;
+        output::print(&commented(Config::KEYS, &table, &remark))
+    }
+
+    /// The system: the argument's, the file's, the model's or the checkpoint's.
+    fn named(&self, layers: &Layers, start: Option<&Start>, saved: Option<&Config>) -> Result<Named, CliError> {
+        let place = || self.run.config.as_deref().map_or("the configuration".to_string(), crate::input::name);
+        let requested = self.requested()?;
+        let in_file = layers.text("system");
+        // A description that is wrong is one of the mistakes of the file.
+        let written = layers.get("description").and_then(|value| Description::deserialize(value.clone()).ok());
+        let name = match (&requested, in_file) {
+            (Some(requested), Some(found)) if requested.name != found => {
+                return Err(CliError::usage(format_args!("{} is about {found:?}, not {:?}", place(), requested.name)));
+            }
+            (Some(requested), _) => requested.name.clone(),
+            (None, Some(name)) => name.to_string(),
+            (None, None) => {
+                let known = start.map(|start| &start.header.system).or(saved.map(|saved| &saved.system));
+                known.cloned().ok_or_else(|| {
+                    let problem = "system: expected a system, here or as an argument";
+                    CliError::usage(format_args!("{}: {problem}", place()))
+                })?
+            }
+        };
+        let requested = requested.and_then(|requested| requested.description);
+        if let (Some(requested), Some(written)) = (&requested, &written)
+            && requested != written
+        {
+            let file = self.system.as_deref().unwrap_or_default();
+            let problem = format!("{} describes {name} differently from {file}: leave out one of the two", place());
+            return Err(CliError::usage(problem));
+        }
+        let known = start.and_then(|start| start.header.description.clone());
+        let candidates = [written, known, saved.and_then(|saved| saved.description.clone())];
+        let description = requested.or(candidates.into_iter().flatten().find(|description| description.name == name));
+        Ok(Named { name, description })
+    }
+}
+
+/// The requested system, by name or with its description.
+#[derive(Debug)]
+struct Named {
+    name: String,
+    description: Option<Description>,
+}
+
+/// Why there is no system to train on.
+#[derive(Debug, thiserror::Error)]
+enum Unusable {
+    #[error(transparent)]
+    System(SystemError),
+    #[error("description.{0}")]
+    Description(DescriptionError),
+}
+
+impl Unusable {
+    /// The error as a mistake in a configuration.
+    fn mistake(&self) -> Mistake {
+        match self {
+            Self::System(error) => Mistake::new("system", error),
+            Self::Description(error) => Mistake::new(format!("description.{}", error.key), &error.problem),
+        }
+    }
+}
+
+/// Mistakes in the parameters of a system, each of them by itself.
+fn wrong_parameters(system: &System, parameters: &BTreeMap<String, f64>, error: &SystemError) -> Vec<Mistake> {
+    let alone = parameters.iter().filter_map(|(symbol, value)| {
+        let one = BTreeMap::from([(symbol.clone(), *value)]);
+        let problem = configure_values::<f64>(Cow::Owned(system.clone()), &one).err()?;
+        Some(Mistake::new(format!("parameters.{symbol}"), problem))
+    });
+    let found: Vec<Mistake> = alone.collect();
+    if found.is_empty() { vec![Mistake::new("parameters", error)] } else { found }
+}

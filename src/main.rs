@@ -1,6 +1,0 @@
-//! The program `lnn`.
-#![forbid(unsafe_code)]
-
-fn main() -> std::process::ExitCode {
-    lnn::cli::main(std::env::args_os())
-}
