@@ -156,18 +156,19 @@ fn misused(given: &[String]) -> Option<String> {
 
 /// Targets that Cargo knows, by kind, and modules of the test program.
 fn cargo_targets() -> BTreeMap<&'static str, BTreeSet<String>> {
-    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
-    let named = |kind: &str| -> BTreeSet<String> {
+    let manifest = |path: &str| -> toml::Table { read(path).parse().unwrap() };
+    let (library, program) = (manifest("Cargo.toml"), manifest("crates/lnn-cli/Cargo.toml"));
+    let named = |manifest: &toml::Table, kind: &str| -> BTreeSet<String> {
         let entries = manifest[kind].as_array().unwrap().iter();
         entries.map(|entry| entry["name"].as_str().unwrap().to_string()).collect()
     };
     let files = fs::read_dir(root().join("examples")).unwrap().map(|entry| entry.unwrap().path());
     let examples = files.filter(|path| path.extension().is_some_and(|e| e == "rs"));
     let examples = examples.map(|path| path.file_stem().unwrap().to_str().unwrap().to_string()).collect();
-    let features = manifest["features"].as_table().unwrap().keys().cloned().collect();
+    let features = library["features"].as_table().unwrap().keys().cloned().collect();
     BTreeMap::from([
-        ("--bench", named("bench")),
-        ("--test", named("test")),
+        ("--bench", named(&library, "bench")),
+        ("--test", named(&program, "test")),
         ("--example", examples),
         ("--features", features),
     ])

@@ -1,6 +1,6 @@
 //! The crate inside another program: global state, errors, dependencies.
 
-use super::floors::SOURCES;
+use super::floors::LIBRARIES;
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Terms, systems::DoublePendulum};
 use lnn::network::{ModelFile, NetworkLagrangian};
@@ -63,13 +63,13 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-/// Source files of the library, without the program.
+/// Source files below a folder.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         match path.is_dir() {
-            true if !path.ends_with("cli") => sources(&path, found),
-            false if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("main.rs") => found.push(path),
+            true => sources(&path, found),
+            false if path.extension().is_some_and(|e| e == "rs") => found.push(path),
             _ => {}
         }
     }
@@ -78,7 +78,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 #[test]
 fn nothing_is_global() {
     let mut files = Vec::new();
-    SOURCES.iter().for_each(|folder| sources(&root().join(folder), &mut files));
+    LIBRARIES.iter().for_each(|folder| sources(&root().join(folder), &mut files));
     assert!(files.len() > 100);
     let mut found = Vec::new();
     for file in files {
@@ -97,10 +97,21 @@ fn nothing_is_global() {
     assert_eq!(found, [(PathBuf::from("crates/lnn-engine/src/support/storage/files.rs"), expected)]);
 }
 
-/// Crates that a build with these features links.
-fn dependencies(features: &[&str]) -> Vec<String> {
+/// Crates that a build of a package with these features links.
+fn dependencies(package: &str, features: &[&str]) -> Vec<String> {
     let mut command = Command::new(env!("CARGO"));
-    command.args(["tree", "--edges", "normal", "--prefix", "none", "--offline", "--locked", "--manifest-path"]);
+    command.args([
+        "tree",
+        "--package",
+        package,
+        "--edges",
+        "normal",
+        "--prefix",
+        "none",
+        "--offline",
+        "--locked",
+        "--manifest-path",
+    ]);
     let output = command.arg(root().join("Cargo.toml")).args(features).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
@@ -112,14 +123,21 @@ fn dependencies(features: &[&str]) -> Vec<String> {
 
 #[test]
 fn the_library_leaves_the_program_out() {
-    let program = ["clap", "clap_complete", "clap_mangen", "indicatif", "signal-hook", "toml", "tracing-subscriber"];
+    let program = ["clap", "clap_complete", "clap_mangen", "indicatif", "signal-hook", "tracing-subscriber"];
     let learning =
         ["argmin", "faer", "nalgebra", "ode_solvers", "rayon", "safetensors", "serde_json", "tracing", "zip"];
-    let (all, library) = (dependencies(&[]), dependencies(&["--no-default-features"]));
-    for name in program.into_iter().chain(learning) {
-        assert!(all.iter().any(|d| d == name), "the program uses {name}");
-        assert!(!library.iter().any(|d| d == name), "the library does not need {name}");
+    let (all, library, engine) = (
+        dependencies("lnn-cli", &[]),
+        dependencies("lnn", &[]),
+        dependencies("lnn-engine", &["--no-default-features"]),
+    );
+    let has = |found: &[String], name: &str| found.iter().any(|d| d == name);
+    for name in program {
+        assert!(has(&all, name) && !has(&library, name), "the program uses {name}, the library does not");
     }
-    assert!(library.len() <= 20, "{} packages: {library:?}", library.len());
-    assert!(dependencies(&["--no-default-features", "--features", "faer"]).iter().any(|d| d == "faer"));
+    for name in learning {
+        assert!(has(&library, name) && !has(&engine, name), "the library uses {name}, the engine does not");
+    }
+    assert!(engine.len() <= 20, "{} packages: {engine:?}", engine.len());
+    assert!(has(&dependencies("lnn", &["--no-default-features", "--features", "faer"]), "faer"));
 }
