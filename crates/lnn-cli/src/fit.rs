@@ -5,9 +5,9 @@ use crate::fit_config::{Args, Plan, Saved};
 use crate::learn::{Learned, Session, open};
 use crate::print_config::{PrintFormat, commented, fit_reference, training_reference};
 use crate::recording_args::read;
-use crate::resume::{Learner, Text, reopen};
+use crate::resume::{Text, reopen};
 use crate::{CliError, output};
-use lnn::pipeline::{Begin, FitConfig, PipelineError, PreparedFit, fit};
+use lnn::pipeline::{Begin, Command, FitConfig, PipelineError, PreparedFit, fit};
 use lnn::recording::LoadedRecording;
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         None => (Plan::new(args, None)?, None),
         Some(path) => {
             let read = |text: Text<'_>| Plan::new(args, Some(Saved::read(path, text)?));
-            let Some((folder, plan)) = reopen(path, Learner::Fit, args.run.json, read)? else { return Ok(()) };
+            let Some((folder, plan)) = reopen(path, Command::Fit, args.run.json, read)? else { return Ok(()) };
             (plan, Some(folder))
         }
     };

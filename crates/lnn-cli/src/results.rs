@@ -3,7 +3,7 @@
 use crate::CliError;
 use crate::files::{holds_something, same_file};
 use crate::resume::{command, has_checkpoint};
-use lnn::pipeline::{CAPTIONS, LEARNED, PLAY, PipelineError};
+use lnn::pipeline::{CAPTIONS, Command, LEARNED, PLAY, PipelineError, RUN};
 use lnn::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -71,13 +71,11 @@ fn described(directory: &Path) -> Option<String> {
         epochs: Option<u64>,
         #[serde(default)]
         ended: Option<String>,
-        #[serde(default)]
-        targets: Option<String>,
     }
     let read =
         |name: &str| serde_json::from_slice::<Summary>(&read_regular(&directory.join(name), MAX_BYTES).ok()?).ok();
-    if let Some(Summary { system, seed, epochs: Some(epochs), ended, targets }) = read("summary.json") {
-        let what = if targets.is_some() { "fit" } else { "training" };
+    if let Some(Summary { system, seed, epochs: Some(epochs), ended }) = read("summary.json") {
+        let what = if Command::of(directory) == Ok(Command::Fit) { "fit" } else { "training" };
         let ended = if ended.as_deref() == Some("finished") { "a finished" } else { "an ended" };
         return Some(format!("{ended} {what} of {system} (seed {seed}, {epochs} epochs)"));
     }
@@ -136,7 +134,7 @@ pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
             number.is_some_and(|n| n.is_empty() || n.strip_prefix('-').is_some_and(|n| n.parse::<u32>().is_ok()));
         let path = entry.path();
         if numbered && entry.file_type().is_ok_and(|kind| kind.is_dir()) && path.join(EVALUATED[0]).is_file() {
-            remove(&path, &EVALUATED)?;
+            remove(&path, &[&EVALUATED[..], &[RUN]].concat())?;
             // A directory with other contents stays.
             let _ = fs::remove_dir(&path);
         }

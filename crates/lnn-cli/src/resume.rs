@@ -3,30 +3,12 @@
 use crate::differences::differences;
 use crate::folder::Folder;
 use crate::{CliError, Kind, config, output};
+use lnn::pipeline::Command;
 use lnn::storage::{Disk, read_regular};
 use lnn::training::{CheckpointError, LATEST, PREVIOUS, remove_checkpoints, saved};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// Command that learns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Learner {
-    /// `lnn train`.
-    Train,
-    /// `lnn fit`.
-    Fit,
-}
-
-impl Learner {
-    /// The command.
-    pub fn verb(self) -> &'static str {
-        match self {
-            Self::Train => "train",
-            Self::Fit => "fit",
-        }
-    }
-}
 
 /// A directory of a training or a fit.
 enum Found {
@@ -53,14 +35,14 @@ pub enum Text<'a> {
 /// of `read`.
 pub fn reopen<T>(
     directory: &Path,
-    learner: Learner,
+    command: Command,
     json: bool,
     read: impl FnOnce(Text<'_>) -> Result<T, CliError>,
 ) -> Result<Option<(Folder, T)>, CliError> {
     // Looked for before anything is created, and again when no other process can write.
-    find(directory, learner)?;
+    find(directory, command)?;
     let folder = Folder::open(directory)?;
-    match find(directory, learner)? {
+    match find(directory, command)? {
         Found::Unfinished(text) => Ok(Some((folder, read(Text::Checkpoint(&text))?))),
         Found::Finished(text, summary) => {
             read(Text::Configuration(&text))?;
@@ -80,48 +62,36 @@ pub fn has_checkpoint(directory: &Path) -> bool {
 ///
 /// # Errors
 /// A data error if there is none, if it ended with an error, if it is of the other kind, or if what is there is damaged.
-fn find(directory: &Path, learner: Learner) -> Result<Found, CliError> {
+fn find(directory: &Path, command: Command) -> Result<Found, CliError> {
     if !directory.is_dir() {
         return Err(CliError::file(directory, "no such directory"));
     }
-    let (found, kind) = match saved(&Disk, directory) {
-        Ok(found) => {
-            let kind = kind_of(&found.content.config);
-            (Found::Unfinished(found.content.config), kind)
-        }
+    let found = match saved(&Disk, directory) {
+        Ok(found) => Found::Unfinished(found.content.config),
         Err(CheckpointError::Missing) => finished(directory)?,
         Err(error) => return Err(CliError::file(directory, error)),
     };
-    if kind != learner {
-        let problem = format!("this is a run of lnn {}, not of lnn {}", kind.verb(), learner.verb());
-        return Err(CliError::file(directory, problem));
+    match Command::of(directory).map_err(|problem| CliError::file(directory, problem))? {
+        filled if filled == command => Ok(found),
+        other => {
+            let problem = format!("this is a run of lnn {}, not of lnn {}", other.name(), command.name());
+            Err(CliError::file(directory, problem))
+        }
     }
-    Ok(found)
-}
-
-/// Command that wrote the text of a checkpoint: that of a fit has a table of this name.
-fn kind_of(text: &str) -> Learner {
-    let is_fit = text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("fit"));
-    if is_fit { Learner::Fit } else { Learner::Train }
 }
 
 /// The run that left its summary and no checkpoint.
-fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
+fn finished(directory: &Path) -> Result<Found, CliError> {
     /// The part of `summary.json` that describes the end.
     #[derive(Deserialize)]
     struct Summary {
         ended: String,
-        /// Where recorded motion was learned from.
-        #[serde(default)]
-        targets: Option<String>,
     }
     let read = |name: &str| String::from_utf8(read_regular(&directory.join(name), 1 << 26).ok()?).ok();
     let summary = read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?, json)));
     match (summary, read("config.toml")) {
-        (Some((Summary { ended, targets }, json)), Some(text)) if ended == "finished" => {
-            Ok((Found::Finished(text, json), if targets.is_some() { Learner::Fit } else { Learner::Train }))
-        }
-        (Some((Summary { ended, .. }, _)), _) if ended != "interrupted" => {
+        (Some((Summary { ended }, json)), Some(text)) if ended == "finished" => Ok(Found::Finished(text, json)),
+        (Some((Summary { ended }, _)), _) if ended != "interrupted" => {
             Err(CliError::file(directory, format_args!("this training has ended: {ended}")))
         }
         _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({LATEST}) to continue from"))),
@@ -152,8 +122,8 @@ pub fn require_same<T: Serialize>(directory: &Path, saved: &T, asked: &T) -> Res
 
 /// The command that continues with the run whose checkpoint is in a directory.
 pub fn command(directory: &Path) -> String {
-    let learner = saved(&Disk, directory).map_or(Learner::Train, |found| kind_of(&found.content.config));
-    let (verb, text) = (learner.verb(), directory.display().to_string());
+    let verb = Command::of(directory).unwrap_or(Command::Train).name();
+    let text = directory.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
     if !text.is_empty() && !text.starts_with('-') && text.chars().all(plain) {
         format!("lnn {verb} --resume {text}")

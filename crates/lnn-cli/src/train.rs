@@ -1,7 +1,7 @@
 //! `lnn train`: trains a model, tests it, writes the results.
 
 use crate::learn::{Learned, Session, open};
-use crate::resume::{Learner, Text, parse, reopen, require_same};
+use crate::resume::{Text, parse, reopen, require_same};
 use crate::system_arg::note_impacts;
 use crate::train_config::Args;
 use crate::{CliError, output};
@@ -9,7 +9,7 @@ use lnn::configuration::{Config, Penalty, Regularizer};
 use lnn::data::sample_all;
 use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::names::percent;
-use lnn::pipeline::{Begin, train};
+use lnn::pipeline::{Begin, Command, train};
 use lnn::training::LATEST;
 
 /// Trains and writes everything into the output directory; continues with a training that was stopped, if asked to.
@@ -36,7 +36,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
                 require_same(path, &saved, &args.resolve(Some(&saved))?.0)?;
                 Ok(saved)
             };
-            let Some((folder, saved)) = reopen(path, Learner::Train, args.run.json, read)? else { return Ok(()) };
+            let Some((folder, saved)) = reopen(path, Command::Train, args.run.json, read)? else { return Ok(()) };
             let system = args.check(&saved)?;
             (saved, system, folder, Begin::Resume)
         }

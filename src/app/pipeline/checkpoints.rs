@@ -1,8 +1,8 @@
 //! Checkpoints of a pipeline: where they are kept, and whether a training continues from one.
 
-use crate::pipeline::{Event, PipelineError, Watch};
+use crate::pipeline::{Command, Event, PipelineError, RUN, Watch};
 use crate::scalar::Scalar;
-use crate::storage::{Disk, Files};
+use crate::storage::{Disk, Files, write_whole};
 use crate::training::{
     CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Restored, Snapshot, remove_checkpoints,
 };
@@ -74,13 +74,13 @@ impl Checkpoints {
         remove_checkpoints(self.files.as_ref(), &self.directory).map_err(cannot)
     }
 
-    /// The writer of checkpoints, and the checkpoint to continue from, if any, after old ones were removed.
+    /// The writer of checkpoints of a command, and the checkpoint to continue from, if any, after old ones were removed.
     ///
     /// # Errors
-    /// [`PipelineError::Checkpoint`] for one that must be there and is not, or that is of another run.
+    /// [`PipelineError::Output`] if the directory cannot be written, [`PipelineError::Checkpoint`] for one that must be there and is not, or that is of another run.
     pub(crate) fn open<S: Scalar>(
         &self,
-        config: &str,
+        (command, config): (Command, &str),
         data: Vec<(String, u32)>,
         (parameters, states): (usize, usize),
         watch: &Watch,
@@ -105,6 +105,9 @@ impl Checkpoints {
             }
         }
         self.remove()?;
+        let path = self.directory.join(RUN);
+        let cannot = |e| PipelineError::output(&path, format_args!("cannot write: {e}"));
+        write_whole(self.files.as_ref(), &path, command.text()?.as_bytes()).map_err(cannot)?;
         Ok((manager, None))
     }
 }

@@ -8,7 +8,7 @@ use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::report_files::{parameter_table, write_page, write_report_and_figures};
-use crate::pipeline::{Output, PipelineError, headline};
+use crate::pipeline::{Command, Output, PipelineError, headline};
 use crate::report::{Figure, Report, with_unit};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -42,6 +42,7 @@ impl Evaluation {
         let summary =
             Summary { system: &system.system.name, seed, validation_loss: header.validation_loss, evaluation: self };
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
+        Command::Evaluate.sign(output)?;
         output.write("evaluation.json", json.as_bytes())?;
         let title = format!("{}: learned against exact", system.system.title);
         let report = Report::new(&title)

@@ -9,7 +9,7 @@ use crate::pipeline::evaluation::STARTS;
 use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory};
 use crate::pipeline::experiment_report::{Additions, ExperimentReport, Results, conclude};
 use crate::pipeline::train::{RunOptions, train};
-use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch, from_table};
+use crate::pipeline::{Command, Event, Output, PipelineError, RECORD, Watch, from_table};
 use crate::storage::container::text_checksum;
 use crate::storage::in_order;
 use crate::training::{StopReason, TrainingError};
@@ -20,6 +20,11 @@ use std::time::Instant;
 pub trait Experiment: Sync {
     /// Name in lists and messages.
     fn name(&self) -> &str;
+
+    /// Command that performs it.
+    fn command(&self) -> Command {
+        Command::Experiment
+    }
 
     /// Title of its report.
     fn title(&self) -> &str;

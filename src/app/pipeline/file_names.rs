@@ -10,5 +10,7 @@ pub const PLAY: &str = "play.html";
 pub const RECORD: &str = "record.json";
 /// Name of the file with the figures of a run.
 pub const SUMMARY: &str = "summary.json";
+/// Name of the file that names the command of a directory.
+pub const RUN: &str = "run.json";
 /// Files that only trainings and fits write.
 pub const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", SUMMARY];

@@ -21,7 +21,7 @@ use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
-use crate::pipeline::{Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
+use crate::pipeline::{Command, Event, MODEL, Output, PipelineError, Unjudged, Watch, memory};
 use crate::recording::{LoadedRecording, Targets, formula_in};
 use crate::report::with_unit;
 use crate::scalar::Scalar;
@@ -181,6 +181,7 @@ impl<S: Scalar> LearnedFit<S> {
     /// The model first, then what is small; pictures come last: on a full disk nothing that comes after can lose these.
     fn write(&self, output: &dyn Output, toml: &str) -> Result<(), PipelineError> {
         write_model(output, &self.model)?;
+        Command::Fit.sign(output)?;
         output.write("config.toml", toml.as_bytes())?;
         output.write("history.csv", history(&self.trained.history).as_bytes())?;
         self.shot.as_ref().map_or(Ok(()), |shot| output.write("shooting.csv", history(&shot.history).as_bytes()))
@@ -246,7 +247,8 @@ impl<S: Scalar> Start<S> {
         let judges = LossStates { validation: data.validation.clone(), test: data.test.clone() };
         let sizes = (Layout::new(&architecture).parameters, data.training[0].len());
         let opened = options.checkpoints.as_ref();
-        let opened = opened.map(|checkpoints| checkpoints.open::<S>(toml, checksums(measured, &data), sizes, watch));
+        let opened = opened
+            .map(|checkpoints| checkpoints.open::<S>((Command::Fit, toml), checksums(measured, &data), sizes, watch));
         let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
         let shots = restored.clone().filter(Snapshot::is_shooting);
         let start = restored.or_else(|| weights.map(Snapshot::beginning_with));

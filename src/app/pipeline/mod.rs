@@ -79,6 +79,7 @@ mod prediction;
 mod prepared_fit;
 mod report_files;
 mod robot;
+mod run_file;
 mod run_table;
 mod start;
 mod sweep;
@@ -114,12 +115,13 @@ pub use {
     experiment::{Experiment, KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment},
     experiment_directory::{ExperimentDirectory, LockedDirectory},
     experiment_report::{Additions, ExperimentReport, Results},
-    file_names::{CAPTIONS, LEARNED, MODEL, PLAY, RECORD, SUMMARY},
+    file_names::{CAPTIONS, LEARNED, MODEL, PLAY, RECORD, RUN, SUMMARY},
     fit::{fit, usual_force},
     fit_config::unit,
     model::{CONSTRAINTS_UNSUPPORTED, all_parameters},
     prepared_fit::{PreparedFit, shorten},
     robot::is_robot,
+    run_file::Command,
     start::StartModel,
     tables::from_table,
 };

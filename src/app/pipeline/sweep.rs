@@ -3,7 +3,9 @@
 use crate::configuration::Config;
 use crate::experiments::{Choice, sweep_runs};
 use crate::findings::Findings;
-use crate::pipeline::{Experiment, ExperimentDirectory, KeptRecord, PipelineError, Watch, kept_record, run_experiment};
+use crate::pipeline::{
+    Command, Experiment, ExperimentDirectory, KeptRecord, PipelineError, Watch, kept_record, run_experiment,
+};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -14,6 +16,10 @@ pub struct Sweep;
 impl Experiment for Sweep {
     fn name(&self) -> &str {
         "sweep"
+    }
+
+    fn command(&self) -> Command {
+        Command::Sweep
     }
 
     fn title(&self) -> &str {

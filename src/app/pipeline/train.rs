@@ -16,7 +16,7 @@ use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{
     ended, history, parameter_table, training_pictures, write_page, write_report_and_figures,
 };
-use crate::pipeline::{MODEL, Output, PipelineError, SUMMARY, Unjudged, Watch, memory, start};
+use crate::pipeline::{Command, MODEL, Output, PipelineError, SUMMARY, Unjudged, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resume, training_memory};
@@ -210,6 +210,7 @@ fn train_in<S: Scalar>(
     let LearnedRun { trained, model, fresh } = LearnedRun::<S>::new((config, &toml), system, options, watch)?;
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
     write_model(output, &model)?;
+    Command::Train.sign(output)?;
     output.write("config.toml", toml.as_bytes())?;
     output.write("history.csv", history(&trained.history).as_bytes())?;
 
@@ -277,7 +278,8 @@ impl<S: Scalar> LearnedRun<S> {
         let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
         let sizes = (Layout::new(&architecture).parameters, config.data.training);
         let opened = options.checkpoints.as_ref();
-        let opened = opened.map(|checkpoints| checkpoints.open::<S>(toml, data.checksums(), sizes, watch));
+        let opened =
+            opened.map(|checkpoints| checkpoints.open::<S>((Command::Train, toml), data.checksums(), sizes, watch));
         let (manager, restored) = opened.transpose()?.map_or((None, None), |(manager, start)| (Some(manager), start));
         let start = restored.or_else(|| before.map(Snapshot::beginning_with));
         let resumed = ResumeOptions { checkpoints: manager, start };
