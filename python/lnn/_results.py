@@ -964,7 +964,7 @@ class Checked(_Shown):
     formula : str or None
         A formula of the Lagrangian that explains the motion.
     next : str
-        ``"mend"``, ``"record"``, ``"formula"``, ``"fit-constrained"`` or ``"fit"``.
+        ``"mend"``, ``"record"``, ``"first-order"``, ``"formula"``, ``"fit-constrained"`` or ``"fit"``.
     call : str or None
         The call that does it.
     facts : dict

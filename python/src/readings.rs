@@ -24,7 +24,7 @@ pub fn check(py: Python<'_>, motion: Motion) -> PyResult<String> {
         let look = FirstLook::new(&loaded, guessed, &watch.cancellation()).map_err(pipeline)?;
         let mut findings = look.findings();
         let verb = match look.next {
-            NextStep::Mend | NextStep::Record => None,
+            NextStep::Mend | NextStep::Record | NextStep::FirstOrder => None,
             NextStep::Formula => Some("formula"),
             NextStep::Fit | NextStep::FitConstrained => Some("fit"),
         };

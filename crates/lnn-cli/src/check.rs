@@ -50,7 +50,7 @@ fn commands(recording: &RecordingArgs, columns: &Columns, look: &FirstLook) -> V
     let command = |verb: &str, options: &str| format!("lnn {verb}{}{options}", recording.command(columns));
     let friction = if look.has_friction() { " --friction" } else { "" };
     let mut commands = match look.next {
-        NextStep::Mend | NextStep::Record => return Vec::new(),
+        NextStep::Mend | NextStep::Record | NextStep::FirstOrder => return Vec::new(),
         NextStep::Formula => vec![("next:", command("formula", friction))],
         NextStep::FitConstrained => vec![("next:", command("fit", " --constraints find"))],
         NextStep::Fit => vec![("next:", command("fit", ""))],

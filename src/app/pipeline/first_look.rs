@@ -29,6 +29,8 @@ pub enum NextStep {
     Mend,
     /// Record other motion: nothing accelerates.
     Record,
+    /// Fit equations of first order by another tool, or record motion under other forces: the velocities follow from the positions.
+    FirstOrder,
     /// Take the formula that explains the motion, or search on for one if the search ended at its limit of time.
     Formula,
     /// Learn a network under the constraints that hold the motion.
@@ -91,6 +93,7 @@ impl FirstLook {
         let (formula, unfinished) = if search && !held { formula(&some, cancellation)? } else { (None, false) };
         let next = match (&obstacle, &formula) {
             _ if !survey.accelerates => NextStep::Record,
+            _ if survey.first_order.is_some() => NextStep::FirstOrder,
             (Some(_), _) => NextStep::Mend,
             _ if held => NextStep::FitConstrained,
             (None, Some(_)) => NextStep::Formula,
@@ -107,6 +110,9 @@ impl FirstLook {
             _ if self.next == NextStep::Record => {
                 "Nothing accelerates here beyond the noise: this motion does not determine a Lagrangian.".to_string()
             }
+            _ if self.next == NextStep::FirstOrder => {
+                "The velocities follow from the positions and other columns, as in motion of first order, which no Lagrangian describes.".to_string()
+            }
             Some(obstacle) => format!("A fit cannot learn from these data: {obstacle}."),
             None => self.survey.headline(),
         });
@@ -115,7 +121,7 @@ impl FirstLook {
             findings.gap().table(&["column", "taken as", "because"], rows);
         }
         findings.gap().append(self.survey.findings());
-        if self.obstacle.is_none() {
+        if self.obstacle.is_none() && self.next != NextStep::FirstOrder {
             findings.gap().append(self.survey.advice());
         }
         findings.lines(self.laws()).lines(self.survey.warnings.iter().map(|warning| format!("warning: {warning}")));

@@ -295,7 +295,9 @@ fn motion_of_first_order_is_recognised_by_what_drives_it() {
     let file = folder.file("tanks.csv", &text);
     let found = survey(&[&file], &[]);
     assert_eq!(found["first_order"]["from"], serde_json::json!(["u"]), "{found}");
-    assert_eq!(found["warnings"].as_array().unwrap().len(), 1);
+    assert_eq!((found["warnings"].as_array().unwrap().len(), &found["next"]), (1, &"first-order".into()));
+    let said = check(&[&file], &[]);
+    assert!(!said.stdout.contains("next:"), "{}", said.stdout);
     // Another file without that column is read all the same.
     let other = folder
         .file("other.csv", text.lines().map(|line| line.rsplit_once(',').unwrap().0).collect::<Vec<_>>().join("\n"));
