@@ -16,10 +16,13 @@ use tempfile::TempDir;
 /// Header of the states of a double pendulum.
 pub const HEADER: &str = "theta1,theta2,theta1_dot,theta2_dot\n";
 
-/// The program with its arguments and without a filter of the log.
+/// The top of the repository.
+const TOP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// The program with its arguments at the top of the repository, without a filter of the log.
 pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
-    command.args(arguments).env_remove("LNN_LOG");
+    command.args(arguments).current_dir(TOP).env_remove("LNN_LOG");
     command
 }
 
