@@ -29,6 +29,27 @@ fn pendulum(pairs: &[(&str, f64)]) -> SystemInstance<f64> {
     described(text, pairs)
 }
 
+/// A charged particle in the field of a wiggler.
+fn wiggler(field: f64, wave_number: f64) -> SystemInstance<f64> {
+    let text = r#"{"name": "wiggler", "lagrangian": "(x_dot^2 + z_dot^2)/2 - (B/k)*sin(k*z)*x_dot",
+        "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-2, 2]},
+            {"name": "z", "bounds": [0, 30], "velocity_bounds": [0, 3]}],
+        "parameters": {"B": 1.2, "k": {"default": 2, "learn": true, "range": "positive"}}}"#;
+    described(text, &[("B", field), ("k", wave_number)])
+}
+
+#[test]
+fn a_wave_number_is_found_although_smoothing_leaves_out_the_ends() {
+    // The noise of z asks for wide windows of smoothing: little is left over which the derivative by k could grow.
+    for (seed, wave_number) in [(0, 1.7), (1, 2.3), (2, 1.8), (3, 2.4)] {
+        let recording = recorded(&wiggler(1.2, 2.0), &[&[0.1, 0.0, 0.0, 1.0]], (25.0, 0.05), &[2e-3, 6.5e-2], seed);
+        let options = IdentifyOptions { constants: ["B", "k"].map(String::from).to_vec(), ..Default::default() };
+        let found = identify(&wiggler(1.4, wave_number), &recording, &options).unwrap();
+        let off = off(&found, &[("B", 1.2), ("k", 2.0)]);
+        assert!(found.converged && off.iter().all(|off| off.abs() < 4.5), "{seed}: {found:?}");
+    }
+}
+
 #[test]
 fn a_strong_friction_is_found_from_a_weak_one() {
     let mut squares = Vec::new();

@@ -6,7 +6,6 @@ use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
 use super::follow::{Follower, LANES, forces};
 use super::linear::Products;
 use super::solve::{Normal, Problem};
-use crate::recording::rms;
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
 
@@ -97,17 +96,6 @@ impl States {
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
-    ) {
-        self.batches_at(problem, x, |at| self.place(problem, at), visit);
-    }
-
-    /// The same with states at other times.
-    fn batches_at(
-        &self,
-        problem: &Problem<'_>,
-        x: &[f64],
-        place: impl Fn(usize) -> (usize, f64),
         mut visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
         let n = problem.course.equations.n;
@@ -119,7 +107,7 @@ impl States {
             let range = first..(first + LANES * n).min(self.q.len());
             let a = &mut a[..range.len()];
             let state = (&self.q[range.clone()], &self.v[range.clone()]);
-            follower.at((first / n..range.end / n).map(&place));
+            follower.at((first / n..range.end / n).map(|at| self.place(problem, at)));
             follower.accelerate(&values, state, &self.force[range.clone()], a);
             visit(&mut follower, range, a);
         }
@@ -269,11 +257,14 @@ impl States {
     }
 }
 
-/// Growth of a derivative from the first to the last third of the time from which a constant is one of a phase, such as a frequency.
-const GROWS: f64 = 2.5;
-/// Part of the given value of such a constant on either side of it that is searched, and most values that are tried on either side.
+/// Part of the given value of a constant of a phase on either side of it that is searched, and most values that are tried on either side.
 const SEARCHED: f64 = 0.5;
 const TRIED: usize = 40;
+/// Smallest cosine of the angle between the derivatives by a constant before and after a small change: a phase has turned by 0.6 to 1.1 rad at
+/// the end of the recording (`lnn-studies rates --part machines`).
+const ALIKE: f64 = 0.7;
+/// Most halvings of a change until it is small.
+const HALVINGS: i32 = 20;
 /// Shortest part of a recording that is searched first, and values that are tried on either side after it doubled.
 const SHORTEST: f64 = 1.0 / 16.0;
 const DOUBLED: usize = 3;
@@ -287,18 +278,24 @@ impl States {
         let given = x.clone();
         let mut best = self.fit(problem, x, Met::Accelerations)?;
         let mut cut = Vec::new();
-        for (k, step) in self.phase_steps(problem, &given) {
-            let reach = if given[k] == 0.0 { TRIED as f64 * step } else { SEARCHED * given[k].abs() };
-            let mut share = (TRIED as f64 * step / reach).clamp(SHORTEST, 1.0);
-            let mut count = ((reach * share / step) as usize).min(TRIED);
-            if (count + 1) as f64 * step < reach * share {
-                let widest = count as f64 * step / share;
+        for k in 0..problem.chosen.len() {
+            let Some(whole) = self.phase_step(problem, (&given, k)) else { continue };
+            let reach = if given[k] == 0.0 { TRIED as f64 * whole } else { SEARCHED * given[k].abs() };
+            let mut share = 1.0;
+            let mut step = whole;
+            while TRIED as f64 * step < reach && share > SHORTEST {
+                share /= 2.0;
+                step = self.beginning(problem, share).phase_step(problem, (&given, k)).unwrap_or(reach);
+            }
+            let mut count = ((reach / step).ceil() as usize).min(TRIED);
+            if count as f64 * step < reach {
+                let widest = count as f64 * step;
                 cut.push((k, [given[k] - widest, given[k] + widest]));
             }
             let mut from = given.clone();
             loop {
                 let part = (share < 1.0).then(|| self.beginning(problem, share));
-                let found = part.as_ref().unwrap_or(self).nearest(problem, (&from, k), step / share, count);
+                let found = part.as_ref().unwrap_or(self).nearest(problem, (&from, k), step, count);
                 let Some((tried, found)) = found else { break };
                 if share == 1.0 {
                     if found.square < best.square {
@@ -307,6 +304,7 @@ impl States {
                     break;
                 }
                 (from, share, count) = (tried, (2.0 * share).min(1.0), DOUBLED);
+                step = (step / 2.0).max(whole);
             }
         }
         Some(cut)
@@ -361,44 +359,30 @@ impl States {
         times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)])
     }
 
-    /// Constants whose effect grows with time, each with the change that turns the phase of the forces by about half a radian at the end of the
-    /// recording.
-    fn phase_steps(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<(usize, f64)> {
-        let (n, m) = (problem.course.equations.n, problem.chosen.len());
-        let [low, high] = self.span(problem);
-        let third = (high - low) / 3.0;
-        let (mut sums, mut counts) = ([vec![0.0; m], vec![0.0; m]], [0.0; 2]);
-        self.residuals(problem, x, Met::Accelerations, |first, _, slopes| {
-            for (row, slopes) in slopes.chunks_exact(m.max(1)).enumerate() {
-                let since = self.place(problem, (first + row) / n).1 - low;
-                let part = if since < third { 0 } else { 1 };
-                if since < third || since > 2.0 * third {
-                    sums[part].iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += slope * slope);
-                    counts[part] += 1.0;
-                }
-            }
-        });
-        let size = |part: usize, k: usize| (sums[part][k] / f64::max(counts[part], 1.0)).sqrt();
-        let grow: Vec<usize> = (0..m).filter(|&k| size(1, k) > GROWS * size(0, k)).collect();
-        if grow.is_empty() {
-            return Vec::new();
-        }
-        // What the forces do, between one time and others if they depend on it.
-        let mut all = vec![0.0; self.q.len()];
-        self.batches(problem, x, |_, range, a| all[range].copy_from_slice(a));
-        if problem.course.equations.known > 0 {
-            self.batches_at(
-                problem,
-                x,
-                |at| (self.places[at].0, low),
-                |_, range, a| {
-                    all[range].iter_mut().zip(a).for_each(|(moved, still)| *moved -= still);
-                },
-            );
-        }
-        let effect = rms(all.into_iter().filter(|x| x.is_finite()));
-        let steps = grow.into_iter().map(|k| (k, 0.5 * effect / size(1, k)));
-        steps.filter(|(_, step)| step.is_finite() && *step > 0.0).collect()
+    /// Largest change of a constant, of the range that is searched and its halves, that leaves the derivatives of the accelerations by it almost
+    /// parallel. `None` for the whole range: the constant, such as a stiffness, is none of a phase. No growth of the derivatives is looked for,
+    /// since smoothing leaves out the beginning of a recording.
+    fn phase_step(&self, problem: &Problem<'_>, (x, k): (&[f64], usize)) -> Option<f64> {
+        let m = problem.chosen.len();
+        let derivatives = |change: f64| {
+            let (mut moved, mut found) = (x.to_vec(), Vec::new());
+            moved[k] += change;
+            self.residuals(problem, &moved, Met::Accelerations, |first, _, slopes| {
+                let rows = slopes.chunks_exact(m).zip(&self.weight[first..]);
+                found.extend(rows.map(|(row, weight)| weight * row[k]));
+            });
+            found
+        };
+        let here = derivatives(0.0);
+        let alike = |change: &f64| {
+            let there = derivatives(*change);
+            let pairs = here.iter().zip(&there).filter(|(a, b)| a.is_finite() && b.is_finite());
+            let [ab, aa, bb] = pairs.fold([0.0; 3], |[ab, aa, bb], (a, b)| [ab + a * b, aa + a * a, bb + b * b]);
+            ab >= ALIKE * (aa * bb).sqrt()
+        };
+        let range = if x[k] == 0.0 { 1.0 } else { SEARCHED * x[k].abs() };
+        let step = (0..HALVINGS).map(|halvings| range * 0.5f64.powi(halvings)).find(alike)?;
+        (step < range).then_some(step)
     }
 }
 
