@@ -38,7 +38,7 @@ struct Machine {
     start: (&'static [f64], &'static [f64]),
     /// Inputs at a time and a state, held between the samples; a draw of eight numbers from 0 to 1 makes each recording another one.
     inputs: Inputs,
-    /// What is measured at a state; empty for the positions.
+    /// What is measured at a state, in the order of the names; empty for the positions.
     reads: fn(&[f64], &[f64]) -> Vec<f64>,
     step: f64,
     samples: usize,
@@ -335,7 +335,7 @@ const STAR: Machine = Machine {
         let ((x, y), (sin_i, cos_i), (sin_node, cos_node)) =
             ((q[0] * q[1].cos(), q[0] * q[1].sin()), 0.9f64.sin_cos(), 0.3f64.sin_cos());
         let towards = v[0] * q[1].sin() + q[0] * v[1] * q[1].cos();
-        vec![x * cos_node - y * sin_node * cos_i, x * sin_node + y * cos_node * cos_i, towards * sin_i]
+        vec![x * sin_node + y * cos_node * cos_i, x * cos_node - y * sin_node * cos_i, towards * sin_i]
     },
     step: 0.02,
     samples: 200,
@@ -477,4 +477,18 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
         rates.push(machine.judged(seeds.div_ceil(5), false)?.explained(machine.without, 0.0..=0.05));
     }
     Ok(rates)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_are_those_of_the_system_file() {
+        let (q, v) = ([0.8, 0.7], [0.4, 5.0]);
+        let formulas = STAR.system(true, &[]).unwrap().measure((&q, &v, &[0.0; 2]), &[0.0]);
+        let readings = (STAR.reads)(&q, &v);
+        let apart = formulas.iter().zip(&readings).map(|(formula, reading)| (formula - reading).abs());
+        assert!(formulas.len() == readings.len() && apart.fold(0.0, f64::max) < 1e-12, "{formulas:?} {readings:?}");
+    }
 }
