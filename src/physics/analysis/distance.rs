@@ -7,10 +7,9 @@
 //! e(t) = sqrt( mean over i of ((p_i(t) - q_i(t)) / s_i)^2 )
 //! ```
 //!
-//! Differences of angles are taken modulo `2 pi`. The prediction is valid until `e` first exceeds [`VALID`]; the time counts
-//! to the distance of the samples. In Lyapunov times it says by how many factors of `e = 2.718..` the error has grown till
-//! then, whatever the pace of the motion; after Pathak et al., Phys. Rev. Lett. 120, 024102 (2018), who take one norm over
-//! all components.
+//! Differences of angles are taken modulo `2 pi`. The prediction is valid until `e` first exceeds [`VALID`]; the time is resolved to the
+//! spacing of the samples. In Lyapunov times it counts the factors of `e = 2.718..` by which the error has grown until then, whatever the
+//! pace of the motion; after Pathak et al., Phys. Rev. Lett. 120, 024102 (2018), who take one norm over all components.
 
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
@@ -39,7 +38,7 @@ pub struct ValidTimes {
     pub at_least: bool,
     /// Starts.
     pub starts: usize,
-    /// Median of the times in Lyapunov times of each start; none unless the exact motion is known to be chaotic.
+    /// Median over the starts, each in its own Lyapunov time; none unless the exact motion is known to be chaotic.
     pub lyapunov_times: Option<f64>,
     /// `true` if the true one is longer.
     pub lyapunov_at_least: bool,
@@ -47,8 +46,8 @@ pub struct ValidTimes {
     pub chaotic: usize,
 }
 
-/// Root mean square distance of each of `periodic.len()` coordinates from its mean over samples `(samples, n)`; of an angle on
-/// the circle, where it is at most `pi / sqrt 3` for one that goes round evenly. `NaN` without a finite sample.
+/// Root mean square distance of each of `periodic.len()` coordinates from its mean over samples `(samples, n)`. For an angle it is taken on
+/// the circle, and an angle that goes round evenly has at most `pi / sqrt 3`. `NaN` without a finite sample.
 pub fn spread(samples: &[f64], periodic: &[bool]) -> Vec<f64> {
     let n = periodic.len();
     let column = |i: usize| samples.iter().skip(i).step_by(n.max(1)).copied().filter(|x| x.is_finite());
@@ -85,8 +84,8 @@ pub fn relative_error(exact: &[f64], predicted: &[f64], periodic: &[bool], sprea
     if count == 0 { f64::NAN } else { (sum / f64::from(count)).sqrt() }
 }
 
-/// Time for which a prediction with these errors was valid. `complete` if the prediction did not give up: then the true motion ends
-/// with the last sample, and what comes after is not known.
+/// Time for which a prediction with these errors was valid. `complete` says that the prediction did not give up: the true motion then ends
+/// with the last sample, and the time after it is unknown.
 pub fn valid_time(times: &[f64], errors: impl IntoIterator<Item = f64>, complete: bool) -> ValidTime {
     let mut wrong = times.iter().zip(errors).filter(|(_, error)| error.is_nan() || *error > VALID);
     match wrong.next() {
@@ -96,7 +95,7 @@ pub fn valid_time(times: &[f64], errors: impl IntoIterator<Item = f64>, complete
 }
 
 impl ValidTimes {
-    /// Over starts, each with the Lyapunov time of its exact motion if that is chaotic; `None` without starts.
+    /// Medians over starts, each with the Lyapunov time of its exact motion if that is chaotic; `None` without starts.
     pub fn of(starts: &[(ValidTime, Option<f64>)]) -> Option<Self> {
         let all = median(starts.iter().map(|(valid, _)| *valid).collect())?;
         let scaled = |(valid, lyapunov): &(ValidTime, Option<f64>)| {
@@ -117,7 +116,7 @@ impl ValidTimes {
     }
 }
 
-/// The median; a lower bound if one of the times up to it is.
+/// The median, which is a lower bound if one of the times up to it is.
 fn median(mut times: Vec<ValidTime>) -> Option<ValidTime> {
     times.sort_by(|a, b| a.time.total_cmp(&b.time));
     let (low, high) = (times.len().checked_sub(1)? / 2, times.len() / 2);
@@ -227,7 +226,7 @@ mod tests {
         assert_eq!(valid([0.0, VALID, 0.41, 0.1], true), ValidTime { time: 1.0, at_least: false });
         assert_eq!(valid([0.0, f64::NAN, 0.0, 0.0], true), ValidTime { time: 0.5, at_least: false });
         assert_eq!(valid([0.0, 0.1, 0.2, 0.3], true), ValidTime { time: 1.5, at_least: true });
-        // One that gave up is valid no longer.
+        // A prediction that gave up stays invalid.
         assert_eq!(valid([0.0, 0.1, 0.2, 0.3], false), ValidTime { time: 1.5, at_least: false });
         // An error that grows as e^t from 1e-4 is valid for ln 4000 Lyapunov times.
         let times: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();

@@ -1,5 +1,5 @@
-//! Errors of the energy of a trajectory and of what else the exact motion conserves; the steady loss of energy in recorded
-//! motion, the mark of friction.
+//! Errors of the energy and of other quantities that the exact motion conserves; the steady loss of energy in recorded motion, the mark of
+//! friction.
 
 use super::{Statistics, statistics};
 use crate::data::Split;
@@ -26,7 +26,7 @@ impl EnergyError {
     }
 }
 
-/// The energy of the exact system along any trajectory, a learned one above all: `|E(t) - E(0)| / max(|E(0)|, scale)`.
+/// Error of the exact system's energy along any trajectory, above all a learned one: `|E(t) - E(0)| / max(|E(0)|, scale)`.
 ///
 /// `scale`, in units of energy, keeps the quotient meaningful where `E(0)` is near 0; a natural choice is the kinetic
 /// energy of a typical state.
@@ -34,8 +34,8 @@ pub fn energy_error<S: Scalar>(exact: &dyn EulerLagrange<S>, trajectory: &Trajec
     normalised(trajectory, &trajectory.energy_by(exact), scale)
 }
 
-/// The same with the energies stored in the trajectory, those of the model that moved: how well the integration keeps
-/// the learned energy. Empty if none are stored.
+/// As [`energy_error`], with the energies stored in the trajectory, those of the model that moved: how well the integration conserves the
+/// learned energy. Empty if none are stored.
 pub fn energy_drift<S: Scalar>(trajectory: &Trajectory<S>, scale: S) -> EnergyError {
     normalised(trajectory, trajectory.energy.as_deref().unwrap_or_default(), scale)
 }
@@ -56,10 +56,10 @@ pub(crate) fn conserved_change(first: &[f64], vector: &[f64]) -> f64 {
     distance(vector, first) / distance(first, &vec![0.0; first.len()])
 }
 
-/// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's conserved vector along
-/// any trajectory, one value per sample; `None` for a system without one or a trajectory of another number of coordinates.
+/// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's conserved vector along any trajectory, one value per sample; `None` for a
+/// system without one, or if the trajectory has another number of coordinates.
 ///
-/// `NaN` where `C(0)` vanishes and so does the difference.
+/// `NaN` where both `C(0)` and the difference vanish.
 pub fn conserved_error<S: Scalar>(system: &SystemInstance<S>, trajectory: &Trajectory<S>) -> Option<Vec<f64>> {
     system.system.conserved?;
     let vectors: Option<Vec<Vec<f64>>> = (0..trajectory.len())
@@ -98,11 +98,11 @@ impl EnergyLoss {
 
 /// Stretches that trajectories are cut into, at least about.
 const STRETCHES: usize = 20;
-/// Samples of a stretch at which the energy is examined, at most.
+/// Largest number of samples of a stretch at which the energy is examined.
 const SAMPLES: usize = 64;
 
-/// Energy lost along the estimated states of recorded motion, work of known forces taken out: the slope of straight lines
-/// through `E - work` over stretches of the trajectories. `None` where the model gives no energy.
+/// Energy lost along the estimated states of recorded motion, with the work of known forces subtracted: the slope of straight lines through
+/// `E - work` over stretches of the trajectories. `None` if the model gives no energy.
 pub fn energy_loss(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<EnergyLoss> {
     let n = model.coordinates();
     let pieces = STRETCHES.div_ceil(part.states.len().max(1)).max(1);
@@ -213,7 +213,7 @@ mod tests {
                 let error = conserved_error(&system, &trajectory).unwrap();
                 assert_eq!(error.len(), trajectory.len());
                 assert!(error.iter().all(|&e| e < 1e-9), "{}: {error:?}", system.system.name);
-                // One velocity more at one time: the vector is not the same any more.
+                // One velocity more at one time: the vector changes.
                 let last = trajectory.v.len() - n;
                 trajectory.v[last..].iter_mut().for_each(|v| *v *= 1.5);
                 let error = conserved_error(&system, &trajectory).unwrap();

@@ -37,7 +37,7 @@ pub struct Grid {
     pub x: Vec<f64>,
     /// Values of the second axis.
     pub y: Vec<f64>,
-    /// `(y.len(), x.len())`; `NaN` where the model gives none.
+    /// Values, `(y.len(), x.len())`; `NaN` where the model has none.
     pub values: Vec<f64>,
 }
 
@@ -61,8 +61,8 @@ impl Grid {
         Some(Self { values, ..self.clone() })
     }
 
-    /// Where the values have not the sign of `exact`, value by value; one that is not finite has no sign. `None` at a
-    /// point where `exact` is 0 or not finite; `None` altogether if the sizes differ.
+    /// Whether each value has another sign than that of `exact`; a value that is not finite has no sign. `None` at a point where `exact` is
+    /// 0 or not finite; `None` altogether if the sizes differ.
     pub fn wrong_signs(&self, exact: &Self) -> Option<Vec<Option<bool>>> {
         if self.x.len() != exact.x.len() || self.y.len() != exact.y.len() {
             return None;
@@ -170,7 +170,7 @@ fn evaluate<S: Scalar>(
             q.extend(full[..n].iter().map(|&z| S::of_f64(z)));
             v.extend(full[n..].iter().map(|&z| S::of_f64(z)));
         }
-        // Rows that fail are `NaN` or missing; the others are right whatever the result says.
+        // Rows that fail are `NaN` or missing; the others are right whatever the call returns.
         let _ = model.terms(&q, &v, request, &mut terms);
         values.extend((0..x.len()).map(|row| value(&terms, row).filter(|z| z.is_finite()).unwrap_or(f64::NAN)));
     }
@@ -182,9 +182,9 @@ fn evaluate<S: Scalar>(
 pub struct Spread {
     /// Median.
     pub median: f64,
-    /// One value in a hundred is below.
+    /// One value in a hundred is lower.
     pub low: f64,
-    /// One value in a hundred is above.
+    /// One value in a hundred is higher.
     pub high: f64,
     /// Points with a finite value.
     pub points: usize,
@@ -193,7 +193,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of the finite ones among these values.
+    /// The range of the finite values among these.
     pub fn of(values: &[f64]) -> Self {
         let mut finite: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
         finite.sort_by(f64::total_cmp);
@@ -202,7 +202,7 @@ impl Spread {
     }
 }
 
-/// `true` if `L` is a quadratic form of the velocity, that of geodesics: then it is the energy, at the states `(states, n)`.
+/// `true` if `L` is a quadratic form of the velocity, as for geodesics, so that it equals the energy at the states `(states, n)`.
 pub(crate) fn is_metric(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> bool {
     let mut terms = Terms::default();
     if q.is_empty() || model.terms(q, v, Request::LAGRANGIAN | Request::ENERGY, &mut terms).is_err() {
@@ -211,7 +211,7 @@ pub(crate) fn is_metric(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) ->
     terms.lagrangian.iter().zip(&terms.energy).all(|(l, e)| (l - e).abs() <= 1e-9 * (l.abs() + e.abs()))
 }
 
-/// Points whose geometry is computed at once, at most.
+/// Largest number of points whose geometry is computed at once.
 const CHUNK: usize = 64;
 
 /// Curvature scalar `R` of the mass matrix at rest, as a metric, at points `(points, n)`; `NaN` where there is none.
@@ -270,11 +270,11 @@ fn component(n: usize, matrices: &[f64], [i, j]: [usize; 2]) -> Vec<f64> {
 pub struct MetricComponent {
     /// Indices of the component, the first not above the second.
     pub indices: [usize; 2],
-    /// Of the learned component.
+    /// Range of the learned component.
     pub learned: f64,
-    /// Of the exact one, if there is one.
+    /// Range of the exact component, if there is one.
     pub exact: Option<f64>,
-    /// Of the difference, if there is one.
+    /// Range of the difference, if there is an exact component.
     pub error: Option<f64>,
 }
 

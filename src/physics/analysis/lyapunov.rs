@@ -5,19 +5,18 @@ use crate::linalg::{Workspace, dot, eigh, inertia, inverse};
 use crate::rollout::{Integrable, Options, RolloutError, rollout};
 use serde::{Deserialize, Serialize};
 
-/// Logarithm of the factor by which neighbours part, below which a motion of at most 50 units of time is regular: its
-/// Lyapunov time is then above a fifth of the time span. Those of regular motions part in proportion to time, by a factor of
-/// some 50 in 50 s.
+/// Logarithm of the growth of a separation, below which a motion of at most 50 units of time is regular: its Lyapunov time is then above a
+/// fifth of the time span. Separations of regular motions grow in proportion to time, by a factor of some 50 in 50 s.
 pub const REGULAR: f64 = 5.0;
 /// Largest distance of neighbours in the numbers of the chart, over that at the start: more would leave the linear range.
 const WIDEST: f64 = 1e4;
-/// Time beyond which that factor counts relative to what it is there.
+/// Time beyond which that factor is allowed to grow in proportion to time.
 const LONG: f64 = 50.0;
 
 /// Rate at which neighbouring motions part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lyapunov {
-    /// Finite-time largest exponent, per unit of time; near 0 or below for regular motion.
+    /// Largest finite-time exponent, per unit of time; near 0 or below for regular motion.
     pub exponent: f64,
     /// Time over which it was taken.
     pub time: f64,
@@ -29,7 +28,7 @@ impl Lyapunov {
         if self.exponent > 0.0 { 1.0 / self.exponent } else { f64::INFINITY }
     }
 
-    /// `true` if neighbouring motions part faster than those of regular motion do.
+    /// `true` if neighbouring motions separate faster than for regular motion.
     pub fn is_chaotic(&self) -> bool {
         self.exponent * self.time >= REGULAR + (self.time / LONG).ln().max(0.0)
     }
@@ -37,11 +36,12 @@ impl Lyapunov {
 
 /// Largest finite-time Lyapunov exponent of the motion from `(q, v)` by two nearby trajectories.
 ///
-/// The neighbour starts at the relative distance `sqrt(eps)` and is pulled back to it after every `options.dt`
-/// (Benettin et al. 1980); the exponent is the mean of the logarithms of the growth per time. The separation is measured by geometry and not by
-/// the chart: of a neighbour at `dq` its square is `|dq|^2 + |Dv|^2` by the mass matrix, with `Dv = dv + G(v, dq)` the covariant
-/// change of the velocity, so that a great circle is as regular by angles as by any other coordinates. A mass matrix that is not positive definite
-/// is taken as by an observer of velocity `v`, or else by the magnitudes of its eigenvalues. Regular motion gives about `ln(t) / t`, not 0.
+/// The neighbour starts at the relative distance `sqrt(eps)` and is pulled back to it after every `options.dt` (Benettin et al. 1980); the
+/// exponent is the mean of the logarithms of the growth per time. The separation is measured geometrically, independently of the chart: for
+/// a neighbour at `dq` its square is `|dq|^2 + |Dv|^2` in the mass matrix, with `Dv = dv + G(v, dq)` the covariant change of the velocity,
+/// so that a great circle is as regular in angles as in any other coordinates. A mass matrix that is not positive definite is replaced by
+/// the lengths for an observer of velocity `v`, or else by the magnitudes of its eigenvalues. Regular motion gives about `ln(t) / t`, not
+/// 0.
 ///
 /// # Errors
 /// The error of the roll-out that fails first.
@@ -65,7 +65,7 @@ pub fn lyapunov<S: Integrable>(
     offset.iter_mut().for_each(|x| *x *= distance / norm);
 
     let mut growth = 0.0;
-    // Separations keep this size, as long as their coordinates do not become too large where those of the chart change fast.
+    // Separations keep this size, unless their coordinates would become too large where lengths change fast with the chart.
     let unit = Separation::new(model, &flat(0)).size(&offset);
     let mut before = unit;
     for k in 0..main.len().saturating_sub(1) {
@@ -108,7 +108,8 @@ struct Separation {
 }
 
 impl Separation {
-    /// At a state of coordinates and velocities, `(2 n)`. Where the terms of the model are not finite lengths are those of the coordinates.
+    /// At a state of coordinates and velocities, `(2 n)`. Where the terms of the model are not finite, lengths are those of the
+    /// coordinates.
     fn new<S: Integrable>(model: &dyn EulerLagrange<S>, state: &[f64]) -> Self {
         let (n, v) = (state.len() / 2, &state[state.len() / 2..]);
         let unit: Vec<f64> = (0..n * n).map(|at| f64::from(u8::from(at % (n + 1) == 0))).collect();
@@ -172,8 +173,8 @@ fn nearby_masses<S: Integrable>(model: &dyn EulerLagrange<S>, state: &[f64]) -> 
     all
 }
 
-/// A positive definite matrix of lengths: the mass matrix; that of an observer of velocity `v`, `+-(M - 2 p p^T/(p.v))` with `p = M v`, where it has
-/// another sign along `v` alone; or the magnitudes of its eigenvalues.
+/// A positive definite matrix of lengths: the mass matrix; if only the direction of `v` has another sign, the lengths for an observer of
+/// velocity `v`, `+-(M - 2 p p^T/(p.v))` with `p = M v`; otherwise the magnitudes of its eigenvalues.
 fn lengths(n: usize, mass: &[f64], v: &[f64]) -> Option<Vec<f64>> {
     let p: Vec<f64> = mass.chunks_exact(n).map(|row| dot(row, v)).collect();
     let square = dot(&p, v);
@@ -223,11 +224,11 @@ mod tests {
         let calm = lyapunov(&OSCILLATOR, &[1.0], &[0.0], &Options::<f64>::reference(20.0, 0.5)).unwrap();
         assert!(calm.exponent.abs() < 1e-3, "{calm:?}");
         assert!(hill.is_chaotic() && !calm.is_chaotic());
-        // In proportion to time, over a long one.
+        // In proportion to time, over a long span.
         let linear = |time: f64| Lyapunov { exponent: time.ln() / time, time };
         assert!([10.0, 100.0, 1e4].iter().all(|&time| !linear(time).is_chaotic()));
     }
-    /// Great circles of all inclinations, those near the poles of the chart among them, and geodesics of the plane by angles.
+    /// Great circles of all inclinations, including those near the poles of the chart, and geodesics of the plane in polar coordinates.
     #[test]
     fn a_great_circle_is_regular_in_any_chart() {
         let sphere = build::<f64>("sphere-geodesic", &[]).unwrap();
@@ -241,7 +242,7 @@ mod tests {
         }
     }
 
-    /// The exponent of a chaotic motion is that of the motion whatever the coordinates; neighbours in the plane part as before.
+    /// The exponent of a chaotic motion does not depend on the coordinates; neighbours in the plane separate as before.
     #[test]
     fn a_thrown_double_pendulum_is_chaotic() {
         let pendulum = build::<f64>("double-pendulum", &[]).unwrap();

@@ -1,8 +1,8 @@
-//! Predictions of recorded motion that a model has not seen: how far off they are, how long they hold.
+//! Predictions of recorded motion that a model has not seen: how far off they are and how long they stay valid.
 //!
-//! A recording is cut into windows; every predictor gets an estimated state before a window and says where the coordinates will be at the times
-//! of its samples. What it says is compared with what was measured. An estimate by smoothing has seen samples after its own time: the window
-//! begins behind the last of them.
+//! A recording is cut into windows; every predictor gets an estimated state before a window and predicts the coordinates at the times of
+//! its samples, which are compared with the measured ones. A smoothed estimate has seen samples after its own time, so the window begins
+//! after the last of them.
 
 use super::statistics::quantile;
 use super::{ValidTime, angle_difference, relative_error, valid_time};
@@ -25,18 +25,18 @@ pub struct Window {
     pub times: Vec<f64>,
     /// Measured coordinates at these times, `(samples, n)`.
     pub measured: Vec<f64>,
-    /// Known forces from outside from the state to the end of the window, if there were any.
+    /// Known external forces from the state to the end of the window, if there were any.
     pub force: Option<SampledForce<f64>>,
 }
 
 impl Window {
-    /// Windows of `seconds` one after the other through the samples `interior` of a track of `n` coordinates, each from the
-    /// estimated state, `(samples, n)`, at its first sample; a rest that is shorter is left out.
+    /// Consecutive windows of `seconds` through the samples `interior` of a track of `n` coordinates, each from the estimated state,
+    /// `(samples, n)`, at its first sample; a shorter remainder is left out.
     pub fn cut(states: StateEstimate<'_>, interior: std::ops::Range<usize>, n: usize, seconds: f64) -> Vec<Self> {
         Self::unseen(states, &[], (interior, n), seconds)
     }
 
-    /// As [`Window::cut`], but each window begins with the last sample, by `reach`, that the estimate of its state has seen.
+    /// As [`Window::cut`], but each window begins at the last sample that the estimate of its state has used, `reach` after the state.
     pub fn unseen(
         StateEstimate { track, q, v, between }: StateEstimate<'_>,
         reach: &[usize],
@@ -78,9 +78,9 @@ impl Window {
 /// Coordinates at the times of every window's samples, `(samples, n)`; not finite where a predictor gave up.
 pub type Predictions = Vec<Vec<f64>>;
 
-/// Steps that a motion may take before it is given up, beside [`STEPS_PER_SAMPLE`]: wild ones would take a million.
+/// Steps that a motion may take before it is given up, beside [`STEPS_PER_SAMPLE`]: irregular ones would take a million.
 const STEPS: usize = 1000;
-/// Steps per sample of the windows; one of a healthy motion covers several samples.
+/// Allowed steps per sample of the windows; one step of a healthy motion covers several samples.
 const STEPS_PER_SAMPLE: f64 = 4.0;
 
 /// The motion of a model under the known forces; `NaN` from where it ends before its time. The result does not depend on `threads`.
@@ -101,7 +101,7 @@ pub fn follow(
     let end = windows.iter().filter_map(|window| Some(window.lead + window.times.last()?)).fold(0.0, f64::max);
     let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
     let step = shortest.fold(end, f64::min);
-    // One rounding more, so that the last sample of every window lies inside.
+    // A little longer, so that rounding leaves the last sample of every window inside.
     let max_steps = STEPS + (STEPS_PER_SAMPLE * end / step) as usize;
     let options = Options { energy: false, max_steps, ..Options::new(end * (1.0 + 1e-12), step) };
     let motions = rollout_each(model, &starts, &options, threads);
@@ -136,7 +136,7 @@ fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64>
     positions
 }
 
-/// Everything continues as it went in the state before the window: the least that a model must beat.
+/// Motion continues at the velocity before the window: the least that a model must beat.
 pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
     let prediction = |window: &Window| {
         let times = window.times.iter().map(|t| window.lead + t);
@@ -181,8 +181,8 @@ fn distances(
     })
 }
 
-/// Errors `seconds` after the start of all coordinates together, each over its scale: 1 where they have one unit, else the spread of
-/// its motion; one without a spread is left out.
+/// Errors `seconds` after the start of all coordinates together, each over its scale: 1 where all have the same unit, otherwise the spread
+/// of its motion; a coordinate without a spread is left out.
 pub fn prediction_error(
     windows: &[Window],
     predictions: &Predictions,

@@ -52,12 +52,12 @@ pub struct ErrorDistribution {
     pub max: f64,
     /// States compared.
     pub count: usize,
-    /// States left out because a model gives nothing finite there.
+    /// States left out because a model is not finite there.
     pub failed: usize,
 }
 
 impl ErrorDistribution {
-    /// Of the absolute errors of the states that were compared, and the number of those that were not.
+    /// Statistics of the absolute errors of the states that were compared, and the number of the others.
     pub(super) fn of(mut errors: Vec<f64>, failed: usize) -> Self {
         errors.sort_by(f64::total_cmp);
         let count = errors.len();
@@ -94,8 +94,7 @@ const WINDOW: usize = 15;
 /// Savitzky-Golay filter of order 2: at every point the value of the parabola fitted to the `window` points around it,
 /// at the ends to the first or last `window` points.
 ///
-/// `window` is odd; a shorter series narrows it to its own length (made odd), and fewer than three points are returned
-/// as they are.
+/// `window` is odd; a shorter series narrows it to its own length (made odd), and fewer than three points are returned unchanged.
 pub fn savitzky_golay(series: &[f64], window: usize) -> Vec<f64> {
     let longest = series.len() - usize::from(series.len().is_multiple_of(2) && !series.is_empty());
     let window = window.min(longest);
@@ -138,11 +137,11 @@ pub fn stretches(config: &Config) -> Vec<Range<usize>> {
     all
 }
 
-/// Mean over the stretches of the standard deviation of `loss - trend` within each, the trend being the Savitzky-Golay
-/// filter of order 2 and window 15 over the whole series of losses, one per epoch; in the loss's unit.
+/// Mean over the stretches of the standard deviation of `loss - trend` within each, where the trend is the Savitzky-Golay filter of order 2
+/// and window 15 over the whole series of losses, one per epoch; in the loss's unit.
 ///
-/// Stretches beyond the end of the series are cut or passed over. `None` for a series of fewer than five losses, through
-/// which a parabola says nothing, without a stretch of two epochs, or if a loss is not finite.
+/// Stretches beyond the end of the series are cut or passed over. `None` for fewer than five losses, too few for a parabola, without a
+/// stretch of two epochs, or if a loss is not finite.
 pub fn training_instability(losses: &[f64], stretches: &[Range<usize>]) -> Option<f64> {
     if losses.len() < 5 || losses.iter().any(|loss| !loss.is_finite()) {
         return None;

@@ -44,16 +44,17 @@ pub fn acceleration_errors<S: Scalar>(
 
 /// Distribution of `|s M_learned - M_exact| / |M_exact|` (Frobenius norms) at rest, with one factor `s` for all states.
 ///
-/// A Lagrangian is free up to a factor. Where coordinates do not act on each other by the exact equations, each group of those that do has a
-/// factor of its own: the elements between the groups `a` and `b` are taken times `sqrt |s_a s_b|`. That of a geodesic is free up to any function, `L -> f(L)`: `M` becomes
-/// `f' g + f'' (g v)(g v)^T`, and only at rest the metric `g` is left, up to the one factor `f'(0)`.
+/// A Lagrangian is free up to a factor. Where the exact equations split into groups of coordinates that do not act on each other, each
+/// group has a factor of its own, and the elements between the groups `a` and `b` are multiplied by `sqrt |s_a s_b|`. The Lagrangian of a
+/// geodesic is free up to any function, `L -> f(L)`: `M` becomes `f' g + f'' (g v)(g v)^T`, and only at rest does the metric `g` remain, up
+/// to the one factor `f'(0)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MassMatrixError {
-    /// The factor `s` of the smallest mean square, that of the first group.
+    /// The factor `s` of the smallest mean square error, for the first group.
     pub factor: f64,
     /// Number of groups of coordinates that do not act on each other.
     pub groups: usize,
-    /// The factor of every coordinate, that of its group.
+    /// The factor of every coordinate, which is that of its group.
     #[serde(skip)]
     pub factors: Vec<f64>,
     /// The relative errors.
@@ -99,7 +100,7 @@ pub fn mass_matrix_error<S: Scalar>(
 ) -> MassMatrixError {
     let n = exact.coordinates();
     let (of_exact, mut of_learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
-    // Whatever velocities show what acts on what.
+    // Any velocities that show which coordinates act on which.
     let v: Vec<S> = (0..q.len()).map(|k| S::of_f64(0.3 * (1.0 + 2.4 * k as f64).cos())).collect();
     let groups = groups(exact, (q, &v));
     if groups.len() < 2 {
@@ -136,7 +137,7 @@ pub fn mass_matrix_error_within(
     let states = q.chunks_exact(n).zip(v.chunks_exact(n));
     for ((q, v), (a, b)) in states.zip(exact.chunks_exact(n * n).zip(learned.chunks_exact(n * n))) {
         manifold.rows(q, v, &mut rows);
-        // One basis for both.
+        // One basis of the remaining directions for both.
         let [a, b] = [a, b].map(|matrix| ReducedMass::of(n, matrix, &rows.matrix).map(|reduced| reduced.matrix));
         let most = a.as_ref().map_or(0, Vec::len);
         size = size.max(most);
@@ -154,7 +155,7 @@ fn compare(n: usize, size: usize, exact: &[f64], learned: &[f64]) -> MassMatrixE
     MassMatrixError { factors: vec![factor; n], ..compare_scaled(size, exact, learned, factor) }
 }
 
-/// The same with a given factor.
+/// The comparison with a given factor.
 fn compare_scaled(size: usize, exact: &[f64], learned: &[f64], factor: f64) -> MassMatrixError {
     let states = exact.len().max(learned.len()) / size;
     let error = |(a, b): (&[f64], &[f64])| {
@@ -166,12 +167,12 @@ fn compare_scaled(size: usize, exact: &[f64], learned: &[f64], factor: f64) -> M
     MassMatrixError { factor, groups: 1, factors: Vec::new(), error: ErrorDistribution::of(errors, failed) }
 }
 
-/// Fraction of the states `q`, `v`, both `(states, n)`, whose learned mass matrix has not the inertia (numbers of
-/// positive, zero and negative eigenvalues) of the exact one; matrices that are not finite count as wrong. Under constraints those count
-/// within the directions that are left.
+/// Fraction of the states `q`, `v`, both `(states, n)`, whose learned mass matrix differs in inertia (numbers of positive, zero and
+/// negative eigenvalues) from the exact one; matrices that are not finite count as wrong. Under constraints, the inertia is taken within
+/// the remaining directions.
 ///
-/// A learned Lagrangian is free up to a factor, also a negative one: the sign of all matrices together is chosen so that
-/// fewer are wrong. 0 for no states.
+/// A learned Lagrangian is free up to a factor, which may be negative: the sign of all matrices together is chosen so that fewer are wrong.
+/// 0 for no states.
 pub fn wrong_signatures<S: Scalar>(
     exact: &dyn EulerLagrange<S>,
     learned: &dyn EulerLagrange<S>,
@@ -190,7 +191,7 @@ pub fn wrong_signatures<S: Scalar>(
     1.0 - right(|i| i).max(right(flipped)) as f64 / states as f64
 }
 
-/// Inertia of each state's mass matrix, `None` where it is not finite.
+/// Inertia of each state's mass matrix; `None` where it is not finite.
 fn inertias<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<Option<Inertia>> {
     let n = model.coordinates();
     let mut terms = Terms::default();
@@ -215,8 +216,8 @@ pub struct AffineFit {
     pub a: f64,
     /// Summand.
     pub b: f64,
-    /// Share of the variance of the target that is explained, `1 - residual / variance`; at most 1. `NaN` for a constant
-    /// target that is not met exactly.
+    /// Share of the variance of the target that is explained, `1 - residual / variance`; at most 1. `NaN` for a constant target that is not
+    /// reproduced exactly.
     pub r2: f64,
     /// Root mean square of `target - (a source + b)`, in the unit of the target.
     pub rms: f64,
@@ -233,9 +234,9 @@ impl AffineFit {
 
 /// Fits `target[k] = a source[k] + b` over the pairs in which both are finite; `None` if there are fewer than two.
 ///
-/// A constant source is fitted by `a = 0` and the mean of the target. Sums are taken about the means, so that a large
-/// common offset costs no digits. The remaining freedom of a Lagrangian, a total derivative `dF(q)/dt`, is odd in the
-/// velocity for the usual systems: compare on grids at rest or over coordinates to be free of it.
+/// A constant source is fitted by `a = 0` and the mean of the target. Sums are taken about the means, so that a large common offset loses
+/// no digits. The remaining freedom of a Lagrangian, a total derivative `dF(q)/dt`, is odd in the velocity for the usual systems: compare
+/// on grids at rest or over coordinates to be free of it.
 pub fn affine_fit(source: &[f64], target: &[f64]) -> Option<AffineFit> {
     let pairs = || source.iter().zip(target).map(|(&x, &y)| (x, y)).filter(|(x, y)| x.is_finite() && y.is_finite());
     let count = pairs().count();
@@ -309,7 +310,7 @@ mod tests {
     fn one_factor_is_free_and_nothing_else() {
         let model = |a, b, c| Mechanics::<_, f64>::new(Masses([a, b, c]), vec![]);
         let q = [0.0, 0.0, 1.0, 0.0, 3.0, 0.0];
-        // By `c` the coordinates act on each other.
+        // With `c` the coordinates act on each other.
         let exact = model(1.0, 0.5, 0.1);
         // A difference that vanishes at rest does not count.
         let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);

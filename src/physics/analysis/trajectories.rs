@@ -34,8 +34,8 @@ impl StartBox {
     }
 }
 
-/// Steps after which a learned motion is given up: ten times what a healthy one takes over the longest test, and seconds
-/// where a model learned next to nothing and its motion runs into a singular mass matrix.
+/// Steps after which a learned motion is given up: ten times what a healthy one takes over the longest test. A model that learned next to
+/// nothing, and runs into a singular mass matrix, then costs only seconds.
 const LEARNED_STEPS: usize = 30_000;
 
 /// The test as the paper makes it: random starts, exact motion by [`Options::reference`], learned motion at rtol 1e-6 and
@@ -118,7 +118,7 @@ pub struct TrajectorySummary {
     pub lyapunov_exponent: Option<f64>,
     /// Time of valid prediction of the learned motion.
     pub valid: ValidTime,
-    /// The same in Lyapunov times, if the exact motion is chaotic.
+    /// The time in Lyapunov times, if the exact motion is chaotic.
     pub valid_lyapunov_times: Option<f64>,
     /// Evaluations of the learned acceleration.
     pub evaluations: usize,
@@ -128,7 +128,7 @@ pub struct TrajectorySummary {
     pub reference_stopped: Option<String>,
 }
 
-/// Starts whose motions are made before those of the next.
+/// Number of starts whose motions are computed together.
 const PART: usize = 64;
 
 impl<S: Integrable> TrajectoryTest<S> {
@@ -158,8 +158,8 @@ impl<S: Integrable> TrajectoryTest<S> {
         self.run_from(&self.bounds.starts::<S>(self.starts, self.seed), exact, learned)
     }
 
-    /// The same from the random starts of the box put on the mass shell of `system`, or projected onto the constraints of its exact motion;
-    /// a start without a way there has motions that say so.
+    /// As `run`, with the random starts of the box put on the mass shell of `system` or projected onto the constraints of `exact`;
+    /// where that fails, the motions of the start report it.
     ///
     /// # Errors
     /// [`SystemError::State`] if box and system differ in the number of coordinates.
@@ -187,7 +187,7 @@ impl<S: Integrable> TrajectoryTest<S> {
     ) -> Vec<TrajectoryRun<S>> {
         let (reference, options) = self.options();
         let scale = S::of_f64(self.energy_scale);
-        // Part by part: what is interrupted has the runs of those before.
+        // Part by part, so that an interrupted test keeps the runs of earlier parts.
         let pairs = starts.chunks(PART).flat_map(|part| {
             let truths = rollout_many(exact, part, &reference, self.threads);
             let learned = rollout_many(learned, part, &options, self.threads);
@@ -246,7 +246,7 @@ impl<S: Integrable> TrajectoryTest<S> {
 }
 
 impl<S: Scalar> TrajectoryRun<S> {
-    /// `true` if a flag ended one of the motions.
+    /// `true` if a cancellation flag ended one of the motions.
     pub(crate) fn is_interrupted(&self) -> bool {
         [&self.exact, &self.learned].iter().any(|motion| matches!(motion.stop, Some(RolloutError::Stopped { .. })))
     }
@@ -288,7 +288,7 @@ impl<S: Scalar> TrajectoryRun<S> {
 const SAMPLES: f64 = 4000.0;
 /// Lyapunov times that are drawn of a chaotic motion, at least and at most.
 const LYAPUNOV_TIMES: (f64, f64) = (4.0, 12.0);
-/// Time span of a portrait over the time of valid prediction, so that it is seen how the two part.
+/// Time span of a portrait over the time of valid prediction, so that it shows how the two motions separate.
 const BEYOND: f64 = 1.3;
 /// Turns of its liveliest coordinate that are drawn of a regular motion: ten swings.
 const TURNS: usize = 20;
@@ -305,8 +305,8 @@ pub struct Portrait<S> {
 }
 
 impl<S: Integrable> TrajectoryTest<S> {
-    /// The time up to which a motion is drawn: of a chaotic one a few Lyapunov times, and somewhat beyond the time of valid
-    /// prediction; of a regular one some swings.
+    /// The time up to which a motion is drawn: a few Lyapunov times of a chaotic motion, and somewhat beyond the time of valid prediction;
+    /// some swings of a regular one.
     pub fn shown_until(&self, run: &TrajectoryRun<S>) -> f64 {
         let trajectory = &run.exact.trajectory;
         let end = trajectory.t.last().map_or(0.0, |t| t.to_f64());
@@ -345,8 +345,7 @@ impl<S: Integrable> TrajectoryTest<S> {
     }
 }
 
-/// The time at which the first coordinate has turned so many times: changed the sign of its velocity or, an angle, gone half
-/// round.
+/// The time at which any coordinate has turned `most` times: its velocity changed sign or, for an angle, it made half a revolution.
 fn nth_turn<S: Scalar>(trajectory: &Trajectory<S>, periodic: &[bool], most: usize) -> Option<f64> {
     let n = trajectory.coordinates;
     let mut turns = vec![0; n];
@@ -463,7 +462,8 @@ mod tests {
             assert!(motion.len() >= 4000 && (motion.t.last().unwrap() - until).abs() < 1e-9);
             assert!(motion.t.iter().zip(&motion.q).all(|(t, q)| (q - t.cos()).abs() < 1e-4));
         }
-        // A chaotic one of Lyapunov time 2: four of them, more if the prediction holds longer, never beyond the end.
+        // A chaotic motion of Lyapunov time 2: four of these times are drawn, more if the prediction stays valid longer, never beyond the
+        // end.
         runs[0].lyapunov = Some(Lyapunov { exponent: 0.5, time: 100.0 });
         for (valid, until) in [(1.0, 8.0), (10.0, 13.0), (100.0, 24.0)] {
             runs[0].valid = ValidTime { time: valid, at_least: false };

@@ -1,4 +1,4 @@
-//! Tubes around predicted motion that hold whole motions: split conformal prediction.
+//! Tubes around predicted motion that contain whole motions: split conformal prediction.
 //!
 //! Whole motions that a model has not learned from are predicted and divided in two. The errors of one half give every coordinate a scale
 //! `s_i(t)` by the time ahead. A motion of the other half has the score `max_(t, i) |measured - predicted|/s_i(t)`, and with `m` of them
@@ -24,7 +24,7 @@ pub enum TubeError {
     TooFewWindows {
         /// Motions there are.
         found: usize,
-        /// Motions that it takes.
+        /// Motions that are needed.
         needed: usize,
     },
     /// A model whose motion ends too early.
@@ -86,7 +86,7 @@ impl Tube {
         2 * calibrating(share)
     }
 
-    /// The tube that holds a share of motions of `n` coordinates like these, which start at the beginning of the windows.
+    /// The tube that contains a share of motions of `n` coordinates like these, which start at the beginning of the windows.
     ///
     /// # Errors
     /// [`TubeError`].
@@ -131,7 +131,7 @@ impl Tube {
         Ok(Self { share, times, half_widths, motions: [scaling.len(), scored.len()] })
     }
 
-    /// Half of the width for every coordinate at a time ahead; beyond the last time that of the last time.
+    /// Half-width for every coordinate at a time ahead; after the last time, the half-width at the last time.
     pub fn half_widths(&self, t: f64) -> Vec<f64> {
         between(&self.times, &self.half_widths, self.half_widths.len() / self.times.len(), t)
     }
@@ -143,7 +143,7 @@ impl Tube {
     }
 }
 
-/// Largest error of every motion near every knot, `(motions)(knots, n)`; that of the knot before where there is no sample.
+/// Largest error of every motion near every knot, `(motions)(knots, n)`; where there is no sample, the error at the previous knot.
 fn largest_errors(motions: &[(&Window, &Vec<f64>)], n: usize, step: f64, times: &[f64]) -> Vec<Vec<f64>> {
     let of = |(window, predicted): &(&Window, &Vec<f64>)| {
         let errors = errors(window, predicted);
@@ -187,7 +187,7 @@ mod tests {
     fn the_share_of_fresh_motions_is_inside_and_the_tube_follows_the_errors() {
         let (fresh, of_fresh) = motions(500, 9);
         for share in [0.5, 0.9] {
-            // The share of one tube scatters with the motions that it was scaled by.
+            // The coverage of one tube varies with the motions that scaled it.
             let mut held = 0.0;
             for seed in 0..8 {
                 let (windows, predictions) = motions(800, seed);

@@ -1,8 +1,6 @@
 //! Orbits in the equator of a metric that is the same at all times and around an axis: circular orbits, light and horizons,
 //! and the free fall between two radii.
 //!
-//! Circular orbits, light and horizons in the equator of a metric that is the same at all times and around an axis.
-//!
 //! With the components `g_tt`, `g_tp`, `g_pp` along the two symmetries, `t` the time and `p` the turn about the axis, a circular orbit of
 //! angular velocity `w = dp/dt` obeys `g_tt' + 2 g_tp' w + g_pp' w^2 = 0`, `' = d/dr` along the equator, whatever the other coordinates do.
 //! Its energy and angular momentum per mass are `E = -(g_tt + g_tp w)/s`, `L = (g_tp + g_pp w)/s`, `s^2 = -(g_tt + 2 g_tp w + g_pp w^2)`.

@@ -1,8 +1,7 @@
-//! Ways in which `L` and the friction beside it could be otherwise.
+//! Possible changes of `L` and of the friction.
 //!
-//! A change of `L` is `f(q)` times a product of velocities: none (a potential), two (a mass matrix) or four; a change of
-//! the dissipation `D` is `f(q) v_i^2/2` (viscous) or `w_i^2 ln cosh(v_i/w_i)` (dry beyond `w_i`). What the equations of
-//! motion get from one of them is linear in it.
+//! A change of `L` is `f(q)` times a product of velocities: none (a potential), two (a mass matrix) or four; a change of the dissipation
+//! `D` is `f(q) v_i^2/2` (viscous) or `w_i^2 ln cosh(v_i/w_i)` (dry beyond `w_i`). The equations of motion are linear in each change.
 
 /// The factor of a function of the coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,11 +19,11 @@ enum VelocityFactor {
 struct Change {
     kind: VelocityFactor,
     function: usize,
-    /// Its typical size before the data are considered.
+    /// Its typical size, before the data are considered.
     size: f64,
 }
 
-/// Usual sizes: those of the learned model itself, so that a change of size 1 makes another model of it.
+/// Typical sizes, taken from the learned model itself, so that a change of size 1 makes it a different model.
 #[derive(Clone, Debug)]
 pub struct Typical {
     /// `|M_ii|`, mean over the states.
@@ -65,8 +64,8 @@ const DEGREE: usize = 4;
 const GENEROUS: f64 = 3.0;
 
 impl Changes {
-    /// Changes for coordinates that are angles or range over `range`; those of the friction if `friction`. The degree of
-    /// the functions is as high as their number allows; `None` if even constants are too many.
+    /// Changes for coordinates that are angles or lie in `range`, including changes of the friction if `friction`. The functions have the
+    /// highest degree that their number allows; `None` if even constants are too many.
     pub fn new(periodic: &[bool], range: &[[f64; 2]], usual: &Typical, friction: bool) -> Option<Self> {
         (0..=DEGREE).rev().find_map(|degree| Self::of_degree(periodic, range, usual, friction, degree))
     }
@@ -80,7 +79,7 @@ impl Changes {
     ) -> Option<Self> {
         let n = periodic.len();
         let pairs: Vec<[usize; 2]> = (0..n).flat_map(|i| (i..n).map(move |j| [i, j])).collect();
-        // What constants come to; lists of higher degree grow with the power of `n` and are not made to be counted.
+        // The number of changes by constants. Lists of higher degree grow as a power of `n` and are not built merely to be counted.
         if pairs.len() + 2 * n > MOST || (degree > 0 && n > 8) {
             return None;
         }
@@ -104,7 +103,7 @@ impl Changes {
         let mut add = |kind: VelocityFactor, function: usize, size: f64| all.push(Change { kind, function, size });
         for function in 0..functions.len() {
             for &[i, j] in pairs {
-                // v_i^2 is twice what the kinetic energy has.
+                // The kinetic energy contains half of v_i^2.
                 let size = if i == j { 0.5 } else { 1.0 } * inertia([i, j]);
                 add(VelocityFactor::Product(vec![i, j]), function, size);
             }

@@ -1,9 +1,9 @@
 //! Ranges of the learned constants of a known part, from the residuals of recorded positions.
 //!
-//! One Gauss-Newton step from the fit: the positions of the training trajectories, cut into stretches, are predicted from the
-//! best start of each, and the residuals depend on the constants, on the starts, which are eliminated, and on the weights with
-//! which network and friction enter. What network and constants share is open: a weight may differ from the learned one by as
-//! much as the weights of its kind are large. The error of the step is that of all ranges, see the [module](super).
+//! One Gauss-Newton step from the fit: the positions of the training trajectories, cut into stretches, are predicted from the best start of
+//! each. The residuals depend on the constants, on the starts, which are eliminated, and on the weights of the network and the friction. An
+//! effect that network and constants share stays open: a weight may differ from the learned one by the typical size of weights of its kind.
+//! The error of the step is found as for all ranges, see the [module](super).
 
 use super::Estimate;
 use super::posterior::{Sums, groups, jackknife};
@@ -25,13 +25,13 @@ const LEAST: usize = 8;
 const SAMPLES: usize = 6000;
 /// Corrections of the starts.
 const CORRECTIONS: usize = 4;
-/// Most parameters beside the constants: of more, evenly spaced ones.
+/// Largest number of parameters beside the constants; if there are more, evenly spaced ones are used.
 const WEIGHTS: usize = 128;
 /// Step of a difference by a parameter.
 const DIFFERENCE: f64 = 1e-4;
 
-/// Values of the learned constants of the known part of a network with their ranges, by name; `None` where no range can be
-/// given, and empty without constants that are learned.
+/// Values and ranges of the learned constants of the known part of a network, by name; `None` where no range can be given, and empty if no
+/// constants are learned.
 pub fn constants(
     network: &NetworkLagrangian<f64>,
     measured: &RecordingSplit,
@@ -135,7 +135,7 @@ impl Stretches {
         self.objective.borrow_mut().residuals(weights, &self.segments, starts, &self.rows)
     }
 
-    /// Normal equations of groups of stretches, starts eliminated, and the number of residuals that are left.
+    /// Normal equations of groups of stretches with the starts eliminated, and the number of residuals that remain.
     fn parts(&self, weights: &[f64], columns: &[(usize, f64)]) -> Option<(Vec<Sums>, usize)> {
         let base = self.residuals(weights, &self.starts);
         let width = 2 * self.n;
@@ -156,7 +156,7 @@ impl Stretches {
                     self.residuals(&moved, &self.starts)
                 };
                 let by = DIFFERENCE * size;
-                // What is missed is what a change of the parameters makes up for.
+                // The column has the sign of the residuals, measured minus predicted, which a change of the parameters has to explain.
                 moved(by).iter().zip(moved(-by)).map(|(up, down)| (down - up) * (0.5 / DIFFERENCE)).collect()
             })
             .collect();
@@ -190,7 +190,7 @@ impl Stretches {
     }
 }
 
-/// Orthonormal columns that span the same; those that add nothing are left out.
+/// Orthonormal columns with the same span; columns that add nothing to it are left out.
 fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = Vec::new();
     for mut column in columns {

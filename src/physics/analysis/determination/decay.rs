@@ -1,8 +1,7 @@
 //! Decay of the motion of one coordinate: the part of its acceleration that changes its sign with the velocity.
 //!
-//! Every motion of one coordinate has a Lagrangian, damped motion too, so a model cannot tell friction from the forces of `L`.
-//! A mechanical one, `M(q) v^2/2 - V(q)`, moves backwards as forwards: `a = f(q) + h(q) v^2`, with a known force over `M`
-//! beside it. Friction adds `-r v`.
+//! Every motion of one coordinate has a Lagrangian, damped motion too, so a model cannot tell friction from the forces of `L`. A mechanical
+//! one, `M(q) v^2/2 - V(q)`, is symmetric under time reversal: `a = f(q) + h(q) v^2`, plus a known force over `M`. Friction adds `-r v`.
 
 use super::changes::{Functions, Values};
 use super::observed::Observed;
@@ -30,15 +29,15 @@ impl Decay {
     }
 }
 
-/// Least share of the acceleration that matters, and the share that is left where the motion is of another kind.
+/// Smallest share of the acceleration that matters, and the largest residual share: above it, the motion is of another kind.
 const SHARE: f64 = 0.005;
 const LEFT: f64 = 0.3;
 /// Degree of the functions of the coordinate.
 const DEGREE: usize = 4;
-/// Weight of the data beside the belief that no part of the acceleration is larger than itself.
+/// Weight of the data relative to the prior that no part of the acceleration exceeds the acceleration itself.
 const TRUST: f64 = 1e3;
 
-/// Decay of the motion of one coordinate; `None` for several, or too few states.
+/// Decay of the motion of one coordinate; `None` if there are several, or too few states.
 pub fn decay(periodic: &[bool], observed: &Observed) -> Option<Decay> {
     let [angle] = *periodic else { return None };
     let functions = Functions::new(&[angle], &ranges(1, &observed.q), DEGREE);

@@ -1,38 +1,38 @@
-//! Ranges in which motion determines what was learned from it: mass matrix, friction and energy.
+//! Ranges in which motion determines the learned mass matrix, friction and energy.
 //!
-//! Two Lagrangians may move alike on all that was recorded and differ in `M`: where a momentum is conserved, `L` may be
-//! changed by any function of it. What the data leave open is therefore read off the curvature of the likelihood around the
-//! learned model, in all directions that a Lagrangian has. The equations of motion are linear in `L` and in the dissipation
-//! `D`: a change `dL + dD` changes the acceleration of a state by
+//! Two Lagrangians may give the same motion on all recorded states and still differ in `M`: where a momentum is conserved, any function of
+//! it may be added to `L`. What the data leave open is therefore read off the curvature of the likelihood around the learned model, in all
+//! directions in which a Lagrangian can change. The equations of motion are linear in `L` and in the dissipation `D`: a change `dL + dD`
+//! changes the acceleration of a state by
 //!
 //! ```text
 //! da = -M^-1 (d/dt d(dL)/dv - d(dL)/dq + d(dD)/dv),
 //! ```
 //!
-//! so that changes `sum_k x_k phi_k` with normal `x_k` of standard deviation 1 before the data (the changes are scaled to
-//! the model's own size) come out of a linear regression, `C = (1 + A^T W A)^-1`, `x = C A^T W e`, with `A` the changes of the
-//! accelerations and `e` what they miss of the data. Every quantity that is linear in `L` and `D` follows.
+//! so that changes `sum_k x_k phi_k`, where the `x_k` have a normal prior of standard deviation 1 (the changes are scaled to the model's
+//! own size), follow from a linear regression, `C = (1 + A^T W A)^-1`, `x = C A^T W e`. Here `A` holds the changes of the accelerations,
+//! and `e` the residuals of the accelerations. Every quantity that is linear in `L` and `D` follows.
 //!
-//! Its error has four parts. What the data leave open has the size that was believed before them, `C C`. What noise does is
-//! read off the scatter of `x` when one of twenty groups of consecutive states is left out (the jackknife), which counts no
-//! sample as independent and needs no model of the noise. What the bias of smoothing does is how far `x` moves with accelerations
-//! by polynomials of two more degrees. And what neither the model nor any change of it explains of the
-//! accelerations, beyond their expected error, may be an error of every quantity of that share of its size. `W` has the inverse
-//! mean square of `e`, and as many samples as are independent: it only divides what the data say from what was believed.
+//! Its error has four parts. What the data leave open keeps its prior size, `C C`. The effect of noise is read off the scatter of `x` when
+//! one of twenty groups of consecutive states is left out (the jackknife); this does not assume that samples are independent, and needs no
+//! model of the noise. The effect of smoothing bias is the shift of `x` when accelerations come from polynomials two degrees higher.
+//! Finally, the share of the accelerations that neither the model nor any change of it explains, beyond their expected error, counts as a
+//! relative error of every quantity. `W` is the inverse mean square of `e`, for as many samples as are independent: it only separates the
+//! data from the prior.
 //!
 //! A range reaches two standard deviations to either side of the regression's middle. The regression is of first order: half the
 //! way from the learned value to the middle is one more standard deviation.
 //!
-//! A number of which the data take away less than half of the deviation before them is open: its range would be a belief.
+//! A number whose prior standard deviation the data reduce by less than half is open: its range would only reflect the prior.
 //!
-//! Without known forces `L` has no unit: quantities are then over the mean `M` of the first coordinate.
+//! Without known forces `L` has no unit: quantities are then relative to the mean `M` of the first coordinate.
 //!
-//! Groups of coordinates that do not act on each other have a factor each. Without a known force on one of its coordinates the factor of a group
-//! is open, but for that of the first coordinate's, which is the unit.
+//! Each group of coordinates that do not act on other groups has a factor of its own. Without a known force on one of its coordinates the
+//! factor of a group is open, except for the group of the first coordinate, which is the unit.
 //!
-//! Where a momentum is conserved, its coordinate's `M_ii` is open, and every other one if it is the unit: along a trajectory the momentum is one
-//! number, and how it changes with the velocity is only seen between trajectories, of which few pass most places. A network has room for many
-//! functions of it, the changes above have few.
+//! Where a momentum is conserved, the `M_ii` of its coordinate is open, and so is every other one if that is the unit. Along a trajectory
+//! the momentum is a single number, so its dependence on the velocity shows only between trajectories, and few of them pass the same place.
+//! A network can represent many functions of the momentum, the changes above only a few.
 //!
 //! Sources of the method: MacKay, Neural Computation 4 (1992) 448 (Laplace approximation around trained weights), here for
 //! functions that are linear in the equations instead of weights; Efron and Stein, Annals of Statistics 9 (1981) 586 (jackknife).
@@ -52,7 +52,7 @@ use changes::{Changes, Row};
 use posterior::{Data, Posterior};
 use serde::{Deserialize, Serialize};
 
-/// A learned number and the range in which the data allow it to be.
+/// A learned number and the range that the data allow.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The model's value.
@@ -67,8 +67,8 @@ pub struct Estimate {
 pub const RANGE: f64 = 2.0;
 
 impl Estimate {
-    /// The range of a value that a regression moves by `shift`, with this standard deviation. The regression is of first order: its
-    /// shift is believed to half its size, and the range holds the value itself.
+    /// The range of a value that a regression shifts by `shift`, with this standard deviation. The regression is of first order: half of
+    /// its shift counts as one standard deviation, and the range includes the value itself.
     fn about(value: f64, shift: f64, deviation: f64) -> Self {
         let half = RANGE * deviation.hypot(0.5 * shift);
         Self { value, low: value.min(value + shift - half), high: value.max(value + shift + half) }
@@ -87,7 +87,7 @@ impl Estimate {
     }
 }
 
-/// Ranges in which the data leave a model's inner quantities.
+/// Ranges that the data allow for a model's inner quantities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Determination {
     /// `true` if known forces fix the unit of `L`; if not, everything is over the mean of `M` of the first coordinate.
@@ -102,9 +102,9 @@ pub struct Determination {
     pub energy: Estimate,
 }
 
-/// Ranges in which `observed` leaves `model`; means are taken over its states.
+/// Ranges that `observed` allows for `model`; means are taken over its states.
 ///
-/// `None` where there is nothing to say: too many coordinates, too few states, or a model that is not finite on them.
+/// `None` where no statement is possible: too many coordinates, too few states, or a model that is not finite on them.
 pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed: &Observed) -> Option<Determination> {
     let n = model.coordinates();
     let data = Data::new(model, observed)?;
@@ -157,11 +157,12 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
     finite.then_some(result)
 }
 
-/// Largest rate of a momentum that counts as conserved, over the two parts of the rate, root mean squares. Models of a planet that explain its
-/// motion have 0.07 to 0.3 in the angle, of a cart with some friction 0.05 to 0.45, and 0.5 to 1 where there is a force.
+/// Largest rate of a momentum that counts as conserved, relative to the two parts of the rate (root mean squares). Models that explain the
+/// motion of a planet have 0.07 to 0.3 in the angle, models of a cart with some friction 0.05 to 0.45; where a force acts the rate is 0.5
+/// to 1.
 const CONSERVED: f64 = 1.0 / 3.0;
 
-/// For every coordinate, whether its momentum is conserved: whether `M a` and the change of the momentum with the place cancel.
+/// Whether the momentum of each coordinate is conserved: whether `M a` and the change of the momentum with the position cancel.
 fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
     let n = model.coordinates();
     let mut terms = Terms::default();
@@ -180,14 +181,14 @@ fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
     Some(squares.into_iter().map(|[rate, parts]| rate < CONSERVED * CONSERVED * parts).collect())
 }
 
-/// Largest [`misfit`] of held-out motion at which the ranges of a model hold.
+/// Largest [`misfit`] of held-out motion for which the ranges of a model are valid.
 pub const MOST_MISFIT: f64 = 0.3;
 
-/// What a model misses of the accelerations of every coordinate beyond their expected error, root mean square over their size:
-/// 0 where only noise is left, 1 for a model that explains nothing. `None` where the model is not finite.
+/// Root mean square residual of the accelerations of each coordinate beyond their expected error, over their size: 0 where only noise is
+/// left, 1 for a model that explains nothing. `None` where the model is not finite.
 ///
-/// This is also the test of whether the remainder is noise. Whether it is white says nothing: errors of smoothing are alike within a window
-/// even for the true model, and the jackknife allows for them.
+/// This is also the test of whether the remainder is noise. Whiteness says nothing: smoothing correlates the errors within a window even
+/// for the true model, and the jackknife allows for that.
 pub fn misfit(model: &dyn EulerLagrange<f64>, observed: &Observed) -> Option<Vec<f64>> {
     let data = Data::new(model, observed)?;
     // A model that fails on states does not explain them.
@@ -219,7 +220,7 @@ impl Linear {
     }
 }
 
-/// States at which the energy is examined, at most.
+/// Largest number of states at which the energy is examined.
 const ENERGIES: usize = 256;
 
 /// Numbers of the model that are requested.

@@ -20,7 +20,7 @@ pub struct Observed {
     pub finer: Vec<f64>,
     /// Number of errors of the accelerations that are independent, of each coordinate, `(n)`.
     pub independent: Vec<f64>,
-    /// What the model misses of the accelerations of held-out motion, over their size, `(n)`, or nothing: the error of a network where it was
+    /// The model's residuals of the accelerations on held-out motion, over their size, `(n)`, or empty: the error of a network where it was
     /// not fitted.
     pub missed: Vec<f64>,
 }
@@ -40,10 +40,10 @@ impl Observed {
         Ok(Self { finer: finer.unwrap_or_default(), ..Self::of(&data, measured, targets) })
     }
 
-    /// The states that were held out to judge; `None` if there are none.
+    /// The states held out to judge the model; `None` if there are none.
     ///
     /// # Errors
-    /// As [`RecordingSplit::datasets`].
+    /// See [`RecordingSplit::datasets`].
     pub fn held_out(measured: &RecordingSplit, targets: Targets) -> Result<Option<Self>, RecordingSplitError> {
         if measured.test.states.is_empty() {
             return Ok(None);
@@ -51,8 +51,8 @@ impl Observed {
         Ok(Some(Self::of(&measured.datasets::<f64>(targets)?.test, measured, targets)))
     }
 
-    /// Errors of smoothed accelerations are the same within a window; those of a model change with the state and are of one
-    /// sign over half a swing: samples within half the fast period count as one.
+    /// Errors of smoothed accelerations are shared within a window; errors of a model change with the state and keep their sign over half a
+    /// swing. Samples within half the fast period therefore count as one.
     fn of(data: &Dataset<f64>, measured: &RecordingSplit, targets: Targets) -> Self {
         let n = data.coordinates();
         let some = |values: &[f64]| some(n, values);
@@ -114,7 +114,7 @@ fn some(n: usize, values: &[f64]) -> Vec<f64> {
     values.chunks_exact(n).step_by(stride).flatten().copied().collect()
 }
 
-/// Share of a range by which a state may lie beyond it.
+/// Share of a range by which a state may lie outside it.
 const MARGIN: f64 = 0.05;
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! What a model misses of the accelerations of observed states, and the changes that make up for it, by regularised
-//! least squares over groups of consecutive states.
+//! Residuals of a model's accelerations at observed states, and the changes of the model that explain them, by regularised least squares
+//! over groups of consecutive states.
 
 use super::changes::{Changes, Row, Typical};
 use super::observed::Observed;
@@ -8,7 +8,7 @@ use crate::lagrangian::{EulerLagrange, Request, Terms, acting_groups};
 use crate::linalg::{MatMut, MatRef, Workspace, dot, gemm, inverse, solve};
 use std::ops::Range;
 
-/// States on which a model is finite, with what its accelerations miss.
+/// States at which a model is finite, with the residuals of its accelerations.
 pub(super) struct Data {
     n: usize,
     pub q: Vec<f64>,
@@ -91,20 +91,21 @@ impl Data {
         self.q.len() / self.n
     }
 
-    /// Root mean square, over the size, of what is missed of the accelerations of every coordinate beyond their expected error;
-    /// `squares` are the mean squares of what is missed.
+    /// Root mean square residual of the accelerations of every coordinate beyond their expected error, over their size; `squares` are the
+    /// mean squares of the residuals.
     fn beyond(&self, squares: &[f64]) -> Vec<f64> {
         let of = |(square, [size, error, _]): (&f64, &[f64; 3])| ((square - error).max(0.0) / size).sqrt();
         squares.iter().zip(&self.observed).map(of).collect()
     }
 
-    /// [`Self::beyond`] for what the model misses.
+    /// [`Self::beyond`] for the model's own residuals.
     pub fn misfit(&self) -> Vec<f64> {
         self.beyond(&mean_squares(self.n, &self.missed))
     }
 
-    /// Groups of coordinates that do not act on each other, as far as the model knows: an influence within what it misses beyond the error of
-    /// the data, or twice what it misses of held-out motion, or a share [`COUPLED`] of the acceleration, is none.
+    /// Groups of coordinates that do not act on each other, as far as the model knows. An influence does not count if it is below the
+    /// model's residuals beyond the error of the data, below twice its residuals on held-out motion, or below a share [`COUPLED`] of the
+    /// acceleration.
     pub fn groups(&self, model: &dyn EulerLagrange<f64>) -> Vec<Vec<usize>> {
         let (n, stride) = (self.n, self.states().div_ceil(SHOWN).max(1));
         let some = |x: &[f64]| -> Vec<f64> { x.chunks_exact(n).step_by(stride).flatten().copied().collect() };
@@ -117,7 +118,7 @@ impl Data {
         });
         let accelerations = |q: &[f64], v: &[f64]| {
             let mut terms = Terms::default();
-            // Places between which nothing was seen may have none.
+            // Between observed positions the model may have no accelerations.
             let _ = model.terms(q, v, Request::ACCELERATION, &mut terms);
             if !force.is_empty() {
                 let _ = terms.add_force(n, v, &force, &mut Workspace::new());
@@ -156,7 +157,7 @@ impl Data {
         }
     }
 
-    /// The changes that make up for what is missed.
+    /// The changes that explain the residuals.
     pub fn posterior(&self, changes: &Changes) -> Option<Posterior> {
         let (n, count) = (self.n, changes.len());
         let groups = groups(self.states(), LEAST)?;
@@ -207,15 +208,15 @@ impl Data {
     }
 }
 
-/// Share of the deviation before the data that is left after them, at and above which they leave a number open.
+/// Share of the prior standard deviation that the data must leave for a number to count as open.
 const OPEN: f64 = 0.5;
 /// Fewest states of a group.
 const LEAST: usize = 5;
-/// Share of an acceleration up to which the influence of another coordinate may be an error of the network: small networks of motion without
-/// any coupling that miss 7 to 29 % of held-out accelerations show influences of 0.05 to 0.23, below twice what they miss, and networks of
-/// coupled motion that miss 4 to 11 % show 0.18 to 0.32 (as in `lnn-studies rates --part readings`).
+/// Share of an acceleration up to which the influence of another coordinate may be an error of the network: small networks of motion
+/// without any coupling that miss 7 to 29 % of held-out accelerations show influences of 0.05 to 0.23, below twice that error, and networks
+/// of coupled motion that miss 4 to 11 % show 0.18 to 0.32 (as in `lnn-studies rates --part readings`).
 const COUPLED: f64 = 0.1;
-/// States at which couplings are looked for, at most.
+/// Largest number of states at which couplings are examined.
 const SHOWN: usize = 500;
 
 /// Mean square of each of `n` columns.
@@ -234,12 +235,12 @@ pub(super) struct Posterior {
     bias: Vec<f64>,
     /// `x` without each of the groups.
     without: Vec<Vec<f64>>,
-    /// Of every coordinate, what neither the model nor its changes account for, over the size of the accelerations.
+    /// For every coordinate, the part of the accelerations that neither the model nor its changes explain, over their size.
     pub floor: Vec<f64>,
 }
 
 impl Posterior {
-    /// Variance of a linear function that the data leave open: of size before them, and only believed.
+    /// Prior variance of a linear function that the data leave open.
     fn believed(&self, slopes: &[f64]) -> f64 {
         self.covariance.chunks_exact(slopes.len()).map(|row| dot(row, slopes).powi(2)).sum()
     }
@@ -251,8 +252,7 @@ impl Posterior {
         (middle, self.believed(slopes) + noise + dot(slopes, &self.bias).powi(2))
     }
 
-    /// The range of a number whose consistent error is `floor`; without ends where it would be what was believed and not what the
-    /// data say.
+    /// The range of a number whose systematic error is `floor`; without ends where it would reflect the prior and not the data.
     pub fn estimate(&self, linear: &Linear, floor: f64) -> Estimate {
         let before = dot(&linear.slopes, &linear.slopes);
         if self.believed(&linear.slopes) > OPEN * OPEN * before {
@@ -281,7 +281,7 @@ pub fn groups(states: usize, least: usize) -> Option<Vec<Range<usize>>> {
     (groups >= FEWEST).then(|| (0..groups).map(range).collect())
 }
 
-/// Variance of a number that is `whole` by all groups, from what it is without each of them.
+/// Jackknife variance of a number that is `whole` for all groups, from its values without each of them.
 pub fn jackknife(whole: f64, without: impl ExactSizeIterator<Item = f64>) -> f64 {
     let groups = without.len() as f64;
     without.map(|x| (x - whole).powi(2)).sum::<f64>() * (groups - 1.0) / groups
@@ -296,7 +296,7 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Of the rows of `A`, and `e`.
+    /// Sums over the rows of `A` and `e`.
     pub fn new(rows: &[f64], missed: &[f64]) -> Self {
         let count = rows.len() / missed.len().max(1);
         let mut sums = Self::zero(count);
@@ -311,7 +311,7 @@ impl Sums {
         Self { precision: vec![0.0; count * count], pull: vec![0.0; count], square: 0.0 }
     }
 
-    /// Of all states together.
+    /// Sums over all states.
     pub fn of(parts: &[Self]) -> Self {
         let mut sums = Self::zero(parts.first().map_or(0, |part| part.pull.len()));
         parts.iter().for_each(|part| sums.add(part, 1.0));
@@ -341,7 +341,7 @@ impl Sums {
         Some(sizes)
     }
 
-    /// The same without each of the parts.
+    /// The solution without each of the parts.
     pub fn without(&self, parts: &[Self], trust: f64) -> Option<Vec<Vec<f64>>> {
         let one = |part: &Self| {
             let mut rest = self.clone();
@@ -358,12 +358,12 @@ impl Sums {
         Some(covariance)
     }
 
-    /// The weight of the data by which what the factors leave is of mean square 1, for `rows` rows of `A`.
+    /// The weight of the data that gives the residuals a mean square of 1, for `rows` rows of `A`.
     pub fn trust(&self, rows: usize) -> f64 {
         rows as f64 / self.square.max(f64::MIN_POSITIVE)
     }
 
-    /// Square of what these factors leave.
+    /// Sum of squared residuals with these factors.
     pub fn left(&self, sizes: &[f64]) -> f64 {
         let rows = self.precision.chunks_exact(sizes.len());
         let square: f64 = rows.zip(sizes).map(|(row, s)| s * dot(row, sizes)).sum();
@@ -378,7 +378,7 @@ mod tests {
     use rand::Rng;
     use rand_distr::StandardNormal;
 
-    /// A line through noise whose neighbours are alike: the jackknife states the scatter over many draws.
+    /// A line through correlated noise: the jackknife states the scatter over many draws.
     #[test]
     fn errors_of_correlated_noise_are_stated() {
         let mut rng = RngStream::Validation.generator(3);
