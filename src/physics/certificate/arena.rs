@@ -18,10 +18,10 @@ pub struct Place {
     pub lane: u32,
 }
 
-/// Memory of all numbers of one evaluation, up to [`LANES`] of them in a pack: units of a layer lie side by side.
+/// Memory of all numbers of one evaluation, in packs of up to [`LANES`]: the units of a layer lie side by side.
 ///
-/// A number has `1 + n + n (n + 1)/2` forms of [`Basis::stride`] coefficients: the value, `n` first derivatives, and of the second ones those with
-/// `j <= i`, row by row.
+/// A number has `1 + n + n (n + 1)/2` forms of [`Basis::stride`] coefficients: the value, `n` first derivatives, and the second derivatives
+/// with `j <= i`, row by row.
 pub struct Arena {
     pub basis: Arc<Basis>,
     /// Directions of the derivatives.
@@ -48,7 +48,7 @@ struct Pack {
 struct Layout {
     /// The first one.
     start: usize,
-    /// Places side by side: one for a number that is alone, [`LANES`] for others.
+    /// Places side by side: one for a single number, [`LANES`] otherwise.
     width: usize,
     /// Numbers in them.
     lanes: usize,
@@ -81,7 +81,7 @@ impl Arena {
     pub fn was_read(&self) -> bool {
         self.read.get()
     }
-    /// Bits of the axes along which a box has to be cut for what is not known to become so.
+    /// Bits of the axes along which to cut a box so that what is unknown may become known.
     pub fn blamed(&self) -> u64 {
         self.blamed.get()
     }
@@ -91,7 +91,7 @@ impl Arena {
     }
     fn blame_form<const W: usize>(&self, form: &[[f64; W]], lane: usize) {
         if !form::deviation(form)[lane].is_finite() {
-            // Those to blame for it have been noted where it came from.
+            // The axes responsible were noted where it arose.
             return;
         }
         let dependent = (1..self.basis.count()).filter(|&k| form[k][lane] != 0.0);
@@ -116,7 +116,8 @@ impl Arena {
         &forms[start..start + self.block() * width]
     }
 
-    /// Makes packs of so many numbers each; `fill` is given the coefficients of all earlier packs and of the new ones, zeros.
+    /// Makes packs of `lanes` numbers each; `fill` receives the coefficients of all earlier packs and those of the new ones, which are
+    /// zeros.
     pub fn make(&self, lanes: &[usize], fill: impl FnOnce(&[f64], &mut [f64])) -> u32 {
         let (mut forms, mut packs) = (self.forms.borrow_mut(), self.packs.borrow_mut());
         let (first, before) = (packs.len(), forms.len());
@@ -135,7 +136,7 @@ impl Arena {
     fn single(&self, fill: impl FnOnce(&[f64], &mut [[f64; 1]])) -> Place {
         Place { pack: self.make(&[1], |earlier, new| fill(earlier, new.as_chunks_mut().0)), lane: 0 }
     }
-    /// Reads the coefficients of a pack, so many side by side.
+    /// Passes the coefficients of a pack, and how many lie side by side, to `read`.
     pub fn look<T>(&self, pack: u32, read: impl FnOnce(&[f64], usize) -> T) -> T {
         let layout = self.layout(pack);
         read(self.of(&self.forms.borrow(), layout), layout.width)
@@ -171,7 +172,7 @@ impl Arena {
         self.single(|_, new| new.fill([f64::NAN]))
     }
 
-    /// The pack of a number that is alone in it, a copy if it has neighbours.
+    /// The pack of a single number, copied if it shares a pack with others.
     fn alone(&self, place: Place) -> Layout {
         let layout = self.layout(place.pack);
         if layout.width == 1 {
@@ -226,7 +227,8 @@ impl Arena {
                 self.blame_form(z, lane);
             }
         }
-        // The powers of what differs from the middle, the derivatives of the function, and what makes second derivatives of first ones.
+        // The powers of the deviation from the middle, the derivatives of the function, and the terms that give second derivatives from
+        // first ones.
         let mut scratch = vec![[0.0; W]; (basis.degree() + 2 + n) * stride];
         let (powers, rest) = scratch.split_at_mut(basis.degree() * stride);
         let (first, rest) = rest.split_at_mut(stride);
@@ -287,7 +289,7 @@ impl Arena {
     /// The product of two numbers.
     pub fn product(&self, a: Place, b: Place) -> Place {
         if a == b && self.layout(a.pack).width > 1 {
-            // The square of a unit of a layer is found with those of its neighbours.
+            // The square of a unit of a layer is computed together with its neighbours.
             return self.function(Function::Table(Unary::Powi(2)), a);
         }
         let (basis, n, stride) = (&*self.basis, self.n, self.basis.stride());

@@ -1,9 +1,9 @@
-//! Forms: functions on a box as a polynomial and a distance from it (Taylor models, Makino and Berz 2003).
+//! Forms: functions on a box as a polynomial and a bound of the distance from it (Taylor models, Makino and Berz 2003).
 //!
-//! A form over a box with the axes `e_k` from -1 to 1 is a slice `[c_0, .., c_m, r]`, one coefficient per monomial of a [`Basis`]: everywhere
-//! on the box the function lies within `r` of the polynomial. Numbers are rounded to nearest, and what that may have lost is added to `r`: a
-//! sum or product `x` is off by at most `EPSILON |x| / 2`, and `r` is charged twice that at least, which also covers the rounding of the charge
-//! itself.
+//! A form over a box with the axes `e_k` from -1 to 1 is a slice `[c_0, .., c_m, r]`, one coefficient per monomial of a [`Basis`]:
+//! everywhere on the box the function lies within `r` of the polynomial. Numbers are rounded to nearest, and a bound of the rounding error
+//! is added to `r`: a sum or product `x` is off by at most `EPSILON |x| / 2`, and `r` is charged at least twice that, which also covers the
+//! rounding of the charge itself.
 //!
 //! The forms of `W` functions lie side by side, so that vector instructions work on all of them.
 
@@ -13,7 +13,7 @@ use super::interval::Interval;
 const EPSILON: f64 = f64::EPSILON;
 /// Largest share of the radius of a range that the distance from a polynomial may have.
 const WORTHWHILE: f64 = 0.7;
-/// Covers what underflow loses.
+/// Covers losses by underflow.
 pub const TINY: f64 = 1e-290;
 
 /// A sum of numbers that are not negative, rounded up by more than its own rounding lost.
@@ -46,13 +46,13 @@ pub fn deviation<const W: usize>(a: &[[f64; W]]) -> [f64; W] {
     size(&a[1..]).map(|sum| sum * (1.0 + (a.len() as f64 + 2.0) * EPSILON))
 }
 
-/// Every value of one of the functions on the box.
+/// An interval of all values of one of the functions on the box.
 #[inline]
 pub fn range<const W: usize>(basis: &Basis, a: &[[f64; W]], lane: usize) -> Interval {
     let distance = a[a.len() - 1][lane];
     let (mut below, mut above) = (distance, distance);
     for (k, c) in (1..basis.count()).map(|k| (k, a[k][lane])) {
-        // Not a number goes to `above`, and no order of the ends is found.
+        // `NaN` goes to `above`, and the ends then have no order.
         if !basis.is_square(k) {
             below += c.abs();
             above += c.abs();
@@ -66,7 +66,7 @@ pub fn range<const W: usize>(basis: &Basis, a: &[[f64; W]], lane: usize) -> Inte
     Interval::outward(a[0][lane] - grown(below), a[0][lane] + grown(above))
 }
 
-/// One of the functions becomes a constant with a value of the interval.
+/// Makes one of the functions a constant within the interval.
 #[inline]
 pub fn set_constant<const W: usize>(out: &mut [[f64; W]], lane: usize, value: Interval) {
     out.iter_mut().for_each(|c| c[lane] = 0.0);
@@ -146,11 +146,11 @@ pub fn add_product<const W: usize>(basis: &Basis, out: &mut [[f64; W]], a: &[[f6
     }
 }
 
-/// Taylor's formula for functions side by side: `sum_p c_p w^p`, `w` what the argument differs from its value in the middle.
+/// Taylor's formula for functions side by side: `sum_p c_p w^p`, where `w` is the deviation of the argument from its value in the middle.
 pub struct Expansion<const W: usize> {
     /// Coefficients.
     value: [[f64; W]; MOST_DEGREE + 1],
-    /// Errors of the coefficients, at most.
+    /// Bounds of the errors of the coefficients.
     spread: [[f64; W]; MOST_DEGREE + 1],
     /// Everything that the functions can be on the box.
     whole: [Interval; W],
@@ -171,7 +171,7 @@ impl<const W: usize> Expansion<W> {
         (order, degree): (usize, usize),
     ) {
         let power = Interval::point(distance).power(degree as i32 + 1).high;
-        // Of an even degree the rest has the sign of an odd power.
+        // For an even degree the remainder has the sign of an odd power.
         let power = if degree % 2 == 0 { Interval::symmetric(power) } else { Interval::new(0.0, power) };
         // Exact where nothing is to be rounded.
         let divided = |x: Interval, by: f64| if by == 1.0 || x == Interval::ZERO { x } else { x / Interval::point(by) };
@@ -189,8 +189,8 @@ impl<const W: usize> Expansion<W> {
         self.whole[lane] = over[order];
     }
 
-    /// Writes the forms, given those of the powers `w`, `w^2`, .. of the argument. Where the range of a function is not much wider than the
-    /// distance from the polynomial, the range.
+    /// Writes the forms, given the forms of the powers `w`, `w^2`, .. of the argument. Writes a constant with the range of a function where
+    /// that is not much wider than the distance from the polynomial.
     #[inline(always)]
     pub fn write(&self, basis: &Basis, out: &mut [[f64; W]], powers: &[[f64; W]]) {
         let m = basis.count();
@@ -213,8 +213,8 @@ impl<const W: usize> Expansion<W> {
         }
         for l in 0..W {
             out[m][l] = raised(spread[l] + 8.0 * EPSILON * charge[l]);
-            // A polynomial keeps what functions have in common, as long as the distance from it is small beside the range; not a number
-            // is not.
+            // A polynomial keeps the dependences between functions, as long as the distance from it is small relative to the range; `NaN`
+            // never is.
             let whole = self.whole[l];
             let worthwhile = out[m][l] <= WORTHWHILE * whole.radius();
             if whole.is_bounded() && !worthwhile {
@@ -240,8 +240,8 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// The degree that decides boxes of so many axes soonest: the distance from a polynomial shrinks with one power of the sides more than
-    /// its degree, and the number of its coefficients grows with the axes.
+    /// The degree that decides boxes with this number of axes soonest: the distance from a polynomial shrinks with one power of the sides
+    /// more than its degree, and the number of its coefficients grows with the axes.
     pub fn for_axes(axes: usize) -> Self {
         Self::new(
             axes,
@@ -327,7 +327,7 @@ mod tests {
             for axis in 0..axes {
                 assert_eq!(basis.factors(1 + axis), [axis]);
             }
-            // At a place whose powers are all different numbers.
+            // At a position where all monomials differ.
             let place: Vec<f64> = (0..axes).map(|axis| [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0][axis]).collect();
             let value = |k: u16| basis.factors(usize::from(k)).iter().map(|&axis| place[axis]).product::<f64>();
             assert!(basis.products().iter().all(|&[i, j, k]| value(i) * value(j) == value(k)));

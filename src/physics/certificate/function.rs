@@ -29,7 +29,7 @@ impl Function {
         (at, over)
     }
 
-    /// Every value over the numbers of `x`.
+    /// An interval of all values for the numbers of `x`.
     pub fn value(self, x: Interval) -> Interval {
         self.formulas(x)[0]
     }
@@ -108,7 +108,7 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
                 times(t, &[272.0, 960.0, 720.0]),
             ]
         }
-        // With g = 1/sqrt(1 - x^2), polynomials in x^2 g^2, which is g^2 - 1: positive coefficients all.
+        // With g = 1/sqrt(1 - x^2): polynomials in x^2 g^2 = g^2 - 1, all coefficients positive.
         Unary::Asin | Unary::Acos => {
             let square = x.square();
             let g = one / ((one - x) * (one + x)).sqrt();
@@ -173,7 +173,7 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
             g[0] = (x * number(0.5)).tanh();
             std::array::from_fn(|k| if k == 0 { x * g[0] } else { x * g[k] + number(k as f64) * g[k - 1] })
         }
-        // Numbers enclose it by the functions that it is made of.
+        // Numbers enclose such functions through the operations that they consist of.
         _ => [Interval::ENTIRE; 7],
     }
 }
@@ -198,7 +198,7 @@ pub fn real_power(x: Interval, p: f64) -> Derivatives {
     let mut factor = number(1.0);
     std::array::from_fn(|k| {
         let exponent = number(p) - number(k as f64);
-        // The exponent p - k may be rounded: x^e increases or decreases in e, its ends give the ends.
+        // The exponent p - k may be rounded: x^e is monotonic in e, so its ends give the ends.
         let found = factor * x.real_power(exponent.low).hull(x.real_power(exponent.high));
         factor *= exponent;
         found

@@ -8,11 +8,11 @@ use crate::scalar::Real;
 use std::f64::consts::PI;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// All numbers from `low` to `high`; what an operation gives holds every result of numbers in its operands.
+/// All numbers from `low` to `high`. The result of an operation contains every result for numbers in its operands.
 ///
-/// Sums, products, quotients and roots are rounded to nearest by the hardware and then moved outward by one number, which is the most
-/// that they can be off. Where a result is not defined for every number of an operand (a quotient by an interval that holds 0, the
-/// root of one that reaches below it), it is [`Interval::ENTIRE`], of which nothing can be concluded.
+/// Sums, products, quotients and roots are rounded to nearest by the hardware and then moved outward by one number, which bounds their
+/// error. Where a result is not defined for every number of an operand (a quotient by an interval that contains 0, the root of one with
+/// negative numbers), it is [`Interval::ENTIRE`], which proves nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The lower end.
@@ -27,12 +27,12 @@ impl Interval {
     /// 0 alone.
     pub const ZERO: Self = Self::point(0.0);
 
-    /// From `low` to `high`; everything if the two are not in order or not numbers.
+    /// From `low` to `high`; everything if the two are out of order or `NaN`.
     #[inline]
     pub fn new(low: f64, high: f64) -> Self {
         if low <= high { Self { low, high } } else { Self::ENTIRE }
     }
-    /// One number alone; of `NaN`, see [`Interval::new`].
+    /// A single number; for `NaN`, see [`Interval::new`].
     #[inline]
     pub const fn point(x: f64) -> Self {
         if x.is_nan() { Self::ENTIRE } else { Self { low: x, high: x } }
@@ -87,13 +87,13 @@ impl Interval {
     pub fn is_bounded(self) -> bool {
         self.low.is_finite() && self.high.is_finite()
     }
-    /// The numbers in both; one of the two, as each holds the truth, if rounding left none.
+    /// The intersection. If rounding left nothing, one of the two, since each contains the truth.
     #[inline]
     pub fn meet(self, other: Self) -> Self {
         let (low, high) = (self.low.max(other.low), self.high.min(other.high));
         if low <= high { Self { low, high } } else { self }
     }
-    /// The smallest interval that holds both.
+    /// The smallest interval that contains both.
     #[inline]
     pub fn hull(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
@@ -115,7 +115,7 @@ impl Interval {
         match exponent {
             0 => Self::point(1.0),
             1 => self,
-            // Of an even power the ends are those of the absolute values.
+            // An even power has the ends of the power of the absolute value.
             even if even % 2 == 0 => self.square().power_of(even / 2),
             // An odd power increases.
             odd => {
@@ -220,7 +220,7 @@ fn widened(low: f64, high: f64) -> Interval {
     let wide = |x: f64| x.abs() * MARGIN + f64::MIN_POSITIVE;
     let (low, high) =
         (low - if low.is_finite() { wide(low) } else { 0.0 }, high + if high.is_finite() { wide(high) } else { 0.0 });
-    // An infinite end that overflow gave stands for numbers beyond the largest.
+    // An infinite end that came from overflow stands for numbers beyond the largest.
     let low = if low == f64::INFINITY { f64::MAX } else { low };
     let high = if high == f64::NEG_INFINITY { f64::MIN } else { high };
     Interval::outward(low, high)
@@ -278,7 +278,7 @@ impl Interval {
     pub fn sin_cos(self) -> (Self, Self) {
         (self.wave(f64::sin, 0.5), self.wave(f64::cos, 0.0))
     }
-    /// A wave that is 1 at `crest * pi` and each turn from there.
+    /// A wave that is 1 at `crest * pi` and once every turn from there.
     fn wave(self, f: impl Fn(f64) -> f64, crest: f64) -> Self {
         if !self.inside(-LARGE_ANGLE, LARGE_ANGLE) || self.high - self.low > 6.0 {
             return Self { low: -1.0, high: 1.0 };

@@ -4,18 +4,18 @@
 //!
 //! A Lagrangian, learned or written down, is evaluated once per box of states with numbers that carry its value and its first and second
 //! derivatives along the velocities, each as a polynomial over the box and a bound of the distance from it (a Taylor model, of the third
-//! order for two coordinates). What comes out encloses the mass matrix of every state of the box; Gershgorin's and Sylvester's theorems prove the signs of its eigenvalues
-//! and bound its condition number. Boxes that are not decided are cut in two.
+//! order for two coordinates). The result encloses the mass matrix of every state of the box; Gershgorin's and Sylvester's theorems prove
+//! the signs of its eigenvalues and bound its condition number. Undecided boxes are cut in two.
 //!
 //! # What is proven
 //!
 //! Every statement is about the Lagrangian as a function of real numbers whose weights, parameters and constants are those of the program.
-//! The rounding of the proof itself is covered everywhere: `Interval`s are rounded outward, forms charge to their distance
-//! what a sum or a product may have lost, and the functions of the standard library are granted 8 units in the last place. What a program
-//! rounds when it evaluates the same mass matrix at one state is not part of the statement; it moves eigenvalues by about the condition
+//! The rounding of the proof itself is covered everywhere: `Interval`s are rounded outward, forms add to their distance the possible
+//! rounding error of a sum or a product, and the functions of the standard library are granted 8 units in the last place. Rounding in a
+//! program that evaluates the same mass matrix at one state is not part of the statement; it shifts eigenvalues by about the condition
 //! number times `1e-16`, relative to the smallest.
 //!
-//! A box in which a branch of the Lagrangian (`select`, `max`, `|x|`) is not decided, or where it is not defined, stays open.
+//! A box in which a branch of the Lagrangian (`select`, `max`, `|x|`) is not decided, or the Lagrangian is not defined, stays open.
 //!
 //! # Example
 //!
@@ -77,7 +77,7 @@ impl From<Signature> for [usize; 2] {
 }
 
 impl Signature {
-    /// Of `n` coordinates, one of which may be a time: all positive but one for the time.
+    /// The signature of `n` coordinates, one of which may be a time: all positive except for the time.
     pub fn of(n: usize, time_like: bool) -> Self {
         let negative = usize::from(time_like && n > 0);
         Self { positive: n - negative, negative }
@@ -94,12 +94,12 @@ pub struct Options<'a> {
     pub condition: Option<f64>,
     /// Time in s after which no further box is evaluated.
     pub seconds: f64,
-    /// Boxes after which no further one is evaluated: a search that ends by it, not by time, is the same every time, on any number of
+    /// Largest number of boxes to evaluate: a search that ends by it, not by time, gives the same result every time, on any number of
     /// threads.
     pub boxes: usize,
-    /// Threads, at most; where fewer can be started, a search takes longer and finds the same.
+    /// Largest number of threads; if fewer can be started, the search takes longer and finds the same.
     pub threads: usize,
-    /// A flag that ends the search when it is raised, with what is proven by then.
+    /// A flag that ends the search when raised; what is proven by then is kept.
     pub stop: Option<&'a AtomicBool>,
 }
 
@@ -122,7 +122,7 @@ pub struct Witness {
     pub eigenvalues: Vec<f64>,
 }
 
-/// Outcome of a search: shares of the region, which add up to 1, and what was proven of a single state.
+/// Outcome of a search: shares of the region, which add up to 1, and proofs about single states.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Certificate {
@@ -133,13 +133,13 @@ pub struct Certificate {
     pub limit: Option<f64>,
     /// Share in which every state is proven to satisfy the conditions.
     pub certified: f64,
-    /// Share in which every state is proven not to be.
+    /// Share in which every state is proven to violate them.
     pub refuted: f64,
-    /// Share of which neither is proven.
+    /// Share in which neither is proven.
     pub open: f64,
     /// Boxes evaluated.
     pub boxes: usize,
-    /// A state that is proven not to be as it should, if one was found.
+    /// A state that is proven to violate the conditions, if one was found.
     pub witness: Option<Witness>,
     /// Proven bound of the condition number in the whole certified share; `None` if no box was certified by enclosures.
     #[cfg_attr(feature = "serde", serde(rename = "condition_bound"))]
@@ -158,9 +158,9 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// Knowledge of a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
+    /// The verdict on a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
     ///
-    /// A few comparisons: an integrator may ask at every step, as it does of a [`Guarded`] model.
+    /// It takes a few comparisons, so that an integrator can ask at every step, as it does for a [`Guarded`] model.
     pub fn verdict<S: Scalar>(&self, q: &[S], v: &[S]) -> Verdict {
         let wrapped = |(i, x): (usize, &S)| if self.wrapped.get(i) == Some(&true) { x.wrap_angle() } else { *x };
         let state: Vec<f64> = q.iter().enumerate().map(wrapped).chain(v.iter().copied()).map(S::to_f64).collect();
@@ -185,7 +185,7 @@ pub enum CertificateError {
         /// Pairs found.
         found: usize,
     },
-    /// Bounds that hold no number, or too many.
+    /// Bounds that contain no number, or too many.
     Bounds {
         /// Coordinate or velocity.
         what: &'static str,
@@ -209,7 +209,7 @@ pub enum CertificateError {
     Condition(f64),
     /// More coordinates than the enclosures are made for.
     Coordinates(usize),
-    /// A system that is not of the catalogue and has no description.
+    /// The system is not in the catalogue and has no description.
     NoLagrangian,
     /// A system that depends on the time.
     Timed,
@@ -236,9 +236,9 @@ impl std::fmt::Display for CertificateError {
 
 impl std::error::Error for CertificateError {}
 
-/// Searches a region for where the mass matrix of a Lagrangian has its signature.
+/// Searches a region for states where the mass matrix of a Lagrangian has its signature.
 ///
-/// `parameters` are those that the Lagrangian takes, enclosed if no `f64` is equal to one.
+/// `parameters` are those of the Lagrangian; a parameter that no `f64` equals is enclosed.
 ///
 /// # Errors
 /// [`CertificateError`] for a region, a signature or a condition number that does not fit.
@@ -252,10 +252,10 @@ pub fn certify<L: Lagrangian, S: Scalar>(
     Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
 }
 
-/// As [`certify`], for a system of the catalogue or by its description.
+/// As [`certify`], for a system from the catalogue or from its description.
 ///
 /// # Errors
-/// As there, [`CertificateError::NoLagrangian`] and [`CertificateError::Timed`].
+/// Those of [`certify`], [`CertificateError::NoLagrangian`] and [`CertificateError::Timed`].
 pub fn certify_system<S: Scalar>(
     configured: &SystemInstance<S>,
     region: &Bounds,

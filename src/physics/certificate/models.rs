@@ -13,12 +13,12 @@ use std::f64::consts::TAU;
 /// As [`certify`](super::certify), for a network with its weights.
 ///
 /// The structures `mechanical` and `metric` have their signature by construction: `M = S C eta C^T S` with `S` the reciprocal scales, `eta`
-/// the signs and `C` lower triangular, its diagonal `softplus(c_ii) + 10^-3 > 0`, so that `C` is not singular whatever the network's
-/// finite outputs are, and `M` has the signs of `eta` (Sylvester). This holds unless a known Lagrangian is added. If that is the signature
-/// asked for and no condition number is, nothing is evaluated.
+/// the signs and `C` lower triangular, its diagonal `softplus(c_ii) + 10^-3 > 0`, so that `C` is not singular whatever the network's finite
+/// outputs are, and `M` has the signs of `eta` (Sylvester). This holds unless a known Lagrangian is added. If this signature is requested
+/// without a condition number, nothing is evaluated.
 ///
-/// A coordinate that the network takes as an angle without its sine and cosine is reduced to one turn before; a region that reaches over
-/// the end of a turn is cut there, and witnesses are given in that turn.
+/// A coordinate that the network takes as an angle, without its sine and cosine, is first reduced to one turn; a region that crosses the
+/// end of a turn is cut there, and witnesses are given in that turn.
 ///
 /// # Errors
 /// As [`certify`](super::certify).
@@ -45,7 +45,7 @@ fn signature_by_construction(architecture: &Architecture) -> Option<Signature> {
     proven.then(|| Signature::of(architecture.coordinates, architecture.time_like.is_some()))
 }
 
-/// A region that is certified without a box.
+/// A region that is certified without evaluating a box.
 fn proven(signature: Signature, bounds: Vec<(f64, f64)>) -> Certificate {
     let (n, found) = (bounds.len() / 2, Found::proven());
     Certificate {
@@ -107,11 +107,11 @@ fn turn(bounds: Vec<(f64, f64)>, share: f64, axis: usize) -> Vec<(Vec<(f64, f64)
     vec![part((first.min(end), end), share * (1.0 - beyond)), part((0.0, rest), share * beyond)]
 }
 
-/// A model with a [`Certificate`] that is asked at every state: `dL/dq`, mass matrix and acceleration of a state that is not certified fail
-/// with [`MechanicsError::Uncertified`].
+/// A model with a [`Certificate`] that is consulted at every state: `dL/dq`, mass matrix and acceleration of a state that is not certified
+/// fail with [`MechanicsError::Uncertified`].
 ///
 /// An integrator stops where the certified region ends, as at the bound of a domain, and says so (`RolloutError::Uncertified`): at every
-/// state that moved it the mass matrix is proven to have its signature. `L`, momenta and the energy are given everywhere.
+/// state that it used, the mass matrix is proven to have its signature. `L`, momenta and the energy are given everywhere.
 #[derive(Clone, Debug)]
 pub struct Guarded<'a, M> {
     model: M,

@@ -47,7 +47,7 @@ impl<'a> Number<'a> {
         Variable(arena, arena.combine(terms, constant))
     }
 
-    /// The sign, if it is the same on the whole box: `Some(true)` above 0, `Some(false)` at or below.
+    /// The sign, if it is the same on the whole box: `Some(true)` if positive, `Some(false)` if not.
     fn positive(self) -> Option<bool> {
         let range = self.range();
         if range.low > 0.0 {
@@ -96,7 +96,7 @@ impl Add for Number<'_> {
         }
     }
 }
-/// Exact where one of the two is 0.
+/// Exact if one of the two is 0.
 fn sum(a: Interval, b: Interval) -> Interval {
     if a == Interval::ZERO {
         b
@@ -240,9 +240,9 @@ impl Real for Number<'_> {
 
 /// `W x + b`, `(outputs)`; `weights` is `W`, `(outputs, inputs)` row-major, `bias` is `b` or empty.
 ///
-/// The polynomial of an output is the product of `W` with those of the inputs; its distance is the product of `|W|` with the distances of the
-/// inputs and with what the rounding of a sum of so many products can lose in any order, `|error| <= gamma sum_j |W_ij| |x_j|`,
-/// `gamma = inputs EPSILON / 2` to first order (Higham 2002, section 3.1), charged twice.
+/// The polynomial of an output is the product of `W` with those of the inputs; its distance is the product of `|W|` with the distances of
+/// the inputs and with the largest rounding error of such a sum in any order, `|error| <= gamma sum_j |W_ij| |x_j|`, `gamma = inputs
+/// EPSILON / 2` to first order (Higham 2002, section 3.1), charged twice.
 pub fn map<'a>(weights: &[Number<'a>], bias: &[Number<'a>], x: &[Number<'a>]) -> Vec<Number<'a>> {
     let arena = x.iter().find_map(|x| if let Number::Variable(arena, _) = x { Some(*arena) } else { None });
     let exact: Option<Vec<f64>> = weights.iter().map(exact).collect();
@@ -343,7 +343,7 @@ fn gathered(arena: &Arena, x: &[Number<'_>]) -> Vec<f64> {
     columns
 }
 
-/// Distances of the inputs and what rounding may lose of their coefficients, `(parts, inputs)`.
+/// Distances of the inputs and a bound of the rounding errors of their coefficients, `(parts, inputs)`.
 fn distances(columns: &[f64], (inputs, stride): (usize, usize), loss: f64) -> Vec<f64> {
     let mut found = vec![0.0; columns.len() / stride];
     vectorized(

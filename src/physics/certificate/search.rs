@@ -50,13 +50,13 @@ struct Waiting {
     bounds: Vec<(f64, f64)>,
     /// Share of the whole region.
     share: f64,
-    /// Number of halvings until its parts are probably decided, by what was found of the box that it was cut from.
+    /// Estimated number of halvings until its parts are decided, from the spectrum of the box that it was cut from.
     halvings: f64,
 }
 
 impl Waiting {
-    /// Boxes with a larger rank come first: at the beginning large ones, which show where the matrix is not as it should be; then those of which
-    /// most will be decided per box that has to be evaluated, of these small ones, whose neighbours were decided last.
+    /// Boxes with a larger rank come first: at the beginning large ones, which show where the matrix violates the conditions; then boxes
+    /// with the largest decided share expected per evaluated box, the smallest of them first, whose neighbours were decided last.
     fn rank(&self) -> (bool, i64, Reverse<i64>, Reverse<usize>) {
         let size = self.share.log2();
         let large = size > LARGE;
@@ -99,7 +99,7 @@ const CHUNK: usize = 128;
 const LARGE: f64 = -9.5;
 /// A box is cut at once into parts that are halved so much less often than it probably has to be.
 const CAUTION: f64 = 0.5;
-/// Halvings at once, at most.
+/// Largest number of halvings at once.
 const MOST_HALVINGS: usize = 6;
 
 /// Cuts boxes whose shares of the region are given with them, until each is decided, or time, the number of boxes or a flag ends the search.
@@ -152,7 +152,7 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
     found
 }
 
-/// The spectra of boxes, `None` for those that were not evaluated before `goes_on` returned `false`.
+/// The spectra of boxes; `None` for boxes that were not evaluated before `goes_on` returned `false`.
 fn evaluate(
     source: &dyn Enclose,
     chunk: &[Waiting],
@@ -209,9 +209,9 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
     active
 }
 
-/// Where and how often a box is to be cut.
+/// Where and how often to cut a box.
 struct Cut<'a> {
-    /// For every axis how much the matrix changes along it in the part that is cut next.
+    /// For every axis, how much the matrix changes along it in the part that is cut next.
     influence: Vec<f64>,
     spectrum: &'a Spectrum,
     /// Sides of the region.
@@ -224,8 +224,8 @@ impl<'a> Cut<'a> {
         Self { influence: spectrum.influence.clone(), spectrum, scale, active }
     }
 
-    /// The axis to cut and its middle: where the matrix changes most, by its polynomial and, for a share as large as the side, by the distance
-    /// from it. Of a matrix that is not known, the longest side of those to blame.
+    /// The axis to cut and its middle: where the matrix changes most, by its polynomial and by a share of the distance from it as large as
+    /// the side. If the matrix is not known, the longest of the axes responsible.
     fn place(&self, bounds: &[(f64, f64)]) -> Option<(usize, f64)> {
         let relative = |axis: usize| {
             let (low, high) = bounds[axis];
@@ -294,7 +294,7 @@ impl Tree {
         })
     }
 
-    /// The verdict of the smallest box that holds a state of the `root`-th region.
+    /// The verdict of the smallest box that contains a state of the `root`-th region.
     pub fn verdict(&self, root: usize, state: &[f64]) -> Verdict {
         let mut at = root;
         while let Some((axis, place, first)) = self.nodes[at].cut {
@@ -352,7 +352,7 @@ impl Options<'_> {
         }
     }
 
-    /// `true` if the computed eigenvalues of a state make it worth a proof that it is a witness.
+    /// `true` if the computed eigenvalues suggest that a state is a witness, which is worth a proof.
     fn suspects(&self, eigenvalues: &[f64], n: usize) -> bool {
         let size = |x: &f64| x.abs();
         let condition = eigenvalues.iter().map(size).fold(0.0, f64::max)

@@ -15,7 +15,7 @@ pub struct MatrixForms {
     pub n: usize,
     pub basis: Arc<Basis>,
     pub forms: Vec<[f64; 1]>,
-    /// Bits of the axes along which a box has to be cut for what is not known to become so.
+    /// Bits of the axes along which to cut a box so that what is unknown may become known.
     pub blamed: u64,
 }
 
@@ -29,9 +29,9 @@ pub struct Spectrum {
     pub condition: (f64, f64),
     /// Eigenvalues in the middle, ascending, as computed: not an enclosure. Empty if the middle is not finite.
     pub middle: Vec<f64>,
-    /// For every axis of the box how much the matrix changes along it, relative to its eigenvalues.
+    /// For every axis of the box, how much the matrix changes along it, relative to its eigenvalues.
     pub influence: Vec<f64>,
-    /// The same for the distance from the polynomial; infinite if the matrix is not known.
+    /// The change through the distance from the polynomial; infinite if the matrix is not known.
     pub remainder: f64,
     /// Number of halvings of the box until the signs of the eigenvalues are proven in every part, as far as its polynomial can say; 0 if they
     /// are proven, infinite if the matrix is not known.
@@ -47,13 +47,13 @@ impl MatrixForms {
         &self.forms[(i * self.n + j) * stride..(i * self.n + j + 1) * stride]
     }
 
-    /// Proves what it can.
+    /// Proves as much as possible.
     ///
-    /// With the computed eigenvectors `u_k` of the middle as rows of `U`, `B = U M U^T` is nearly diagonal, as long as the box is small.
-    /// Where every row `k` is dominated by its diagonal, `d_k |B_kk| > sum_l d_l |B_kl|` for some `d > 0`, no matrix on the way from `B`
-    /// to its diagonal is singular: the signs of the diagonal are those of the eigenvalues (Gershgorin), and by Sylvester's law also of
-    /// those of `M`. The rounding of `U` is no matter there; for the condition number Ostrowski's theorem bounds it: with
-    /// `|U U^T - 1| <= delta` every eigenvalue of `B` is one of `M` times a factor from `1 - delta` to `1 + delta`.
+    /// With the computed eigenvectors `u_k` of the middle as rows of `U`, `B = U M U^T` is nearly diagonal if the box is small. Where every
+    /// row `k` is dominated by its diagonal, `d_k |B_kk| > sum_l d_l |B_kl|` for some `d > 0`, no matrix on the way from `B` to its
+    /// diagonal is singular: the diagonal has the signs of the eigenvalues (Gershgorin), which by Sylvester's law are also those of `M`.
+    /// The rounding of `U` does not affect that; for the condition number Ostrowski's theorem bounds its effect: with `|U U^T - 1| <=
+    /// delta` every eigenvalue of `B` is one of `M` times a factor from `1 - delta` to `1 + delta`.
     pub fn spectrum(&self) -> Spectrum {
         let (n, stride, basis) = (self.n, self.basis.stride(), &*self.basis);
         let axes = basis.of_degree(1).len();
@@ -82,7 +82,7 @@ impl MatrixForms {
         let weights: Vec<f64> = (0..n).map(weight).collect();
         let (polynomials, distance) = self.split();
         let whole = self.rotated(&vectors);
-        // Growth with the sides, by degrees, of the row in which it is largest.
+        // Growth with the sides, by degree, in the row in which it is largest.
         let mut growth = [0.0; MOST_DEGREE + 2];
         for k in 0..n {
             let mut row = [0.0; MOST_DEGREE + 2];
@@ -178,8 +178,8 @@ fn orthogonality_defect(n: usize, u: &[f64]) -> f64 {
 }
 
 impl Spectrum {
-    /// From the ranges of the elements of a matrix, `(n, n)`, that differs from `B` by one of at most the norm `distance`, and weights
-    /// `d`. What was known before is kept.
+    /// Draws conclusions from the ranges of the elements of a matrix, `(n, n)`, that differs from `B` by a matrix of norm at most
+    /// `distance`, and from weights `d`. Earlier conclusions are kept.
     fn conclude(&mut self, n: usize, ranges: &[Interval], weights: &[f64], distance: f64, defect: f64) {
         let diagonal = |k: usize| ranges[k * n + k];
         let distance = Interval::new(0.0, distance);
@@ -192,7 +192,7 @@ impl Spectrum {
             diagonal(k).abs() + Interval::symmetric(radius.magnitude())
         };
         let discs: Vec<Interval> = (0..n).map(disc).collect();
-        // Comparisons fail for what is not a number.
+        // Comparisons with `NaN` fail.
         if !discs.iter().all(|disc| disc.low > 0.0) {
             return;
         }
@@ -215,9 +215,9 @@ impl Spectrum {
 /// A Lagrangian with its parameters, ready to be evaluated over boxes by any thread.
 pub struct Source<'l, L> {
     pub lagrangian: &'l L,
-    /// Intervals that hold the parameters.
+    /// Intervals that contain the parameters.
     pub parameters: Vec<Interval>,
-    /// Monomials of the polynomials that enclose what it computes.
+    /// Monomials of the polynomials that enclose the results.
     pub basis: Arc<Basis>,
 }
 
@@ -230,7 +230,7 @@ pub trait Enclose: Sync {
 }
 
 impl<'l, L: Lagrangian> Source<'l, L> {
-    /// Numbers of any precision; those that no `f64` is equal to are enclosed.
+    /// Accepts numbers of any precision; a number that no `f64` equals is enclosed.
     pub fn new<S: Scalar>(lagrangian: &'l L, parameters: &[S]) -> Self {
         let enclosed = |x: &S| match x.parts() {
             (high, 0.0) => Interval::point(high),
@@ -287,10 +287,10 @@ fn mass_matrix<'a, L: Lagrangian>(
     MatrixForms { n, basis: Arc::clone(&arena.basis), forms, blamed: arena.blamed() }
 }
 
-/// Intervals `(n, n)` that hold the elements of the mass matrix `d2L/dv dv` of every state of a box, `(low, high)` of every coordinate and
-/// every velocity; everything where the Lagrangian is not defined in the whole box, or not differentiable, as `|v|` at 0.
+/// Intervals `(n, n)` that contain the elements of the mass matrix `d2L/dv dv` of every state of a box, `(low, high)` of every coordinate
+/// and every velocity; everything where the Lagrangian is not defined in the whole box, or not differentiable, such as `|v|` at 0.
 ///
-/// Parameters are taken as they are; constants in the Lagrangian's own code are the `f64` that it names.
+/// Parameters are enclosed; constants in the Lagrangian's own code are the `f64` numbers that it names.
 ///
 /// # Panics
 /// If there are not `n` pairs of each.

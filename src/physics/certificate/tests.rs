@@ -206,7 +206,7 @@ fn what_is_not_decided_stays_open() {
     let kink = open("x_dot^2 + y_dot^2 + abs(x_dot)");
     assert!(kink.certified > 0.9 && kink.open > 0.0 && kink.refuted == 0.0, "{kink:?}");
     assert_eq!(kink.verdict(&[0.3, 0.2], &[0.0, 0.2]), Verdict::Open);
-    // Where L is not defined.
+    // Where L is undefined.
     let undefined = open("x_dot^2*exp(sqrt(x)) + y_dot^2");
     assert!(undefined.certified < 0.5 && undefined.certified > 0.4 && undefined.refuted == 0.0, "{undefined:?}");
     let potential = open("x_dot^2 + y_dot^2 - ln(y)");
@@ -323,7 +323,7 @@ fn structures_are_certified_by_construction() {
         let bounded = certify_network(&model, &region, &options).unwrap();
         assert!(bounded.by_construction && bounded.boxes > 0 && bounded.certified > 0.9, "{bounded:?}");
         assert!(bounded.condition.unwrap() <= 1e4);
-        // A known part may spoil the signature, another one is not that of the structure.
+        // A known part may spoil the signature, and another signature is not that of the structure.
         let other = if signature == DEFINITE { indefinite } else { DEFINITE };
         let wrong = certify_network(&model, &region, &limited(other, 400)).unwrap();
         assert!(!wrong.by_construction && wrong.certified == 0.0 && wrong.refuted > 0.0);
@@ -339,7 +339,7 @@ fn threads_and_turns_change_nothing() {
         let region = Bounds { positions: vec![positions, (-0.2, 0.2)], velocities: vec![(-0.2, 0.2); 2] };
         certify_network(&model, &region, &Options { threads, ..limited(DEFINITE, 3000) }).unwrap()
     };
-    // More threads than there are boxes are not started.
+    // No more threads are started than there are boxes.
     let many = certified((1.0, 2.0), usize::MAX);
     let (one, three) = (certified((1.0, 2.0), 1), certified((1.0, 2.0), 3));
     assert_eq!((one.certified, one.refuted, one.boxes), (many.certified, many.refuted, many.boxes));

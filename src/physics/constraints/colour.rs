@@ -22,11 +22,11 @@ const MOST: f64 = 0.97;
 /// Decrease of the misfit, in units of its standard deviation, above which noise counts as correlated (`lnn-studies rates --part
 /// constraints`: white noise is called correlated in none of a hundred).
 const PLAIN: f64 = 12.0;
-/// Largest misfit, above the smallest one, that is not excluded. The differences at neighbouring distances share samples, so that their misfit
-/// scatters by far more than its units: with 40 the true variance is included in 15 of 16 recordings with an autocorrelation of 0.9, with 12 in
-/// 11.
+/// Largest excess of the misfit over the smallest one that is not excluded. The differences at neighbouring distances share samples, so
+/// that the misfit scatters by far more than one unit: with 40 the true variance is included in 15 of 16 recordings with an autocorrelation
+/// of 0.9, with 12 in 11.
 const ALLOWED: f64 = 40.0;
-/// Largest mean square, over that at distance 1, at which the noise is visible beside the motion.
+/// Largest mean square, relative to that at distance 1, at which the noise is visible beside the motion.
 const SEEN: f64 = 40.0;
 /// Smallest number of differences that is used.
 const LEAST: usize = 64;
@@ -38,8 +38,8 @@ pub struct Colour {
     pub sigma: f64,
     /// Lag-1 autocorrelation.
     pub rho: f64,
-    /// The largest variance that the differences allow, over that of the standard deviation: at low frequencies, where the motion hides the
-    /// noise, its spectrum is extrapolated from higher ones.
+    /// The largest variance that the differences allow, over the estimated one: at low frequencies, where the motion hides the noise, its
+    /// spectrum is extrapolated from higher ones.
     pub slack: f64,
 }
 
@@ -162,7 +162,7 @@ mod tests {
                     .collect();
                 let white = noise_alone(tracks.iter().map(|t| (t.times.as_slice(), t.q.as_slice())), 1, 0);
                 let found = Colour::of(&tracks, 1, 0, white);
-                // Correlated noise hides behind the motion as soon as it is slow.
+                // Correlated noise is hidden by slow motion.
                 assert!((found.rho - rho).abs() < 0.1 && found.slack.sqrt() * found.sigma > 0.0095, "{rho}: {found:?}");
                 assert!(rho > 0.5 || (found.sigma / 0.01 - 1.0).abs() < 0.15, "{rho}: {found:?}");
                 assert!(rho > 0.0 || found.slack == 1.0, "{rho}: {found:?}");

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Usual number of states at which a Lagrangian is examined.
 pub const EXAMINED_STATES: usize = 64;
 
-/// Eigenvalues of a mass matrix within its constraints below so many roundings of the largest count as zero.
+/// Eigenvalues of a mass matrix within its constraints that are below this many roundings of the largest count as zero.
 const ROUNDINGS: f64 = 1024.0;
 
 /// Constraints and degenerate directions of a Lagrangian.
@@ -47,8 +47,8 @@ pub struct OwnConstraint {
     pub formula: String,
 }
 
-/// Examines the Lagrangian of a system with these coordinates at states `(states, n)`, each projected onto the constraints; `formulas` are those
-/// of the constraints by name.
+/// Examines the Lagrangian of a system with these coordinates at states `(states, n)`, each projected onto the constraints; `formulas` are
+/// the formulas of the constraints, by name.
 ///
 /// States without a finite mass matrix are left out; `states` is 0 if that leaves none.
 pub fn examine(

@@ -143,7 +143,7 @@ impl Features {
     pub fn moves(&self, term: usize) -> bool {
         self.terms[term].velocity.is_some()
     }
-    /// `true` for terms with velocities whose weights include one of a term without.
+    /// `true` if a combination of terms with velocities also contains a term without one.
     pub fn has_rate(&self, weights: &[f64]) -> bool {
         self.terms.iter().zip(weights).any(|(term, &weight)| term.velocity.is_none() && weight != 0.0)
     }
@@ -198,7 +198,7 @@ impl Features {
         }
     }
 
-    /// Gradient by the coordinates of a combination.
+    /// Gradient of a combination with respect to the coordinates.
     pub fn gradient(&self, samples: &MotionSamples, at: usize, weights: &[f64]) -> Vec<f64> {
         let (mut values, mut slopes, mut gradient) = (Vec::new(), Vec::new(), vec![0.0; self.n]);
         self.evaluate(samples, at, &mut values, &mut slopes);

@@ -19,7 +19,7 @@ const HOLDS: f64 = 9.0;
 const RISE: f64 = 30.0;
 /// Shares of the largest weight below which several terms are removed at a time.
 const SHARES: [f64; 5] = [0.1, 0.03, 0.01, 3e-3, 1e-3];
-/// Terms are removed one by one if there are at most so many.
+/// Terms are removed one by one if there are at most this many.
 const FEW: usize = 40;
 /// Preference for pivots of lower degree, which would otherwise not divide terms of higher degree.
 const LOWER: f64 = 1e-3;
@@ -29,7 +29,7 @@ const FORMS: usize = 4;
 const WORK: usize = 4_000_000_000;
 /// Half-width of the confidence interval of a factor, over the largest factor, above which the factor is not determined.
 const UNDETERMINED: f64 = 0.3;
-/// Quantile of Student's distribution for 95 %, 7 degrees of freedom, as of eight parts.
+/// Quantile of Student's distribution for 95 % and 7 degrees of freedom, from eight parts of the data.
 const STUDENT: f64 = 2.365;
 
 /// Largest ratios of variances at which a combination vanishes, and at which it does so within the noise.
@@ -46,14 +46,14 @@ pub struct Limits {
 const DEVIATIONS: f64 = 3.0;
 
 impl Limits {
-    /// For functions of positions, or for rows with measured velocities.
+    /// Limits for functions of positions, or for rows with measured velocities.
     pub fn of(samples: &MotionSamples) -> Self {
         let (count, independent) = (samples.len().max(1) as f64, samples.independent().max(1.0));
         let scatter = (2.0 / independent + 6.0 / count).sqrt();
         Self { taken: TAKEN * samples.slack(), within: samples.slack() * (1.0 + DEVIATIONS * scatter) }
     }
 
-    /// For rows with velocities from smoothing, whose errors are known less well.
+    /// Limits for rows with smoothed velocities, whose errors are less well known.
     pub fn of_smoothed() -> Self {
         Self { taken: TAKEN, within: TAKEN }
     }
@@ -73,7 +73,7 @@ pub struct Generator {
     pub holds: bool,
     /// Whether only noise remains.
     pub within: bool,
-    /// Root mean square length of its gradient by the coordinates.
+    /// Root mean square length of its gradient with respect to the coordinates.
     size: f64,
 }
 
@@ -125,7 +125,7 @@ impl<'a> Vanishing<'a> {
         let cancellation = &samples.cancellation;
         let mut found = Self { features, cancellation, moments, whole, centred, independent, limits, levels, leading };
         let highest = (0..p).map(|term| features.degree(term)).max().unwrap_or(0);
-        // The product of a constant and of another function is not constant: there is one level.
+        // The product of a constant and another function is not constant, so centred functions have one level.
         let degrees = if centred { highest..=highest } else { 0..=highest };
         for degree in degrees.take_while(|_| cancellation.go_on()) {
             let left = |&term: &usize| {
@@ -168,8 +168,8 @@ impl<'a> Vanishing<'a> {
         if taken.is_empty() { self.levels.last().and_then(|level| level.gap) } else { gaps.reduce(f64::min) }
     }
 
-    /// Combinations reduced to the terms they need, simple ones first: an independent basis, and combinations of few terms. Also whether the
-    /// search for the latter was complete.
+    /// Combinations reduced to the terms they need, simple ones first: an independent basis, and combinations of few terms. Also returns
+    /// whether the search for those of few terms was complete.
     pub fn generators(&self) -> (Vec<Generator>, bool) {
         let mut supports: Vec<Vec<usize>> = Vec::new();
         for level in &self.levels {
@@ -369,12 +369,12 @@ impl Generator {
         (0..self.weights.len()).filter(|&term| self.weights[term] != 0.0)
     }
 
-    /// Root mean square length of its gradient by the coordinates, once computed.
+    /// Root mean square length of its gradient with respect to the coordinates, once computed.
     pub fn size(&self) -> f64 {
         self.size
     }
 
-    /// The same with the length of its gradient at some samples.
+    /// Sets the length of its gradient from some samples.
     pub fn sized(self, samples: &MotionSamples, features: &Features, places: &[usize]) -> Self {
         let square = |&at: &usize| {
             let row = features.gradient(samples, at, &self.weights);

@@ -31,8 +31,8 @@ use regular::{branching, phases};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Distance of smoothed positions from their constraints, root mean square, in standard deviations of the noise and over the size of the
-/// motion, up to which it is said to obey them.
+/// Largest root mean square distance of smoothed positions from their constraints, in standard deviations of the noise and over the size of
+/// the motion, at which the motion is said to obey them.
 pub(crate) const OBEDIENCE: (f64, f64) = (5.0, 0.01);
 
 /// Largest number of terms that are searched together.
@@ -45,7 +45,7 @@ const IMPOSED: (f64, f64) = (0.1, 0.1);
 const BESIDE: (f64, f64) = (0.5, OUTSIDE);
 /// Number of states at which gradients are compared.
 const PLACES: usize = 64;
-/// Number of states for the test that they stay independent, which must include one near where they do not.
+/// Number of states at which functions are tested for independence, which must include one near a place where they depend on each other.
 const MANY_PLACES: usize = 256;
 /// A row of unit length nearly follows from others at a state if its part outside their span is below this.
 const NEARLY: f64 = 0.1;
@@ -84,8 +84,8 @@ pub enum ConstraintKind {
     PerTrajectory,
     /// A function or a row that nearly vanishes, but not within the noise: a stiff spring, an arc that looks straight. It is not a constraint.
     Nearly,
-    /// A function whose gradient vanishes somewhere along the motion, or follows from those of others there: a second branch begins, and the
-    /// function does not determine which branch the motion takes. It cannot serve as a constraint.
+    /// A function whose gradient vanishes somewhere along the motion, or depends on the gradients of others there: a second branch begins,
+    /// and the function does not determine which branch the motion takes. It cannot serve as a constraint.
     Branching,
 }
 
@@ -123,7 +123,7 @@ pub struct FoundConstraints {
     pub gap: Option<f64>,
     /// Trajectories it was found on.
     pub trajectories: usize,
-    /// Candidates that did not hold on trajectories that were left out.
+    /// Candidates that failed on held-out trajectories.
     pub refuted: usize,
     /// Names of the coordinates.
     pub coordinates: Vec<String>,
@@ -154,7 +154,7 @@ pub enum ConstraintSearchError {
     /// Too many terms.
     #[error("{what} gives {found} terms, at most {MOST_TERMS} can be searched together")]
     Terms {
-        /// What gives so many terms.
+        /// The kind of terms that are too many.
         what: &'static str,
         /// Their number.
         found: usize,
@@ -180,7 +180,7 @@ pub fn find_constraints(
     search: ConstraintSearch,
 ) -> Result<FoundConstraints, ConstraintSearchError> {
     let of_positions = Features::of_positions(samples, search.degree);
-    // Of many coordinates, as many as there is room for.
+    // With many coordinates, the highest degree that there is room for.
     let (degree, of_velocities) = (0..=search.velocity_degree)
         .rev()
         .map(|degree| (degree, Features::of_velocities(samples, degree)))
@@ -289,8 +289,8 @@ impl RowsTaken {
         Self { bases: vec![Vec::new(); places.len()], places, refuted: 0 }
     }
 
-    /// Takes generators while one has a part outside the span of those already taken: the simplest, which come first, of those whose part is at
-    /// least half of the largest one.
+    /// Takes generators while one has a part outside the span of those already taken. Each time it takes the simplest one, which comes
+    /// first, whose part is at least half of the largest part.
     fn take(
         &mut self,
         samples: &MotionSamples,
@@ -360,9 +360,9 @@ impl RowsTaken {
 /// Functions with the same zeros whose gradients are independent wherever the motion was: for a rotation matrix, three products of columns and
 /// three of rows are independent at most states, but not for rotations about an axis.
 ///
-/// If one of the functions nearly follows from the others, or its gradient vanishes, at some of the states, others are chosen from all simple
-/// functions with these zeros: the same number, one after the other, with the smallest mean of `1 / det G` over the states, where `G` contains
-/// the products of the normalized gradients.
+/// If one of the functions nearly follows from the others, or its gradient vanishes, at some of the states, an equal number of others is
+/// chosen from all simple functions with these zeros, one after the other, with the smallest mean of `1 / det G` over the states, where `G`
+/// contains the products of the normalized gradients.
 fn independent_everywhere(
     samples: &MotionSamples,
     features: &Features,
@@ -429,7 +429,7 @@ fn independent_everywhere(
     chosen.into_iter().map(|k| pool[k].clone()).collect()
 }
 
-/// The smallest part of one of some rows outside the span of those before it.
+/// The smallest part of any row outside the span of the rows before it.
 fn least_part<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
     let (mut basis, mut least): (Vec<f64>, f64) = (Vec::new(), f64::INFINITY);
     for row in rows {

@@ -16,7 +16,7 @@ struct Fold {
     between: Vec<f64>,
 }
 
-/// The same of several parts of the data, so that each can be left out.
+/// Moments of several parts of the data, so that each can be left out.
 #[derive(Clone, Debug)]
 pub struct Moments {
     terms: usize,
@@ -34,7 +34,7 @@ pub struct Pencil {
 }
 
 impl Moments {
-    /// From all samples, in `folds` parts; trajectories stay whole if there are enough of them.
+    /// Moments of all samples, in `folds` parts; trajectories stay whole if there are enough of them.
     pub fn of(samples: &MotionSamples, features: &Features, folds: usize) -> Self {
         let p = features.len();
         let empty = Fold { samples: 0.0, gram: vec![0.0; p * p], noise: vec![0.0; p * p], between: vec![0.0; p * p] };

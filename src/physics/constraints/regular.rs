@@ -8,7 +8,7 @@ use crate::linalg::{Workspace, dot, eigh};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Largest integer multiple of an angle that is tried, and how near to one a ratio of gradients must be.
+/// Largest integer multiple of an angle that is tried, and the largest deviation of a ratio of gradients from one.
 const MULTIPLES: std::ops::RangeInclusive<u32> = 1..=12;
 const WHOLE: f64 = 0.05;
 /// Share of the gradients that must have the same directions everywhere.
@@ -114,8 +114,8 @@ fn phase(samples: &MotionSamples, limits: Limits, k: &[i32]) -> Option<FoundCons
     Some(FoundConstraint { kind, formula: format!("sin({terms})"), coefficients, range, defect: ratio.sqrt() })
 }
 
-/// Which of some functions reach a second branch along the motion: their gradient reverses from one sample to the next, or follows from those of
-/// the others.
+/// Which of some functions reach a second branch along the motion: their gradient reverses from one sample to the next, or depends on the
+/// gradients of the others.
 pub(super) fn branching(samples: &MotionSamples, features: &Features, functions: &[Generator]) -> Vec<bool> {
     let (m, mut found) = (functions.len(), vec![false; functions.len()]);
     let sizes: Vec<f64> = functions.iter().map(Generator::size).collect();

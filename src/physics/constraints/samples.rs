@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 
 /// Largest number of samples that are used, evenly spaced.
 const MOST_SAMPLES: usize = 60_000;
-/// A column moves if its standard deviation along its trajectories exceeds so many standard deviations of its noise: otherwise it would vanish
-/// itself, and every function of it with it.
+/// A column moves if its standard deviation along its trajectories exceeds this many standard deviations of its noise. Otherwise it would
+/// vanish itself, and with it every function of it.
 const MOVES: f64 = 2.0;
 
 /// Positions and velocities of trajectories, with standard deviations of their noise.
@@ -20,7 +20,7 @@ pub struct MotionSamples {
     periodic: Vec<bool>,
     /// `(samples, 2 n)`.
     states: Vec<f64>,
-    /// Of the positions, `(n)`, and of the velocities, `(samples, n)`.
+    /// Noise of the positions, `(n)`, and of the velocities, `(samples, n)`.
     position_noise: Vec<f64>,
     velocity_noise: Vec<f64>,
     /// First sample of each trajectory.
@@ -124,7 +124,7 @@ impl MotionSamples {
         Ok(samples)
     }
 
-    /// The same samples; `cancellation` cancels a search in them and receives its progress.
+    /// These samples with a `cancellation` that cancels a search in them and receives its progress.
     #[must_use]
     pub fn watched(self, cancellation: &Cancellation) -> Self {
         Self { cancellation: cancellation.clone(), ..self }
@@ -150,7 +150,7 @@ impl MotionSamples {
     pub(super) fn independent(&self) -> f64 {
         self.len() as f64 / self.alike.max(1.0)
     }
-    /// Largest variance of the noise that the recording allows, over the one that is used.
+    /// Largest variance of the noise that the recording allows, over the estimated one.
     pub(super) fn slack(&self) -> f64 {
         self.slack
     }
@@ -191,7 +191,7 @@ impl MotionSamples {
         let ends = self.starts.iter().skip(1).copied().chain([self.len()]);
         self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
     }
-    /// At most so many samples, evenly spaced.
+    /// At most `most` evenly spaced samples.
     pub(crate) fn places(&self, most: usize) -> Vec<usize> {
         (0..self.len()).step_by(self.len().div_ceil(most).max(1)).collect()
     }
@@ -208,8 +208,8 @@ impl MotionSamples {
     }
 }
 
-/// Why a column counts as still; none for one that moves. A column that is constant along every trajectory does not show a constraint, nor does
-/// one that is all noise: its sensor may be off.
+/// Why a column counts as still; none if it moves. Neither a column that is constant along every trajectory nor one of pure noise shows a
+/// constraint: its sensor may be off.
 fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> Option<String> {
     let (n, mut square, mut count, mut constant) = (recording.n(), 0.0, 0.0, true);
     for track in &recording.tracks {

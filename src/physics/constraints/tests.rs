@@ -95,7 +95,7 @@ fn rotation(rng: &mut ChaCha8Rng) -> Path {
     })
 }
 
-/// The products of columns and rows of a rotation matrix hold it at most states, and depend on each other where it turns about an axis.
+/// The products of columns and of rows determine a rotation matrix at most states, but depend on each other where it turns about an axis.
 #[test]
 fn what_holds_a_rotation_holds_it_about_every_axis() {
     let names = ["r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"];
@@ -149,7 +149,7 @@ fn top(rng: &mut ChaCha8Rng) -> Path {
     })
 }
 
-/// Linear functions are found as such, and not as their products with coordinates, which hold nothing where these vanish.
+/// Linear functions are found themselves, not their products with coordinates, which constrain nothing where those vanish.
 #[test]
 fn what_follows_from_linear_functions_is_not_found_again() {
     let names: Vec<String> = (1..=12).map(|i| format!("q{i}")).collect();
@@ -161,7 +161,7 @@ fn what_follows_from_linear_functions_is_not_found_again() {
             let least = linear.coefficients.values().fold(f64::INFINITY, |least, c| c.abs().min(least));
             assert!((least - 0.22 / 1.22).abs() < 1e-3, "{noise}: {linear:?}");
         }
-        // The other six are of the nine coordinates that are left, and their terms are squares and products of two.
+        // The other six contain the remaining nine coordinates, and their terms are squares and products of two.
         let others = found.constraints[3..].iter().flat_map(|found| found.coefficients.keys());
         let used: BTreeSet<&str> =
             others.flat_map(|term| term.split(['*', '^'])).filter(|x| x.starts_with('q')).collect();
@@ -212,7 +212,7 @@ fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
     assert!(radius.len() == 2 && (radius["x^2"] / radius["y^2"] - 1.0).abs() < 1e-3, "{found:?}");
 }
 
-/// The way of a rolling disk along its heading has no curl in the directions that both rows leave, and is no function all the same.
+/// The row of a rolling disk along its heading has no curl in the null space of both rows, and yet is not the derivative of a function.
 #[test]
 fn a_row_beside_others_is_integrable_by_itself_or_not_at_all() {
     let names = ["x", "y", "theta", "phi"];
@@ -301,7 +301,7 @@ fn what_stretches_by_more_than_the_noise_is_nearly_a_constraint() {
         assert_eq!(found.count, found.formulas().len());
         found.constraints.iter().map(|c| c.kind).collect::<Vec<_>>()
     };
-    // A root mean square stretch of 1.6 of the noise, and one of a tenth.
+    // A root mean square stretch of 1.6 times the noise, and one of a tenth.
     assert_eq!(kinds(0.01 * 1.6 * 2f64.sqrt()), [ConstraintKind::Nearly]);
     assert_eq!(kinds(0.01 * 0.1), [ConstraintKind::Holonomic]);
 }

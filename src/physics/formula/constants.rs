@@ -1,4 +1,4 @@
-//! Names of constants, those of equal coefficients among them, and fractions near them.
+//! Names of constants, shared by equal coefficients, and fractions near them.
 
 use super::found::{FoundFormula, Near};
 use super::units::{Dimension, of_coefficient};
@@ -36,8 +36,8 @@ impl FoundFormula {
         }
     }
 
-    /// `true` if two coefficients are the same constant or its negative: in the same block, with the same unit, equal within their errors, and
-    /// not by chance.
+    /// `true` if two coefficients are the same constant or its negative: in the same block, with the same unit, equal within their errors,
+    /// and too close for chance.
     fn equal(&self, a: usize, b: usize) -> bool {
         const ACCIDENT: f64 = 5e-3;
         let (m, [x, y]) = (self.terms.len(), [a, b].map(|k| &self.terms[k]));

@@ -1,8 +1,8 @@
-//! Frequencies of a periodic drive, in what libraries without one leave of the motion.
+//! Frequencies of a periodic drive, found in the residuals of libraries without one.
 //!
-//! The weak form of a library leaves a mean acceleration in every window. A drive shows in them as a spectral line: as a force on a coordinate,
-//! `cos(om t)`, or as a factor of a function of the coordinates. Its power is compared with that of the neighbouring frequencies, so that a
-//! continuous spectrum, of noise or of what the library lacks, has no line.
+//! The weak form of a library leaves a mean acceleration in every window. A drive shows in the residuals as a spectral line: as a force on
+//! a coordinate, `cos(om t)`, or as a factor of a function of the coordinates. Its power is compared with that of the neighbouring
+//! frequencies, so that a continuous spectrum, of noise or of what the library lacks, has no line.
 
 use super::find::{WeakForm, best};
 use super::function::Function;
@@ -21,8 +21,8 @@ const MOST_DAMPED: f64 = 15.0;
 /// Frequencies that are looked at within the resolution of the recording, and their largest number.
 const OVERSAMPLED: f64 = 4.0;
 const MOST_FREQUENCIES: f64 = 50_000.0;
-/// Distance from a line, in units of the resolution, of the frequencies that show the spectrum without it; and their smallest number, in the
-/// same units.
+/// Distance from a line, in units of the resolution, of the frequencies that show the background spectrum; and their smallest number, in
+/// the same units.
 const BESIDE: [f64; 2] = [2.0, 14.0];
 const LEAST_BESIDE: f64 = 6.0;
 /// Largest rate of false alarms, for all frequencies that are looked at together.
@@ -34,7 +34,7 @@ const MOST_LINES: usize = 3;
 /// Largest number of terms whose effect is removed from the motion first.
 const MOST_REMOVED: usize = 20;
 
-/// What a library leaves of the motion.
+/// The residuals that a library leaves.
 pub(super) struct Rest {
     /// Times of the windows, in s.
     times: Vec<f64>,
@@ -46,8 +46,8 @@ pub(super) struct Rest {
     resolution: [f64; 2],
 }
 
-/// The effect on accelerations of what a drive multiplies, for a factor of 1, by window: its square, its product with the errors that are left,
-/// and with each of the orthonormal effects of other terms, which are not in the errors.
+/// The accelerations per unit amplitude of a drive, by window: their square, their product with the residuals, and with each of the
+/// orthonormal effects of other terms, which are no longer in the residuals.
 struct Driven {
     squares: Vec<f64>,
     products: Vec<f64>,
@@ -76,7 +76,7 @@ impl Driven {
             ss -= s * s;
         }
         let determinant = cc * ss - cs * cs;
-        // Near a frequency of 0 the sine and the cosine are one function; others may be both of them.
+        // Near frequency 0 the sine and the cosine are the same function, and other terms may explain both.
         if determinant <= 1e-9 * whole_cc * whole_ss {
             return 0.0;
         }
@@ -99,8 +99,8 @@ pub(super) fn longest(data: &Prepared<'_>) -> f64 {
 }
 
 impl Rest {
-    /// What is left of the motion in the windows that are not held out, with the mass matrix of the best choice of terms, which a drive may have
-    /// led astray, and with one of unit masses.
+    /// The residuals in the windows that are not held out, with the mass matrix of the best choice of terms, which a drive may have
+    /// spoiled, and with unit masses.
     pub fn of(weak: &WeakForm, data: &Prepared<'_>, held: &BTreeSet<usize>) -> Vec<Self> {
         let units = weak.windows.unit_mass(&weak.library, &weak.quotient.kept, &data.speeds);
         let masses = [Some(&units), best(&weak.path).map(|choice| &choice.coefficients)];
@@ -146,7 +146,7 @@ impl Rest {
         Self { times, driven, band, resolution }
     }
 
-    /// The most significant lines of several, in order; those that are one within the resolution once.
+    /// The most significant lines of several spectra, in order; lines closer than the resolution are returned once.
     pub fn lines<'a>(rests: impl Iterator<Item = &'a Self>, stop: &Cancellation) -> Vec<Line> {
         let mut lines: Vec<(Line, f64)> =
             rests.filter_map(|rest| Some((rest.line(stop)?, rest.resolution[0] / 2.0))).collect();
@@ -191,8 +191,8 @@ impl Rest {
         self.driven.iter().map(|driven| driven.power(&sines, &cosines)).collect()
     }
 
-    /// Probability of a power as large as that at a peak, from the median of those beside it: of `k` of them, `(1 + z/k)^-k` for a power of `z`
-    /// times their mean, where all are exponentially distributed. `None` if there are too few.
+    /// Probability of a power as large as that at a peak, from the median of `k` powers beside it: `(1 + z/k)^-k` for a power of `z` times
+    /// their mean, if all are exponentially distributed. `None` if there are too few.
     fn chance(&self, grid: &[f64], powers: &[f64], peak: usize) -> Option<f64> {
         let [from, to] = BESIDE.map(|units| units * self.resolution[0]);
         let is_beside = |om: &f64| (from..to).contains(&(om - grid[peak]).abs());
@@ -223,7 +223,7 @@ fn add(to: &mut [f64], factor: f64, column: &[f64]) {
     to.iter_mut().zip(column).for_each(|(to, x)| *to += factor * x);
 }
 
-/// Removes from a column what others explain; returns orthonormal directions of these.
+/// Removes from a column what other columns explain; returns orthonormal directions of those columns.
 fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
     let mut directions: Vec<Vec<f64>> = Vec::new();
     for mut column in columns {

@@ -12,8 +12,8 @@ use std::f64::consts::TAU;
 /// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
 const REPEATED: f64 = 0.02;
 const MOST_REPEATED: usize = 4;
-/// Most terms of a law with a drive, whose frequency is chosen too: of two nearly linear coordinates outside the libraries, one recording in ten
-/// was followed by 24 terms; laws with a drive of the same study have up to 7 (`lnn-studies rates --part drives`).
+/// Most terms of a law with a drive, whose frequency is fitted too: for two nearly linear coordinates outside the libraries, 24 terms
+/// fitted one recording in ten; laws with a drive in the same study have up to 7 (`lnn-studies rates --part drives`).
 const MOST_TERMS: usize = 12;
 
 /// Reasons why a model with a drive may not be the law of the motion that it fits.
@@ -67,7 +67,7 @@ fn is_linear(library: &Library, k: usize) -> bool {
     library.is_driven(k) || own + function <= 2
 }
 
-/// `true` if the whole motion is the same after a time.
+/// `true` if the whole motion repeats after a time.
 fn repeats(data: &Prepared<'_>, after: f64) -> bool {
     let n = data.n;
     let (mut squares, mut count) = (vec![0.0; n], 0.0);

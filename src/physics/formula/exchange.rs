@@ -54,7 +54,7 @@ impl Search<'_> {
                 let mut tried = proposal.model;
                 let mut starts = segments.clone();
                 for rounds in [0, CHOICES] {
-                    // As it is, and without the terms that the exchange has made superfluous.
+                    // With all terms, and without those that the exchange has made superfluous.
                     self.converge(&mut tried, &mut starts, rounds);
                     if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
                         break;
@@ -83,7 +83,7 @@ impl Search<'_> {
         rival
     }
 
-    /// Exchanges by the normal equations of all candidates, the cheapest first, and the variance that counts as noise.
+    /// Exchanges by the normal equations of all candidates, the cheapest first, and the noise variance.
     fn proposals(
         &self,
         model: &Model,
@@ -142,7 +142,7 @@ fn removals(inverse: &[f64], x: &[f64], most: f64) -> Vec<(f64, Vec<usize>)> {
         let pivot = inverse_with(gone.len(), &part(size, inverse, gone), 0.0)?;
         Some(dot(&own, &times(gone.len(), &pivot, &own)))
     };
-    // More terms never cost less than one of them.
+    // Removing more terms never costs less than removing one of them.
     let mut found: Vec<(f64, Vec<usize>)> = Vec::new();
     let mut last: Vec<Vec<usize>> = vec![Vec::new()];
     for _ in 0..MOST_GONE {

@@ -1,4 +1,4 @@
-//! What a library has beside kinetic and potential terms: gyroscopic ones, friction and a drive.
+//! Terms of a library other than kinetic and potential ones: gyroscopic terms, friction and a drive.
 
 use super::families::Families;
 use super::function::{Factor, Function};
@@ -48,7 +48,7 @@ impl std::fmt::Display for Extent {
 pub(super) struct Drive {
     /// Name of its angular frequency.
     pub name: String,
-    /// Angular frequency `om` in rad/s; that of a [`Model`](super::motion::Model) is fitted.
+    /// Angular frequency `om` in rad/s; a [`Model`](super::motion::Model) fits it.
     pub frequency: f64,
 }
 
@@ -67,7 +67,7 @@ impl Library {
         }
     }
 
-    /// Adds the terms of a drive: forces on the coordinates, `q_i cos(om t)`, and simple functions that it shakes.
+    /// Adds the terms of a drive: forces on the coordinates, `q_i cos(om t)`, and simple functions with an oscillating factor.
     pub(super) fn add_drive(&mut self) {
         if self.drive.is_none() {
             return;

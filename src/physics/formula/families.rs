@@ -109,7 +109,7 @@ impl std::str::FromStr for Families {
     }
 }
 
-/// Exponents of so many coordinates with a sum of at most `degree`, lower sums first.
+/// Exponents of `count` coordinates with a sum of at most `degree`, lower sums first.
 fn exponents(count: usize, degree: usize) -> Vec<Vec<usize>> {
     let mut all = vec![vec![]];
     for _ in 0..count {
@@ -125,7 +125,7 @@ fn exponents(count: usize, degree: usize) -> Vec<Vec<usize>> {
     all
 }
 
-/// Multiples of so many angles with a sum of magnitudes from 1 to `degree`, one of each pair `m`, `-m`.
+/// Multiples of `count` angles with a sum of magnitudes from 1 to `degree`, one of each pair `m`, `-m`.
 fn harmonics(count: usize, degree: i32) -> Vec<Vec<i32>> {
     let mut all: Vec<Vec<i32>> = vec![vec![]];
     for _ in 0..count {

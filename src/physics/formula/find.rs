@@ -80,7 +80,7 @@ impl Default for FormulaOptions {
 
 /// Largest number of bootstrap samples.
 pub const MOST_BOOTSTRAPS: usize = 10_000;
-/// One block in so many is held out.
+/// One block in this many is held out.
 const HELD_OUT: usize = 5;
 /// Largest number of terms that are fitted to the motion.
 const MOST_CANDIDATES: usize = 60;
@@ -88,8 +88,8 @@ const MOST_CANDIDATES: usize = 60;
 const MOST_START: usize = 15;
 /// Largest error of accelerations, over the smallest of all choices, of a shorter choice that may be the start.
 const START_ERROR: f64 = 1.3;
-/// The same for a choice with a positive definite mass matrix if no such choice is nearer, and for others that are tried if the first gives no
-/// formula; and the number of these.
+/// The largest such error of a choice with a positive definite mass matrix if no closer choice has one, and of other choices, tried if the
+/// first gives no formula; and the number of the latter.
 const DEFINITE_ERROR: f64 = 3.0;
 const OTHER_STARTS: usize = 2;
 /// Largest number of choices of terms that are fitted to the motion.
@@ -301,7 +301,7 @@ impl WeakForm {
     }
 }
 
-/// The blocks that are held out: one in so many, chosen at random.
+/// The blocks that are held out: one in [`HELD_OUT`], chosen at random.
 pub(super) fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     let tracks = 0..data.recording.tracks.len();
     let mut blocks: Vec<usize> = tracks.flat_map(|t| data.pieces(t).into_iter().map(|(block, _)| block)).collect();

@@ -61,7 +61,7 @@ pub struct FoundTerm {
     pub dissipation: bool,
     /// A simple fraction within the error of the coefficient, if there is one.
     pub near: Option<Near>,
-    /// Index of the term of its block whose coefficient is fixed, if there is one.
+    /// Index of the term of its block with the fixed coefficient, if there is one.
     #[serde(skip)]
     pub(super) reference: Option<usize>,
     /// Coefficients of bootstrap samples in which terms were chosen again.
@@ -143,7 +143,7 @@ pub struct FoundFormula {
     pub notes: Vec<String>,
     /// Interpolation of known forces between the samples.
     pub between: Option<Between>,
-    /// `true` if the formula is that of a model, not of recorded motion.
+    /// `true` if the formula describes a model, not recorded motion.
     pub of_model: bool,
     /// `true` if a dissipation function was searched.
     pub friction: bool,
@@ -231,7 +231,7 @@ impl FoundFormula {
         }
     }
 
-    /// Takes over the coefficients of bootstrap samples, by the terms of the library.
+    /// Stores the coefficients of bootstrap samples for the terms of the library.
     pub(super) fn draw(&mut self, library: &Library, model: &Model, coefficients: &BTreeMap<usize, Vec<f64>>) {
         for &k in &model.terms {
             let text = library.written(k, Notation::System);

@@ -195,7 +195,7 @@ impl Function {
         Self::Product(vec![Factor::Power(i, 1)])
     }
 
-    /// Value at `q` and gradient by the first `n` of its numbers; a phase may stand behind them.
+    /// Value at `q` and gradient with respect to the first `n` numbers; a phase may follow them.
     pub fn taylor(&self, q: &[f64], n: usize) -> Taylor {
         let mut found = Taylor::default();
         if self.is_one() {

@@ -7,8 +7,8 @@ use super::search::Search;
 use crate::identification::{ResidualPath, Segment};
 use crate::names::rounded;
 
-/// Smallest and largest held-out residual over noise at which a formula is found; if the noise is given or is that of exact numbers, only the
-/// largest one applies.
+/// Smallest and largest ratio of held-out residuals to noise at which a formula counts as found; if the noise is given or that of exact
+/// numbers, only the largest one applies.
 const LEAST_RESIDUAL: f64 = 0.8;
 const MOST_RESIDUAL: f64 = 1.1;
 /// Smallest ratio of a coordinate's motion to its residual at which it can confirm a law: noise is below half of the spread.

@@ -17,7 +17,8 @@ use std::collections::BTreeSet;
 const BETTER: f64 = 0.8;
 
 /// Finds a formula for the Lagrangian of recorded motion. If no families are given, searches larger and larger libraries until one fits the
-/// held-out motion; if none does, searches on as far as the options say, for friction that depends on the position and for a periodic drive.
+/// held-out motion; if none does, it also searches, as far as the options allow, for friction that depends on the position and for a
+/// periodic drive.
 ///
 /// # Errors
 /// [`FormulaError`] for motion that is too short, cannot be smoothed or does not determine a law, for example because a coordinate stands still;
@@ -73,7 +74,7 @@ struct Ladder<'a> {
     best: Option<FoundFormula>,
     /// Smallest error of accelerations so far.
     least: f64,
-    /// What libraries without a drive leave of the motion.
+    /// Residuals of the libraries without a drive.
     rests: Vec<(Extent, Vec<Rest>)>,
 }
 
@@ -107,7 +108,7 @@ impl<'a> Ladder<'a> {
         self.kept(weak)
     }
 
-    /// A result, or none after an error that another library may not have.
+    /// A result; none after an error that another library may avoid.
     fn kept<T>(&mut self, result: Result<T, FormulaError>) -> Result<Option<T>, FormulaError> {
         self.options.cancellation.check()?;
         Ok(match result {
@@ -120,7 +121,7 @@ impl<'a> Ladder<'a> {
     }
 
     fn climb(&mut self, friction: Friction) -> Result<(), FormulaError> {
-        // A formula of high powers may be the series of a shorter one of other functions.
+        // A long formula of high powers may be the series of a shorter one of other functions.
         let mut long = false;
         for families in self.rungs.clone() {
             if long && families.is_polynomial() {
@@ -159,8 +160,8 @@ impl<'a> Ladder<'a> {
         Ok(())
     }
 
-    /// Searches the libraries again with a drive, of each frequency that stands out of what one of them leaves: where a library hides it, another
-    /// may not.
+    /// Searches the libraries again with a drive, at each frequency that stands out of the residuals of one of them: one library may hide a
+    /// line that another one shows.
     fn drive(&mut self) -> Result<(), FormulaError> {
         let Some(name) = drive_name(&self.data.recording.coordinates) else { return Ok(()) };
         let stop = &self.options.cancellation;
@@ -175,7 +176,7 @@ impl<'a> Ladder<'a> {
             let families = extent.families;
             let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent.clone() };
             let Some(weak) = self.weak_form(&extent)? else { continue };
-            // As long as the frequency is that of a line, errors of libraries are hardly different.
+            // Near the frequency of a line, the errors of different libraries hardly differ.
             if weak.least() > least / BETTER {
                 continue;
             }

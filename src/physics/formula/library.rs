@@ -90,7 +90,7 @@ impl Library {
         Ok(library)
     }
 
-    /// Adds products of sines and cosines of single angles, each of which is a sum of the functions that are searched.
+    /// Adds products of sines and cosines of single angles, each of which is a sum of searched functions.
     fn add_products(&mut self, angles: &[usize]) {
         let n = self.names.len();
         let unit = |i: usize| (0..n).map(|k| i32::from(k == i)).collect::<Vec<_>>();
@@ -185,8 +185,8 @@ impl Library {
         }
     }
 
-    /// The equations of motion of some terms, whose coefficients are the first of `count` parameters and the last of which is the frequency of
-    /// the drive if there is one; with derivatives by the chosen parameters and then by the coefficients of the wanted terms.
+    /// The equations of motion of some terms with `count` parameters: first the coefficients, last the frequency of the drive if there is
+    /// one. They have derivatives by the chosen parameters and then by the coefficients of the wanted terms.
     ///
     /// # Errors
     /// A formula that branches on its data.
@@ -344,7 +344,7 @@ struct Sum<'a> {
 }
 
 impl Lagrangian for Sum<'_> {
-    /// The time is the last one if there is a drive.
+    /// If there is a drive, the time comes last.
     fn coordinates(&self) -> usize {
         self.library.n() + self.library.known()
     }
@@ -386,7 +386,7 @@ mod tests {
             assert!(!kept.contains(&find(nothing)), "{nothing}");
             assert!(quotient.over_kept[find(nothing)].as_ref().unwrap().iter().all(|x| x.abs() < 1e-9));
         }
-        // Of two terms whose sum is a total derivative one remains.
+        // If the sum of two terms is a total derivative, one of them remains.
         let pair = ["q1_dot*q2*cos(q1)", "q2_dot*sin(q1)"].map(find);
         assert_eq!(pair.iter().filter(|k| kept.contains(k)).count(), 1);
         // sin^2 over cos 2x.

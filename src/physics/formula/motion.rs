@@ -158,7 +158,7 @@ impl Motion<'_> {
         Some(work(&mut problem, x))
     }
 
-    /// Normal equations of some terms at a model, by block, with the frequency of the drive as it is.
+    /// Normal equations of some terms at a model, by block, with the frequency of the drive fixed.
     pub fn blocks(&self, model: &Model, wanted: &[usize], segments: &[Segment]) -> BTreeMap<usize, BlockSum> {
         self.blocks_of(model, (false, wanted), segments)
     }

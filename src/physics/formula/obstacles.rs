@@ -1,4 +1,4 @@
-//! Recordings that do not determine a law: coordinates that stand still, copies, steps, rows that do not belong to the motion, constraints.
+//! Recordings that do not determine a law: coordinates that stand still, copies, steps, outliers, constraints.
 
 use super::error::FormulaError;
 use crate::cancellation::Cancellation;
@@ -85,7 +85,7 @@ pub(super) fn constrained(
     }
     let options = SmoothOptions { noise: noise.cloned(), ..SmoothOptions::default() };
     let samples = MotionSamples::of(recording, &options)?.watched(cancellation);
-    // A search that is too large, or has too few samples, is no objection to a formula.
+    // A search that is too large, or has too few samples, does not rule a formula out.
     let Ok(found) = find_constraints(&samples, ConstraintSearch::default()) else { return Ok(None) };
     let held = found.constraints.into_iter().filter(|c| c.kind == ConstraintKind::Holonomic).map(|c| c.formula);
     let formulas: Vec<String> = held.collect();

@@ -208,7 +208,7 @@ impl<'a> Prepared<'a> {
         stretches
     }
 
-    /// Measured motion cut into segments of about so many seconds.
+    /// Measured motion cut into segments of about `seconds`.
     pub fn segments(&self, seconds: f64) -> Vec<Segment> {
         let n = self.n;
         let mut segments = Vec::new();

@@ -8,7 +8,7 @@ use crate::linalg::dot;
 pub(super) struct Quotient {
     /// Kept terms, in the order of the library.
     pub kept: Vec<usize>,
-    /// For every term of the library: its coefficients over the kept terms; none if it is not a combination of them.
+    /// For every term of the library, its coefficients over the kept terms; none if it is not a combination of them.
     pub over_kept: Vec<Option<Vec<f64>>>,
     /// Total derivatives and identities among the terms that are searched.
     pub removed: usize,

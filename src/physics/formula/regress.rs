@@ -15,20 +15,20 @@ use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
 use rand::Rng;
 
-/// Largest relative error of accelerations at which a formula counts as that of a model.
+/// Largest relative error of accelerations at which a formula still describes a model.
 const MOST_RESIDUAL: f64 = 0.02;
 /// Usual number of states at which a model is evaluated.
 pub const MODEL_STATES: usize = 1500;
 /// Largest number of such states.
 const MOST_STATES: usize = 3000;
-/// One state in so many is used only for validation.
+/// One state in this many is used only for validation.
 const HELD_OUT: usize = 5;
 /// Largest mean squared error, over the smallest one, at which a choice of terms may be the formula.
 const NEAR: f64 = 100.0;
 
 /// Passes of a refit: each uses the mass matrix of the previous one.
 const REFITS: usize = 8;
-/// Error of the motion, over the smallest one of any coefficients, up to which it does not determine a direction.
+/// A direction is not determined if the error of the motion stays below this multiple of the smallest error of any coefficients.
 const OPEN: f64 = 4.0;
 
 /// A state with the mass matrix and the acceleration of a model.
@@ -42,8 +42,8 @@ struct Asked {
 /// Finds a formula for a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at random accelerations `a`, or by
 /// `a(q, v)` alone if no formula has the mass matrix `M`; coefficients by `a(q, v)`.
 ///
-/// Structured models, black boxes and systems are evaluated in the same way. Total derivatives do not change the equations, so that neither
-/// model nor formula needs a gauge.
+/// Structured models, black boxes and systems are evaluated in the same way. Total derivatives do not change the equations, so neither the
+/// model nor the formula needs a gauge.
 ///
 /// # Errors
 /// [`FormulaError`] for a model whose terms are not finite, for a library that is too large, and for invalid functions and terms.
@@ -226,7 +226,7 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
     choice
 }
 
-/// The choice of terms from which none can be removed: the error grows most at the next shorter one.
+/// The choice of terms after which removing another one raises the error most.
 fn elbow(path: &Path, n: usize) -> Option<&Choice> {
     let least = path.best.values().map(|choice| choice.held_out).fold(f64::INFINITY, f64::min);
     // Differences below rounding are not significant.

@@ -49,8 +49,8 @@ impl Search<'_> {
         masses
     }
 
-    /// `true` if terms give a mass matrix that is not nearly singular relative to that of a model, and as definite. Lagrangians of the same
-    /// motion may differ in that: with a cyclic coordinate, any multiple of the square of its momentum may be added.
+    /// `true` if terms give a mass matrix that is not nearly singular relative to that of a model, and equally definite. Lagrangians of the
+    /// same motion may differ in this: with a cyclic coordinate, any multiple of the square of its momentum may be added.
     pub fn regular(&self, model: &Model, (terms, coefficients): (&[usize], &[f64])) -> bool {
         let n = self.library.n();
         let eigenvalues = |mass: &[f64]| {
@@ -229,7 +229,7 @@ pub(super) fn shorten(
 
 /// Covariance of a fit.
 pub(super) struct Covariance {
-    /// Of the coefficients with the common factors fixed, `(terms, terms)`.
+    /// Covariance of the coefficients with the common factors fixed, `(terms, terms)`.
     pub coefficients: Vec<f64>,
     /// Standard error of the frequency of the drive, if there is one.
     pub frequency: Option<f64>,

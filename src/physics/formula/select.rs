@@ -24,7 +24,7 @@ pub(super) struct Choice {
     pub coefficients: Vec<f64>,
     /// Mean squared error of accelerations on the training data.
     pub error: f64,
-    /// The same on held-out data.
+    /// The error on held-out data.
     pub held_out: f64,
 }
 
@@ -89,7 +89,7 @@ impl Normal {
         if self.driven() { &self.right } else { &self.size }
     }
 
-    /// The least error less what no choice changes.
+    /// The smallest possible error, without the part that no choice changes.
     fn least(&self, groups: &[Group]) -> Option<f64> {
         let of = |Group { places, share }: &Group| {
             let own = self.of(places);
@@ -300,7 +300,7 @@ pub(super) fn eliminate_backward(
     Path { best, order, settled }
 }
 
-/// Takes over a choice if it is better than that of the same size.
+/// Takes over a choice if it is better than the one of the same size.
 fn improve(best: &mut BTreeMap<usize, Choice>, choice: Choice) -> bool {
     let known = best.get(&choice.set.len()).map_or(f64::INFINITY, |known| known.error);
     let better = choice.error < known * (1.0 - 1e-3);

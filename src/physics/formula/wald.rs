@@ -59,7 +59,7 @@ pub(super) fn survivors(
         if cost(least) >= threshold || set.len() == 1 {
             return Some(Survivors { next: cost(least), set, coefficients: x });
         }
-        // Of terms that cost almost nothing the most complex one is removed first.
+        // Among terms that cost almost nothing, the most complex one is removed first.
         let nothing = threshold / 10.0;
         let free = order.iter().copied().filter(|&k| cost(k) < nothing);
         let gone = free.max_by(|&a, &b| complexity[a].total_cmp(&complexity[b])).unwrap_or(least);
@@ -108,7 +108,7 @@ mod tests {
             Equations { matrix: &matrix, right: &[0.1, -0.1], coefficients: &[2.0, 0.0], complexity: &[2.0, 1.0] };
         let all = survivors(&equations, 30.0, &|x| x[0] != 0.0 && x[1] != 0.0).unwrap();
         assert!(all.set == [0, 1] && (all.coefficients[0] - 2.0).abs() < 0.1, "{all:?}");
-        // Of terms that cost nothing the more complex one is removed.
+        // Among terms that cost nothing, the more complex one is removed.
         let one = survivors(&equations, 30.0, &|_| true).unwrap();
         assert!(one.set == [1] && (one.coefficients[1] - 2.0).abs() < 1e-2, "{one:?}");
     }

@@ -276,7 +276,7 @@ impl Windows {
         (0..self.terms).filter(|&k| kept(&self.joined[k])).collect()
     }
 
-    /// The inverse mass matrices of `coefficients` in units of `sigma`, `(windows, n, n)`, 0 where there is none, none of them far larger than
+    /// The inverse mass matrices of `coefficients` in units of `sigma`, `(windows, n, n)`; 0 where there is none, and none far larger than
     /// the others.
     fn weights(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
         let n = self.n;

@@ -70,7 +70,7 @@ impl FoundFormula {
         self.sum(dissipation, |t| (number(t.coefficient), t.term.clone()), "*")
     }
 
-    /// The same in LaTeX, with the frequency of the drive if the Lagrangian has one.
+    /// The formula in LaTeX, with the frequency of the drive if the Lagrangian has one.
     pub fn latex(&self, dissipation: bool) -> String {
         let sum = self.sum(dissipation, |t| (latex_number(t.coefficient), t.latex.clone()), "\\,");
         match &self.drive {
