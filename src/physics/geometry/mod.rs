@@ -1,8 +1,8 @@
 //! The geometry of a Lagrangian: metric, connection, curvature at points.
 //!
-//! The metric is the mass matrix `g_ij = d2L/dv_i dv_j` as it is: of `L = g_ij v_i v_j/2` it is `g_ij`, of `L = m g_ij v_i v_j/2`
-//! it is `m g_ij`, whose curvature scalar is that of `g_ij` over `m`. Of a Lagrangian that is not quadratic in the velocities it
-//! is the one at a given velocity, which the derivatives keep; of a quadratic one the velocity does not matter.
+//! The metric is the mass matrix `g_ij = d2L/dv_i dv_j` itself: `g_ij` for `L = g_ij v_i v_j/2`, and `m g_ij` for `L = m g_ij v_i v_j/2`,
+//! whose curvature scalar is that of `g_ij` over `m`. If a Lagrangian is not quadratic in the velocities, the metric is taken at a given
+//! velocity, which derivatives hold fixed; for a quadratic one the velocity does not matter.
 //!
 //! Derivatives are exact to rounding, up to the fourth of `L`. Conventions are those of Misner, Thorne and Wheeler, signature
 //! `-+++`:
@@ -50,7 +50,7 @@ use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};
 use crate::scalar::Scalar;
 use alloc::vec::Vec;
 
-/// Coordinates of a metric whose curvature is computed, at most: a tensor has `n^4` numbers, a point takes 190 MB.
+/// Largest number of coordinates of a metric whose curvature is computed: a tensor has `n^4` numbers, a point takes 190 MB.
 #[doc(hidden)]
 pub const MOST_COORDINATES: usize = 32;
 
@@ -95,10 +95,10 @@ impl<S: Scalar> Geometry<S> {
         Ok(Self { metric, connection, curvature })
     }
 
-    /// The same in other numbers.
+    /// The geometry in another number type.
     ///
     /// # Errors
-    /// [`GeometryError::NotFinite`] where they do not reach that far.
+    /// [`GeometryError::NotFinite`] for numbers beyond its range.
     pub(crate) fn rounded<T: Scalar>(&self) -> Result<Geometry<T>, GeometryError> {
         let Self { metric, connection, curvature } = self;
         let rounded =
@@ -160,7 +160,7 @@ pub enum GeometryError {
         /// Numbers found.
         found: usize,
     },
-    /// Curvature of more coordinates than there is room for.
+    /// More coordinates than the curvature has memory for.
     TooMany {
         /// Coordinates of the model.
         found: usize,

@@ -161,8 +161,8 @@ impl<S: Scalar> Equator<'_, S> {
         Ok(Symmetric { value: [a[0], b[0], c[0]], first: [a[1], b[1], c[1]], second: [a[2], b[2], c[2]] })
     }
 
-    /// Outermost radius between `low` and `high` below which a number that is positive outside is so no more, to the precision of the numbers;
-    /// `None` if it is positive everywhere, or nowhere at the outer end.
+    /// Outermost radius between `low` and `high` below which a number that is positive outside stops being positive, to the precision of
+    /// the numbers; `None` if it is positive everywhere, or nowhere at the outer end.
     ///
     /// # Errors
     /// As [`Equator::at`].

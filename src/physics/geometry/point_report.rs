@@ -11,18 +11,18 @@ use alloc::vec::Vec;
 
 /// Significant digits for people.
 const DIGITS: usize = 7;
-/// A component below so many roundings of the largest one, in directions of unit length, counts as zero.
+/// A component below this many roundings of the largest one, in directions of unit length, counts as zero.
 const ROUNDINGS: f64 = 64.0;
 
 /// What is known of the geometry at a point.
 pub struct PointReport<'a, S> {
     /// Names of the coordinates.
     pub names: &'a [String],
-    /// In the order in which they are reported.
+    /// Quantities in the order in which they are reported.
     pub quantities: Vec<Quantity<S>>,
     /// Lengths of the coordinate directions, `sqrt(max_j |g_ij|)`, `(n)`: components are compared after division by them.
     lengths: Vec<f64>,
-    /// Why there is no geometry, if so.
+    /// Why there is no geometry, if there is none.
     pub problem: Option<String>,
 }
 
@@ -140,13 +140,13 @@ impl<'a, S: Scalar> PointReport<'a, S> {
             up.chain(down.iter().map(|&i| self.lengths[i].recip())).fold(x.abs(), |x, length| x * length)
         };
         let all = || values.iter().enumerate().map(|(place, x)| (indices(place), x.to_f64()));
-        // Ricci's and Einstein's tensors are sums of Riemann's components: rounding is that of the parts.
+        // Ricci's and Einstein's tensors are sums of Riemann's components and inherit their rounding.
         let largest = all().map(|(at, x)| in_lengths(&at, x)).fold(self.curvature_of(quantity), f64::max);
         let least = ROUNDINGS * S::epsilon().to_f64() * largest;
         all().filter(|(at, x)| in_lengths(at, *x) > least && (quantity.independent)(at)).collect()
     }
 
-    /// Largest component of Riemann's tensor in directions of unit length, for what is made of it; 0 for all else.
+    /// Largest component of Riemann's tensor in directions of unit length, for quantities derived from it; 0 for all others.
     fn curvature_of(&self, quantity: &Quantity<S>) -> f64 {
         if !["ricci", "ricci_scalar", "einstein", "weyl"].contains(&quantity.key) {
             return 0.0;
@@ -197,7 +197,7 @@ impl<'a, S: Scalar> PointReport<'a, S> {
         findings
     }
 
-    /// The same as an `align*` environment, the heading as a comment.
+    /// The report as an `align*` environment, with the heading as a comment.
     pub fn latex(&self, heading: &str) -> String {
         let mut lines: Vec<String> = Vec::new();
         for quantity in self.quantities.iter().filter(|quantity| !quantity.symbol.is_empty()) {
@@ -299,7 +299,7 @@ mod tests {
         [report.findings("here").to_string(), report.latex("here")]
     }
 
-    /// Far from a hole Riemann's components differ by the fourth power of the distance, and none is lost.
+    /// Far from a hole Riemann's components differ by the fourth power of the distance, and all are kept.
     #[test]
     fn every_component_beyond_rounding_is_reported_once() {
         for r in [3.0, 3e4] {

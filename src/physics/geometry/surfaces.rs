@@ -98,15 +98,15 @@ fn changes<S: Scalar>(low: S, high: S) -> bool {
 /// |---|---|
 /// | the time | ergosurface, where `g_tt = 0` (of a static metric also its horizon) |
 /// | time and the angle of a symmetry axis | horizon of a rotating black hole: no observer can stay at its place |
-/// | all coordinates but one | where the surfaces of that one become null: a horizon in coordinates that are regular there |
+/// | all coordinates but one | where the surfaces on which that one is constant become null: a horizon in coordinates that are regular there |
 /// | all coordinates | the signature changes |
 ///
-/// The line is cut into `steps` equal pieces; every piece whose ends differ in sign is halved until its ends are neighbours.
-/// Two surfaces within a piece, and determinants that touch zero, are not seen. A place where the metric is not finite is passed over.
+/// The line is cut into `steps` equal pieces; every piece whose ends differ in sign is halved until its ends are neighbours. Two surfaces
+/// within a piece, and determinants that touch zero, are not seen. Points where the metric is not finite are skipped.
 ///
 /// # Errors
-/// [`GeometryError::Shape`] for slices of the wrong length, or a block that is empty or names a coordinate that there is not; the
-/// model's own.
+/// [`GeometryError::Shape`] for slices of the wrong length, or a block that is empty or names a coordinate that does not exist; the model's
+/// own.
 pub fn surfaces<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     block: &[usize],
@@ -130,7 +130,7 @@ pub fn surfaces<S: Scalar>(
     let place = |k: usize| S::of_f64(k as f64) / S::of_f64(steps as f64);
     let mut found = Vec::new();
     let zero = <S as Real>::zero();
-    // The last place where the metric is finite: its number and the value there.
+    // The last point where the metric is finite: its index and the value there.
     let mut last: Option<(usize, S)> = None;
     let mut pieces = Vec::new();
     for start in (0..=steps).step_by(PLACES) {
@@ -142,7 +142,7 @@ pub fn surfaces<S: Scalar>(
             if !here.is_finite() {
                 continue;
             }
-            // A single place where the metric is not finite, such as a horizon that is met exactly, hides no change of sign.
+            // A single point where the metric is not finite, such as one exactly on a horizon, does not hide a change of sign.
             let before = last.replace((k, here)).filter(|(before, at)| k - before <= 2 && changes(*at, here));
             pieces.extend(before.map(|(before, at)| [(place(before), at), (place(k), here)]));
         }
@@ -157,7 +157,7 @@ pub fn surfaces<S: Scalar>(
         loop {
             let within = |part: f64| Some(low + S::of_f64(part) * (high - low)).filter(|s| *s > low && *s < high);
             let mut at_inside = None;
-            // The metric may be singular on the surface itself, not beside it.
+            // The metric may be singular on the surface itself but not next to it.
             for s in [0.5, 0.375, 0.625].into_iter().filter_map(within) {
                 let at = value(&metrics(model, &point(s), velocity)?);
                 if at.is_finite() {

@@ -48,7 +48,7 @@ impl<S: Scalar> Metric<S> {
         Ok(Self { n, components: components.to_vec(), inverse: found, determinant, signature })
     }
 
-    /// The same in other numbers.
+    /// The metric in another number type.
     pub(super) fn rounded<T: Scalar>(&self) -> Metric<T> {
         Metric {
             n: self.n,
@@ -116,7 +116,7 @@ impl<S: Scalar> Connection<S> {
         Self { n, lowered, symbols }
     }
 
-    /// The same in other numbers.
+    /// The connection in another number type.
     pub(super) fn rounded<T: Scalar>(&self) -> Connection<T> {
         Connection { n: self.n, lowered: rounded(&self.lowered), symbols: rounded(&self.symbols) }
     }
@@ -217,7 +217,7 @@ impl<S: Scalar> Curvature<S> {
         Self { n, lowered, riemann, ricci, scalar, einstein, weyl, kretschmann }
     }
 
-    /// The same in other numbers.
+    /// The curvature in another number type.
     pub(super) fn rounded<T: Scalar>(&self) -> Curvature<T> {
         Curvature {
             n: self.n,
@@ -241,8 +241,8 @@ impl<S: Scalar> Curvature<S> {
         self.riemann.chunks_exact(n * n * n).map(second).collect()
     }
 
-    /// Sectional curvature `R_abcd u^a w^b u^c w^d / (g(u, u) g(w, w) - g(u, w)^2)` of the plane of `u` and `w`: 1 on the unit
-    /// sphere. `NaN` or infinite of a plane that is null.
+    /// Sectional curvature `R_abcd u^a w^b u^c w^d / (g(u, u) g(w, w) - g(u, w)^2)` of the plane of `u` and `w`: 1 on the unit sphere.
+    /// `NaN` or infinite for a null plane.
     pub fn sectional(&self, metric: &Metric<S>, u: &[S], w: &[S]) -> S {
         // g(w, R(u, w) u) is minus g(u, the deviation of w along ..): one contraction serves both.
         let turned = self.geodesic_deviation(w, u);

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Observer {
-    /// At rest: its places do not change.
+    /// At rest: its coordinates do not change.
     #[default]
     Rest,
     /// Along the normal of the slices of equal time. In the coordinates of Kerr and Schild it falls, from outside the horizon or within.
@@ -25,7 +25,7 @@ pub enum Observer {
 pub struct Camera {
     /// Coordinates of the metric.
     pub chart: Chart,
-    /// Distance from the centre, the Euclidean one of the coordinates, in their unit.
+    /// Euclidean distance from the centre in the coordinates, in their unit.
     pub distance: f64,
     /// Angle from the axis `z`, in rad, from 0 to pi.
     pub inclination: f64,
@@ -86,8 +86,8 @@ impl Camera {
         self.chart.vector(0.0, times(-self.distance, self.axes()[2]))
     }
 
-    /// Direction that a place of the picture shows: parts right, up and forward, a unit vector. Columns and rows are counted from the upper left
-    /// corner; the middle of the first pixel is `(0.5, 0.5)`.
+    /// Direction of a point of the picture: components right, up and forward, a unit vector. Columns and rows are counted from the upper
+    /// left corner; the middle of the first pixel is `(0.5, 0.5)`.
     pub(crate) fn direction(&self, column: f64, row: f64) -> [f64; 3] {
         let (width, height) = (self.width as f64, self.height as f64);
         let scale = 2.0 * (0.5 * self.field_of_view).tan() / width;
@@ -112,10 +112,10 @@ pub struct Tetrad {
 const SPAN: f64 = 10.0;
 
 impl Tetrad {
-    /// The frame of a camera in a metric, by the method of Gram and Schmidt: velocity, forward, right, up.
+    /// The frame of a camera in a metric by Gram-Schmidt orthonormalization: velocity, forward, right, up.
     ///
     /// # Errors
-    /// [`RelativityError`]: a model that is not a metric of space-time, a camera that cannot rest where it stands.
+    /// [`RelativityError`]: a model that is not a metric of space-time, a camera that cannot be at rest at its position.
     pub fn new(model: &dyn EulerLagrange<f64>, camera: &Camera) -> Result<Self, RelativityError> {
         camera.check()?;
         camera.chart.check(model.coordinates())?;

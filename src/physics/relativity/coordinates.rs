@@ -1,5 +1,5 @@
-//! Coordinates around a centre: distances, directions, the equator; oblate spheroidal coordinates around a spin, in which
-//! Carter's constant has a short formula.
+//! Coordinates around a centre: distances, directions, the equator; oblate spheroidal coordinates around a spin, in which Carter's constant
+//! has a short formula.
 
 use super::RelativityError;
 use super::orbits::directions;
@@ -290,8 +290,8 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
 /// Share of an acceleration up to which an influence may be an error of a learned metric.
 const APART: f64 = 0.05;
 
-/// `true` if the time and the places of a metric do not act on each other, as of `-c dt^2 + h`: motion then leaves the unit of the time beside that of
-/// the places open, and with it every impact parameter. Looked at within a `distance` from the centre.
+/// `true` if the time and the spatial coordinates of a metric do not act on each other, as in `-c dt^2 + h`. Motion then leaves the unit of
+/// time relative to that of length open, and with it every impact parameter. States within a `distance` from the centre are examined.
 pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: f64) -> bool {
     const POINTS: usize = 128;
     let q = CentralCoordinates::Cartesian(chart).points(POINTS, (0.3 * distance, distance));
@@ -315,11 +315,11 @@ const TIMES: [f64; 3] = [0.31, -0.57, 1.0];
 /// Differences of the components, over the largest of them, that are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// `true` if the metric of some point is another one at another time: a span of it, a part of it later or earlier. `points` are
-/// `(points, n)`, `time` is the index of the time.
+/// `true` if the metric at some point changes with time: by a span of time, or a part of it, later or earlier. `points` are `(points, n)`,
+/// `time` is the index of the time.
 ///
 /// # Errors
-/// What the model refuses other than single states, which are passed over.
+/// Refusals of the model other than for single states, which are skipped.
 pub fn depends_on_time(
     model: &dyn EulerLagrange<f64>,
     time: usize,
@@ -367,7 +367,7 @@ mod tests {
         }
     }
 
-    /// In flat space the pulled-back terms are those of the oblate spheroidal metric; of Kerr they are the derivatives of `L`.
+    /// In flat space the pulled-back terms are those of the oblate spheroidal metric; in Kerr space they are the derivatives of `L`.
     #[test]
     fn pulled_back_terms_are_derivatives_of_the_lagrangian() {
         let hole = build::<f64>("kerr-cartesian", &[]).unwrap();
@@ -452,7 +452,7 @@ mod tests {
         // A metric that is invalid at present but valid at other times: `(dx^2 - dt^2)/t^2`.
         let shrinking = Mechanics::<_, f64>::new(Shrinking, vec![]);
         assert_eq!(depends_on_time(&shrinking, 0, &points, 7.0), Ok(true));
-        // Of a place it may depend.
+        // It may depend on the position.
         let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
         let points = [0.0, 8.0, 0.0, 0.0, 0.0, 0.0, -3.0, 1.0, 0.0, 0.0, 0.0, 0.0];
         assert_eq!(depends_on_time(&*hole, 0, &points, 100.0), Ok(false));

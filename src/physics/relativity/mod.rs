@@ -1,12 +1,12 @@
-//! Black holes, learned or written down: what is read off their metrics, and what a camera near them sees.
+//! Black holes, learned or written down: quantities read off their metrics, and the view of a camera near them.
 //!
 //! A [`LearnedHole`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra,
-//! falls through a horizon, mass and spin, curvature, symmetries. It takes the feature `training`.
+//! falls through a horizon, mass and spin, curvature, symmetries. It needs the feature `training`.
 //!
-//! A [`Camera`] stands at a place of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
-//! followed backwards in time, by the accelerations of the model alone, until it comes from far away, where its direction is that of a point
-//! of the sky, or piles up at a horizon: that pixel belongs to the shadow. [`shadow()`] does so for a picture, [`outline`] finds the edge of the
-//! shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours.
+//! A [`Camera`] stands at a point of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
+//! followed backwards in time, by the accelerations of the model alone, until it reaches a great distance, where its direction gives a
+//! point of the sky, or piles up at a horizon, in which case the pixel belongs to the shadow. [`shadow()`] does so for a picture,
+//! [`outline`] finds the edge of the shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours.
 //!
 //! ```
 //! use lnn::lagrangian::build;
@@ -88,7 +88,7 @@ pub enum RelativityError {
         "no camera can be at rest here: the position is inside the ergosurface, or the time coordinate is not timelike there"
     )]
     NothingRests,
-    /// A metric that is another one at another time.
+    /// A metric that changes with time.
     #[error("the metric depends on its time coordinate, expected a stationary metric")]
     DependsOnTime,
     /// A radial coordinate that does not lead from one region far away to another.
@@ -126,7 +126,7 @@ pub enum RelativityError {
     Mechanics(#[from] MechanicsError),
 }
 
-/// Refuses a number that is not as expected.
+/// Rejects a number out of range.
 fn expect(fine: bool, what: &'static str, expected: &'static str, found: f64) -> Result<(), RelativityError> {
     if fine { Ok(()) } else { Err(RelativityError::Invalid { what, expected, found }) }
 }

@@ -11,9 +11,9 @@ use std::ops::ControlFlow;
 
 /// Local error of the motions that are followed.
 const TOLERANCE: f64 = 1e-11;
-/// Steps of a motion, at most: many times what an orbit takes.
+/// Largest number of steps of a motion: many times what an orbit takes.
 const STEPS: usize = 50_000;
-/// Steps of the search between two samples, at most.
+/// Largest number of steps of the search between two samples.
 const REFINEMENTS: usize = 60;
 
 /// State of a motion at a time.
@@ -36,9 +36,9 @@ pub(super) fn options(t_end: f64, dt: f64) -> Options<f64> {
     }
 }
 
-/// The first sample at which `next` says so, with the one before it.
+/// The first sample for which `next` returns `true`, with the one before it.
 ///
-/// `None` if the motion ends before, at `t_end` or where the model fails.
+/// `None` if the motion ends earlier, at `t_end` or where the model fails.
 pub(super) fn passing(
     model: &dyn EulerLagrange<f64>,
     start: (&[f64], &[f64]),
@@ -174,10 +174,10 @@ const ECCENTRICITY: [f64; 2] = [0.5, 0.7];
 const ELLIPSE: f64 = 12.0;
 /// Halvings of the search for the last orbit that comes back.
 const HALVINGS: usize = 24;
-/// Excess of the whirl over that orbit, relative.
+/// Relative excess of the whirl over the semilatus rectum of that orbit.
 const EXCESS: f64 = 3e-3;
 
-/// The orbits of a hole of mass `mass`, whose metric is known down to the distance `inner`; those that it does not have are left out.
+/// The orbits of a hole of mass `mass`, whose metric is known down to the distance `inner`; orbits that it does not have are left out.
 ///
 /// # Errors
 /// Those of the metric.
@@ -190,7 +190,7 @@ pub fn orbits(
     let origin = around.origin();
     let equator = around.equator(model, &origin);
     let kepler = |a: f64| TAU * a.powf(1.5) / mass.sqrt();
-    // From periastron, with the time of a revolution after Kepler.
+    // A start at the periastron, with Kepler's time of a revolution.
     type Start = ([[f64; 4]; 2], f64);
     let bound = |p: f64, e: f64| -> Result<Option<Start>, GeometryError> {
         let (near, far) = (p / (1.0 + e) * mass, p / (1.0 - e) * mass);
@@ -206,7 +206,7 @@ pub fn orbits(
     let comes_back = |p: f64| -> Result<bool, GeometryError> {
         let Some(([q, v], period)) = bound(p, whirl)? else { return Ok(false) };
         let far = p / (1.0 - whirl) * mass;
-        // What starts inside the last orbit turns around elsewhere, or not at all.
+        // Motion that starts inside the last orbit turns around elsewhere, or not at all.
         let reaches =
             passing(model, (&q, &v), (2.0 * period, period / 400.0), |state| around.distance(&state.q) > 0.99 * far);
         Ok(reaches.is_some() && radial_period(model, (&q, &v), around, (4.0 * period, period / 400.0)).is_some())
@@ -223,7 +223,7 @@ pub fn orbits(
     if let Some(([q, v], period)) = bound(high * (1.0 + EXCESS), whirl)? {
         found.push(Orbit { title: "Zoom and whirl", q, v, t_end: 2.2 * period, dt: period / 600.0, inner });
     }
-    // Most of what circles at 10 M, too slow to stay.
+    // At 10 M, with a fraction of the circular velocity: too slow to stay.
     let place = 10.0 * mass;
     let circle = equator.at(place)?;
     if let Some(w) = circle.angular_velocity(Sense::Forward).map(|w| 0.6 * w) {

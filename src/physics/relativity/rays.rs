@@ -1,4 +1,4 @@
-//! Null geodesics, batches of them: each ray has steps of its own, and all rays of a batch are evaluated by one call per stage.
+//! Null geodesics in batches: each ray has its own steps, and one call per stage evaluates all rays of a batch.
 //!
 //! The steps are those of the embedded Runge-Kutta method 5(4) of Dormand and Prince. Source: Dormand and Prince, J. Comput. Appl. Math. 6, 19 (1980), table 2; the last stage is the first of the next step.
 
@@ -24,7 +24,7 @@ pub enum RayOutcome {
 }
 
 impl RayOutcome {
-    /// The place on the sky that a ray comes from, with the number of the sky: 0, or 1 for that of the second region.
+    /// The point of the sky that a ray comes from, with the index of the sky: 0, or 1 for that of the second region.
     pub(super) fn sky(self) -> Option<(usize, [f64; 3])> {
         match self {
             Self::Escaped(place) => Some((0, place)),
@@ -60,10 +60,10 @@ pub const TOLERANCES: (f64, f64) = (1e-12, 0.01);
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
 /// | `threads` | 1 | threads; no result depends on them | above 0 |
 ///
-/// A ray that is followed backwards to a future horizon does not reach it: in coordinates that are regular there, those of Kerr and Schild, it
-/// comes nearer and nearer while `dt` grows beyond all bounds within a finite affine parameter, `|k|` as the inverse of the distance from the
-/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, and with more the nearer that orbit is to the
-/// horizon: next to the largest spins the edge of the shadow wants a larger one.
+/// A ray that is followed backwards to a future horizon does not reach it: in coordinates that are regular there, those of Kerr and Schild,
+/// it comes nearer and nearer while `dt` grows beyond all bounds within a finite affine parameter, `|k|` as the inverse of the distance
+/// from the horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, and of more the nearer that orbit
+/// is to the horizon: close to the largest spins the edge of the shadow needs a larger `growth`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracing {
     /// Relative error of a step.
@@ -107,18 +107,18 @@ const BLOCKS: (usize, usize, usize) = (8, 32, 1024);
 const STEP: (f64, f64) = (0.2, 1.0);
 /// Smallest step over the distance from the centre.
 const LEAST: f64 = 1e-12;
-/// Part of a step that is kept, and the bounds of its change.
+/// Safety factor of a step, and the bounds of its change.
 const SAFETY: (f64, f64, f64) = (0.9, 0.2, 5.0);
 /// Distance beyond the sky to which a step may lead, over that of the sky.
 const BEYOND: f64 = 1e-3;
 
 /// Follows rays from events with tangents `k`, `(4)` each, along which the affine parameter grows; the order is kept.
 ///
-/// `progress` receives the number of rays of every block that is done, from any thread. The rays that a model had not ended when it was
-/// interrupted are unfinished.
+/// `progress` receives the number of rays of every finished block, from any thread. Rays that had not ended when the model was interrupted
+/// are unfinished.
 ///
 /// # Errors
-/// [`RelativityError`] for choices out of range and what the model refuses other than single states.
+/// [`RelativityError`] for choices out of range and for refusals of the model other than for single states.
 pub fn trace(
     model: &dyn EulerLagrange<f64>,
     chart: &Chart,
@@ -162,7 +162,7 @@ struct Moving {
     index: usize,
     q: [f64; 4],
     k: [f64; 4],
-    /// `dk` by the affine parameter.
+    /// Derivative of `k` by the affine parameter.
     a: [f64; 4],
     step: f64,
     /// `|k|` at the start.
@@ -285,7 +285,7 @@ impl Batch<'_> {
         most.min(STEP.1 * distance) / speed
     }
 
-    /// Takes the rays that have ended out of those that move.
+    /// Moves the rays that have ended from `moving` to `ended`.
     fn sort_out(&self, moving: &mut Vec<Moving>, ended: &mut [FinishedRay]) {
         moving.retain(|ray| {
             let Some(fate) = self.fate(ray) else { return true };
@@ -334,7 +334,7 @@ impl Batch<'_> {
     }
 }
 
-/// The refusal of a model, or that of its answer.
+/// The model's refusal, or one for accelerations that it did not give.
 fn no_accelerations(outcome: Result<(), MechanicsError>) -> RelativityError {
     match outcome {
         Err(error) => error.into(),

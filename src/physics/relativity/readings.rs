@@ -1,5 +1,5 @@
-//! Quantities read off a learned metric of a hole, beside those of the exact one: among them the parameters whose metric
-//! comes nearest to it, and the drift of what the exact motion conserves.
+//! Quantities read off a learned metric of a hole, next to those of the exact one: among them the parameters of the closest metric of the
+//! family, and the drift of quantities that the exact motion conserves.
 
 use super::coordinates::Spheroidal;
 use super::orbits::{infall, passing, radial_period};
@@ -20,9 +20,9 @@ pub struct Reading {
     pub quantity: String,
     /// Value of the exact metric, if the quantity is not an error itself.
     pub exact: Option<f64>,
-    /// Value of the learned metric; none if there is no such thing in it.
+    /// Value for the learned metric; none if the metric has no such quantity.
     pub learned: Option<f64>,
-    /// Error, relative where there is an exact value; none if it has no learned one.
+    /// Error, relative where there is an exact value; none without a learned one.
     pub error: Option<f64>,
     /// Target error.
     pub aim: f64,
@@ -65,7 +65,7 @@ impl LearnedHole<'_> {
         Reading { quantity: quantity.into(), exact: None, learned: None, error, aim }
     }
 
-    /// A quantity of both metrics; none where the learned one does not have it.
+    /// A quantity of both metrics; the learned value is none where it does not exist.
     fn both<T>(
         &self,
         of: impl Fn(&dyn EulerLagrange<f64>) -> Result<T, GeometryError>,
@@ -83,10 +83,10 @@ impl LearnedHole<'_> {
         Ok(-0.5 * metric.first[0] * FAR * FAR)
     }
 
-    /// Everything that can be read, the lengths in units of the mass.
+    /// All quantities that can be read, with lengths in units of the mass.
     ///
     /// # Errors
-    /// Those of the exact metric; what the learned one refuses is a reading without a value.
+    /// Those of the exact metric; where the learned one refuses, the reading has no value.
     pub fn readings(&self) -> Result<Vec<Reading>, GeometryError> {
         let mass = self.mass()?;
         let mut all = Vec::new();
@@ -100,12 +100,12 @@ impl LearnedHole<'_> {
         Ok(all)
     }
 
-    /// Distances in units of the mass, as far as they were learned.
+    /// Distances in units of the mass, within the learned range.
     fn within(&self, mass: f64, (low, high): (f64, f64)) -> (f64, f64) {
         ((low * mass).max(self.range.0), (high * mass).min(self.range.1))
     }
 
-    /// The error of the metric, and the factor by which the learned one comes nearest.
+    /// The error of the metric, and the factor that brings the learned one closest.
     fn metric(&self, mass: f64, all: &mut Vec<Reading>) -> f64 {
         let points = self.around.points(POINTS, self.within(mass, (1.5, 20.0)));
         let found = mass_matrix_error(self.exact, self.learned, &points);
@@ -319,16 +319,16 @@ impl LearnedHole<'_> {
     }
 }
 
-/// Steps of Levenberg and Marquardt, at most.
+/// Largest number of Levenberg-Marquardt steps.
 const STEPS: usize = 60;
-/// Change of a parameter by which derivatives are taken, relative; the result does not depend on it.
+/// Relative change of a parameter for difference quotients; the result does not depend on it.
 const DIFFERENCE: f64 = 1e-5;
 
 /// Values by symbol.
 type Values = BTreeMap<String, f64>;
 
-/// Residuals of the metric of a system with these parameters beside a learned one, each point relative to the size of its metric, after
-/// the best factor; `None` where there is no such system.
+/// Residuals of the metric of a system with these parameters against a learned one, each point relative to the size of its metric, after
+/// the best factor; `None` if no such system exists.
 fn residuals(system: &SystemInstance<f64>, values: &Values, learned: &[f64], points: &[f64]) -> Option<Vec<f64>> {
     let model = configure_values::<f64>(system.system.clone(), values).ok()?.build().ok()?;
     let n = model.coordinates();

@@ -26,9 +26,10 @@ pub struct View {
 /// A metric with its name, `exact` or `learned`.
 pub type NamedMetric<'a> = (&'static str, &'a dyn EulerLagrange<f64>);
 
-/// Looks through metrics with a camera, one after the other, until a flag is raised; finds the edges of the shadows in so many directions, if any.
+/// Renders metrics with a camera, one after the other, until a flag is raised, and finds the edges of the shadows in a number of
+/// directions, if requested.
 ///
-/// `begin` receives the name of a metric before its rays are followed, `advance` the number of pixels of every block that is done.
+/// `begin` receives the name of a metric before its rays are followed, `advance` the number of pixels of every finished block.
 ///
 /// # Errors
 /// [`RelativityError`].
@@ -60,7 +61,7 @@ pub fn views(
 /// White columns between pictures.
 const GAP: usize = 8;
 
-/// The pictures of views of one camera side by side, those of two with the picture of their difference.
+/// The pictures of views of one camera side by side; two views also get a picture of their difference.
 ///
 /// # Errors
 /// Views of different sizes.
@@ -102,7 +103,7 @@ pub struct ViewSummary {
     pub seconds: f64,
     /// Rays over time.
     pub rays_per_second: f64,
-    /// Share of the pixels that show the second region; none of a metric with one region.
+    /// Share of the pixels that show the second region; none for a metric with one region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_share: Option<f64>,
     /// Angular radius of the image of the second region, in degrees.
@@ -182,7 +183,7 @@ impl From<&View> for ViewSummary {
 }
 
 impl ShadowSummary {
-    /// Of the views of a camera.
+    /// The summary of the views of a camera.
     ///
     /// # Errors
     /// Views of different sizes.

@@ -31,7 +31,7 @@ pub struct Difference {
 
 /// Follows the ray of the middle of every pixel of a camera.
 ///
-/// `progress` receives the number of pixels of every block that is done, from any thread. Pixels that a model had not reached when it was
+/// `progress` receives the number of pixels of every finished block, from any thread. Pixels that the model had not reached when it was
 /// interrupted are unfinished. The result does not depend on the number of threads.
 ///
 /// # Errors
@@ -54,7 +54,7 @@ pub fn shadow(
 /// A place on one of the two skies, if there is one.
 type Place = Option<(usize, [f64; 3])>;
 
-/// Angle between unit vectors, in rad, right near 0 too.
+/// Angle between unit vectors, in rad, accurate also near 0.
 pub(super) fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     let difference: [f64; 3] = std::array::from_fn(|i| a[i] - b[i]);
     let half = 0.5 * norm(difference);
@@ -176,13 +176,13 @@ impl Outline {
 
 /// Halvings of the angle from 0 to pi.
 const HALVINGS: usize = 30;
-/// Tolerance of a step here over that of a picture.
+/// Tolerance of a step for the edge, over that for a picture.
 const FINER: f64 = 0.01;
 
-/// Finds the edge of the shadow, or of what shows the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the error of rays that are a
-/// hundred times as exact as those of a picture; `None` if the ray of the centre is not captured.
+/// Finds the edge of the shadow, or of the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the
+/// error of rays a hundred times as accurate as those of a picture; `None` if the ray of the centre is not captured.
 ///
-/// Along every direction the shadow is taken to end once. `directions` is rounded up to a multiple of four.
+/// The shadow is assumed to end once along every direction. `directions` is rounded up to a multiple of four.
 ///
 /// # Errors
 /// [`RelativityError`].

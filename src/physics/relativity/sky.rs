@@ -17,7 +17,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Pictures side by side, with white columns between them; what is not as high as the highest is white below.
+    /// Pictures side by side, with white columns between them; pictures lower than the highest are filled with white below.
     pub fn beside(images: &[Self], gap: usize) -> Self {
         let white = [255; 3];
         let height = images.iter().map(|image| image.height).max().unwrap_or(0);
@@ -80,8 +80,8 @@ impl Sky {
         Self { longitude, square: 10f64.to_radians(), disc: (forward, 3f64.to_radians()) }
     }
 
-    /// Angles of a direction, a unit vector, to the left of the point that the camera looks at and above the equator, and the number of
-    /// the quadrant around that point.
+    /// Angles of a direction, a unit vector: to the left of the point that the camera looks at, and above the equator; and the index of the
+    /// quadrant around that point.
     fn angles(&self, [x, y, z]: [f64; 3]) -> (f64, f64, usize) {
         let (sin, cos) = self.longitude.sin_cos();
         let left = (cos * y - sin * x).atan2(cos * x + sin * y);
@@ -128,8 +128,8 @@ impl Sky {
     }
 }
 
-/// The picture of two pictures' difference: from white to blue the angle between the places on the sky, 0.01 to 10 degrees, logarithmic; red
-/// what is in the shadow of one alone, black in that of both.
+/// The difference of two pictures: from white to blue the angle between the points on the sky, 0.01 to 10 degrees, logarithmic; red for the
+/// shadow of one alone, black for the shadow of both.
 ///
 /// # Errors
 /// [`RelativityError::Sizes`].

@@ -128,12 +128,12 @@ fn the_shadow_of_kerr_has_its_edges() {
             let light: f64 = 2.0 * (1.0 + (2.0 / 3.0 * (-a).acos()).cos());
             a + light.powf(1.5)
         };
-        // What comes from the left comes with the spin.
+        // Light from the left co-rotates with the spin.
         let (left, right) = (found.left().celestial, found.right().celestial);
         assert!((left[0] + impact(spin)).abs() < 1e-5, "{left:?} for {}", impact(spin));
         assert!((right[0] - impact(-spin)).abs() < 1e-5, "{right:?} for {}", impact(-spin));
         assert!(found.left().angle < found.right().angle);
-        // Above and below alike.
+        // Symmetric above and below.
         let (top, bottom) = (found.top().celestial, found.bottom().celestial);
         assert!((top[1] + bottom[1]).abs() < 1e-6 && (top[0] - bottom[0]).abs() < 1e-6, "{top:?} {bottom:?}");
     }
@@ -153,7 +153,7 @@ fn no_result_depends_on_the_number_of_threads() {
     let one = of(1);
     assert_eq!(one, of(3));
     assert_eq!(one.unfinished(), 0);
-    // About that of a disc of the angle without spin, 18.8 degrees, in a picture of 70.
+    // About the share of a disc with the angle without spin, 18.8 degrees, in a picture of 70.
     assert!((one.share() - 0.24).abs() < 0.02, "{}", one.share());
     let difference = one.difference(&one).unwrap();
     assert_eq!((difference.shadow, difference.median, difference.most), (0.0, 0.0, 0.0));
@@ -228,7 +228,7 @@ fn rays_that_do_not_end_are_unfinished() {
     let camera = small(10.0, 1.0);
     let seen = shadow(&*model, &camera, &Tracing { most_steps: 2, ..Tracing::of(&camera) }, &|_| ()).unwrap();
     assert_eq!((seen.unfinished(), seen.share()), (600, 0.0));
-    // The centre of the coordinates itself: the metric is none.
+    // At the origin of the coordinates there is no valid metric.
     let start = ([0.0; 4], times(2.0, [0.0, 1.0, 0.0, 0.0]));
     let tracing = Tracing::of(&camera);
     let rays =

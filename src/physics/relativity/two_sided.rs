@@ -1,4 +1,4 @@
-//! Metrics with two regions far away, such as those of wormholes: their radial coordinate goes to minus and to plus infinity.
+//! Metrics with two asymptotic regions, such as wormholes: their radial coordinate goes to minus and to plus infinity.
 
 use super::RelativityError;
 use super::orbits::{along, dot, norm, times};
@@ -6,15 +6,15 @@ use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use std::f64::consts::FRAC_PI_2;
 
-/// A metric of a time, a radial coordinate `l` from minus to plus infinity, the angle `theta` from an axis and the angle `phi` about it, as a
-/// metric of `t, x, y, z`, in which rays are traced over the axis and through the throat:
+/// Turns a metric with a time, a radial coordinate `l` from minus to plus infinity, the angle `theta` from an axis and the angle `phi`
+/// about it into a metric of `t, x, y, z`, in which rays can cross the axis and pass through the throat:
 ///
 /// ```text
 /// (x, y, z) = rho (sin theta cos phi, sin theta sin phi, cos theta),   l = rho - s^2/(4 rho)
 /// ```
 ///
 /// Where `l` goes to plus infinity, `rho` is `l`; the other region far away lies around the origin, and `x s^2/(4 rho^2)` are Cartesian
-/// coordinates there. The scale `s` has no effect on a ray but by its tolerance. Accelerations and mass matrices are given, nothing else.
+/// coordinates there. The scale `s` affects a ray only through its tolerance. Accelerations and mass matrices are given, nothing else.
 pub struct TwoSided<M> {
     model: M,
     time: usize,
@@ -23,8 +23,8 @@ pub struct TwoSided<M> {
     scale: f64,
 }
 
-/// Least sine of the angle from the axis, where the angle about it is not determined: a state that is nearer is turned away to this angle,
-/// and its acceleration back.
+/// Smallest sine of the angle from the axis, where the angle about it is not determined: a state closer to the axis is turned away to this
+/// angle, and its acceleration is turned back.
 const AXIS: f64 = 1e-6;
 /// Deviation of the area of distant spheres from that of flat space.
 const FLAT: f64 = 0.1;
@@ -163,7 +163,7 @@ impl<M: EulerLagrange<f64>> EulerLagrange<f64> for TwoSided<M> {
         for (found, place) in terms.mass_matrix.chunks_exact_mut(16).zip(&places) {
             let lengths = [self.stretch(place.rho), place.rho.recip(), (place.rho * place.sine).recip()];
             let slopes: [[f64; 3]; 3] = std::array::from_fn(|k| times(lengths[k], place.legs[k]));
-            // Columns of the Jacobian: the model's velocities by that of `t`, `x`, `y` or `z`.
+            // Columns of the Jacobian: the model's velocities per velocity of `t`, `x`, `y` or `z`.
             let columns: [[f64; 4]; 4] = std::array::from_fn(|j| match j {
                 0 => self.vector(1.0, [0.0; 3]),
                 j => self.vector(0.0, slopes.map(|slope| slope[j - 1])),

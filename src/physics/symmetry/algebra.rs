@@ -10,10 +10,10 @@ use serde::Serialize;
 /// Structure of a Lie algebra of fields `X_1, .., X_m`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Algebra {
-    /// `c[a][b][c]` of `[X_a, X_b] = sum_c c[a][b][c] X_c`, the nearest such combination where there is none.
+    /// `c[a][b][c]` of `[X_a, X_b] = sum_c c[a][b][c] X_c`; if there is no such combination, of the nearest one.
     pub structure_constants: Vec<Vec<Vec<f64>>>,
-    /// Root mean square of what of the commutators of fields of unit length is no combination of the fields, every coordinate in units
-    /// of its spread over the states: 0 for an algebra.
+    /// Root mean square of the part of the commutators that is no combination of the fields, for fields of unit length and every coordinate
+    /// in units of its spread over the states: 0 for an algebra.
     pub closure: f64,
     /// `true` if the commutators are combinations of the fields up to the noise of the fields; if not, the fields are no
     /// algebra, and neither constants nor signature mean anything.
@@ -21,8 +21,8 @@ pub struct Algebra {
     /// Numbers of negative, positive and zero eigenvalues of the Killing form `K_ab = c_ac^d c_bd^c`; a compact algebra has
     /// negative ones.
     pub killing_form_signature: [usize; 3],
-    /// Name, such as `so(3)+R`, if it is one that is known here. Fields that do not close have none; nor have those of a
-    /// degenerate Lagrangian, which are as many as its functions allow.
+    /// Name, such as `so(3)+R`, if it is identified. Fields that do not close have none; neither do those of a degenerate Lagrangian, whose
+    /// number depends on the basis of functions.
     pub name: Option<String>,
 }
 
@@ -153,7 +153,7 @@ pub(crate) fn signature(matrix: &[f64], tolerance: f64) -> Result<[usize; 3], Sy
 /// Structure constants `[X_a, X_b] = sum_c c[a][b][c] X_c`.
 type Constants = [Vec<Vec<f64>>];
 
-/// Semisimple algebras of a dimension that the signature of the Killing form tells apart: numbers of its negative and positive
+/// Semisimple algebras of a dimension, as identified by the signature of the Killing form: numbers of its negative and positive
 /// eigenvalues, name.
 const SEMISIMPLE: [(usize, usize, &str); 13] = [
     (3, 0, "so(3)"),
@@ -174,7 +174,7 @@ const SEMISIMPLE: [(usize, usize, &str); 13] = [
 /// Largest dimension of an algebra that is identified: named ones are far smaller.
 const MOST: usize = 64;
 
-/// Name of the algebra with these constants, known to `tolerance`; `None` for one that is not known here.
+/// Name of the algebra with these constants, known to `tolerance`; `None` if it cannot be identified.
 ///
 /// Abelian, semisimple (of dimension 3, 6, 8, 9, 10), Euclidean `e(n)` and pseudo-Euclidean `iso(p,q)`, `n` from 2 to 5, the solvable
 /// `aff(1)` and `heis(3)`, and direct sums of these with `R^n` and with each other.
@@ -348,14 +348,14 @@ fn null(columns: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
     Some(found.vectors[..zero].to_vec())
 }
 
-/// Orthonormal vectors beside these, which are orthonormal, of all `m` dimensions.
+/// Orthonormal vectors that complete these orthonormal ones to a basis of all `m` dimensions.
 fn complement(m: usize, these: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let axes = (0..m).map(|k| (0..m).map(|i| f64::from(u8::from(i == k))).collect());
     let all: Vec<Vec<f64>> = these.iter().cloned().chain(axes).collect();
     orthonormal(&all, 1e-6).columns.split_off(these.len())
 }
 
-/// Constants of a subalgebra, or of the quotient by the ideal beside it, in an orthonormal basis.
+/// Structure constants of a subalgebra, or of the quotient by the complementary ideal, in an orthonormal basis.
 fn projected(c: &Constants, basis: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
     let along = |x: &[f64]| basis.iter().map(|u| dot(x, u)).collect();
     basis.iter().map(|x| basis.iter().map(|y| along(&bracket(c, x, y))).collect()).collect()
@@ -380,7 +380,8 @@ mod tests {
         all.iter().map(|a| all.iter().map(|b| coefficients(&bracket(a, b))).collect()).collect()
     }
 
-    /// Generators of the rotations of a metric of signs, as matrices of `size` rows, with the translations if there is a row more.
+    /// Generators of the rotations of a metric with these signs, as matrices of `size` rows; with the translations if there is an extra
+    /// row.
     fn rotations(signs: &[f64], size: usize) -> Vec<Vec<f64>> {
         let n = signs.len();
         let matrix = |entries: &[(usize, usize, f64)]| {

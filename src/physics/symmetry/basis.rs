@@ -43,12 +43,12 @@ pub struct Degrees {
     pub polynomial: usize,
     /// Total degree of the harmonics of the angles; `cot x` and `1/sin x` count 1.
     pub trigonometric: usize,
-    /// Total degree of `sinh x, cosh x, sinh 2x, ..` of the coordinates that are not angles; `coth x` and `1/sinh x` of those that
-    /// keep away from 0 count 1.
+    /// Total degree of `sinh x, cosh x, sinh 2x, ..` of the coordinates that are not angles; `coth x` and `1/sinh x` of those that stay
+    /// away from 0 count 1.
     pub hyperbolic: usize,
 }
 
-/// The text that is read back, every family with its degree.
+/// Writes the text that `from_str` reads, every family with its degree.
 impl Display for Degrees {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { polynomial, trigonometric, hyperbolic } = self;
@@ -56,7 +56,7 @@ impl Display for Degrees {
     }
 }
 
-/// Degrees in a text such as `polynomial:2,trigonometric:1`; a family that is not there has degree 0.
+/// Degrees in a text such as `polynomial:2,trigonometric:1`; a missing family has degree 0.
 ///
 /// ```
 /// use lnn::symmetry::Degrees;
@@ -86,11 +86,11 @@ impl FromStr for Degrees {
     }
 }
 
-/// Unknown coefficients of a search, at most.
+/// Largest number of unknown coefficients of a search.
 pub const MOST_UNKNOWNS: usize = 4000;
-/// Most unknown coefficients of a search over the default basis: it takes seconds.
+/// Largest number of unknown coefficients of a search over the default basis: it takes seconds.
 const USUAL: usize = 1300;
-/// Unknown coefficients times states, at most; a search holds up to about eight times as many numbers, two gigabytes.
+/// Largest product of unknown coefficients and states; a search stores up to about eight times as many numbers, two gigabytes.
 const MOST_NUMBERS: usize = MOST_UNKNOWNS * 2 * MOST_UNKNOWNS;
 /// Highest degree of a family.
 const MOST: usize = 12;
@@ -241,7 +241,7 @@ fn poles(ratio: &str, below: &str, name: &str, a: u32, b: u32) -> String {
 pub struct Basis {
     names: Vec<String>,
     factors: Vec<Vec<Factor>>,
-    /// For every function the place of its factor of every coordinate.
+    /// For every function, the index of its factor in each coordinate.
     products: Vec<Vec<usize>>,
 }
 
@@ -310,8 +310,8 @@ impl Basis {
         products.iter().sum()
     }
 
-    /// [`Degrees::usual`] of these charts, or lower ones as far as the unknown coefficients of a search for symmetries would be too
-    /// many: first those of powers, then those of harmonics.
+    /// [`Degrees::usual`] of these charts, or lower ones if a search for symmetries would have too many unknown coefficients: first the
+    /// powers are lowered, then the harmonics.
     pub(crate) fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
         let count = |degrees: &Degrees| Self::number(charts, *degrees);
         let mut degrees = Degrees::usual(charts);
@@ -326,7 +326,7 @@ impl Basis {
         (Self::new(names, charts, degrees), degrees)
     }
 
-    /// Functions up to these degrees, which are not made if they are too many, or the usual ones of the charts, with their degrees.
+    /// Functions up to these degrees, unless they are too many, or the usual ones of the charts, with their degrees.
     ///
     /// # Errors
     /// What was expected.
@@ -411,7 +411,7 @@ pub fn unknowns(n: usize, functions: usize) -> usize {
     (n + 1).saturating_mul(functions)
 }
 
-/// States that a search for so many unknown coefficients of `n` coordinates takes at most.
+/// Largest number of states of a search for `unknowns` coefficients of `n` coordinates.
 pub fn most_states(n: usize, unknowns: usize) -> usize {
     MOST_NUMBERS / unknowns.max(n * n).max(1)
 }

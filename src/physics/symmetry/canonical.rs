@@ -1,4 +1,4 @@
-//! Canonical form of a Lagrangian: the factor and the gauge up to which motion determines it, fixed at one state.
+//! Canonical form of a Lagrangian: fixes at one state the factor and the gauge that motion leaves open.
 
 use super::SymmetryError;
 use crate::lagrangian::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms};
@@ -15,10 +15,10 @@ use crate::scalar::{Dd, Real, Scalar};
 /// accelerations are those of `L`. Two Lagrangians of the same motion, `s L + dF/dt`, have canonical forms that agree at
 /// the base state in `L`, `p`, `E` and `M`, everywhere in `M`, and everywhere else up to a `dF/dt` whose `F` has no gradient at `q0`.
 ///
-/// The sign of `s` makes most eigenvalues of `M0` positive: all of a mechanical system, those of space of a spacetime. Where as many
-/// are negative, the last coordinate `i` whose `M0_ii` is not zero gets a positive one; where all are zero, as of null
-/// coordinates, the first component that is not. The determinant is that in the units of the coordinates: other units change
-/// the factors of all Lagrangians alike. A determinant serves every regular mass matrix, a trace may vanish.
+/// The sign of `s` makes most eigenvalues of `M0` positive: all of them for a mechanical system, the spatial ones for a spacetime. If as
+/// many are negative, the last nonzero `M0_ii` is made positive; if all of these are zero, as in null coordinates, the first nonzero
+/// component. The determinant is taken in the units of the coordinates: other units change the factors of all Lagrangians equally. A
+/// determinant works for every regular mass matrix, while a trace may vanish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CanonicalForm<S> {
     /// `s`.
@@ -180,7 +180,7 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Canonical<M, S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        // Rows beside one that fails are right, and stay so.
+        // Rows that do not fail are right, and stay so.
         let outcome = self.model.terms(q, v, request, terms);
         self.form.apply(v, terms);
         outcome

@@ -1,4 +1,4 @@
-//! Common ground of two Lagrangians of the same coordinates: the motion, and more than that.
+//! What two Lagrangians of the same coordinates have in common: the motion, and more.
 
 use super::basis::{Basis, Values, unknowns};
 use super::find::room;
@@ -19,8 +19,8 @@ pub struct Comparison {
     /// Factors of the groups of coordinates that do not act on each other by `B`, in the order of their first coordinates; empty if all
     /// coordinates are one group. They have been taken out first: everything here is of `B` with these factors.
     pub group_factors: Vec<f64>,
-    /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the
-    /// states know `f'` at this one value, and mass matrices up to a part `h p p^T`.
+    /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the states
+    /// determine `f'` only at this value, and mass matrices only up to a part `h p p^T`.
     pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,
@@ -28,36 +28,37 @@ pub struct Comparison {
     pub gauge_formula: String,
     /// The constant, in the unit of `A`.
     pub constant: f64,
-    /// Rest of the momenta and of the values of `A` beside `f(B) + dF/dt + constant`, root mean square over that of `A`, values
-    /// about their mean.
+    /// Residual of the momenta and of the values of `A` after fitting `f(B) + dF/dt + constant`, root mean square over that of `A`, with
+    /// values about their mean.
     pub lagrangian: f64,
     /// Difference of the accelerations, root mean square in the frame of `|M|` of `B` over that of the larger ones; `NaN` without
     /// accelerations.
     pub motion: f64,
-    /// States at which one of the two has no accelerations, its mass matrix being singular; `motion` is that of the others.
+    /// States at which one of the two has no accelerations because its mass matrix is singular; `motion` is taken over the others.
     pub motionless_states: usize,
-    /// Rest of the mass matrix of `A` beside that of `f(B)`, root mean square over that of `A`, in the same frame.
+    /// Residual of the mass matrix of `A` after fitting that of `f(B)`, root mean square over that of `A`, in the same frame.
     pub mass_matrix: f64,
-    /// Rest of the energy of `A` beside the best polynomial of that of `B`, of first degree unless `f` has a higher one, root
-    /// mean square over that of the energy of `A` about its mean, or over the energy where that of `B` is the same at all states.
+    /// Residual of the energy of `A` after fitting a polynomial of that of `B`, of first degree unless `f` has a higher one, root mean
+    /// square over that of the energy of `A` about its mean, or over the energy where that of `B` is the same at all states.
     pub energy: f64,
 }
 
 /// Highest power of `B` in `f`, for geodesics.
 const POWERS: usize = 3;
-/// Part of a column that must be left beside the others.
+/// Smallest independent part of a column.
 const DEPENDENT: f64 = 1e-9;
 /// Part of the whole below which a term is rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Compares two Lagrangians at states `(q, v)`, `(states, n)`: what they have in common beyond the freedom that `L` has.
 ///
-/// The motion determines `L` at best up to a factor of each group of coordinates that act on each other and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
-/// geodesics, along which `L` is the energy, up to a function `f(L)`, where `B` is the metric. The best `s` (or `f`, a
-/// polynomial of degree 3), follows by linear least squares from the mass matrices, which know nothing of a gauge, `F`, over the functions
-/// of a basis, from the momenta, both in the frame of `|M|` of `B`, the constant from the values. They are taken out, and the residual is
-/// stated by quantity. Of two metrics `f` is a factor. Where `B` is the same on all states, as on a mass shell, motion does not see
-/// `(B - B0)^2 h(q, v)`, `B0` that value: `f` is a factor, and of the mass matrices the part `h p p^T` is left aside at every state.
+/// At best, motion determines `L` up to a factor for each group of coordinates that act on each other, a total derivative, `L -> s L +
+/// dF(q)/dt`, and a constant. For geodesics, along which `L` is the energy, it does so up to a function `f(L)`, where `B` is the metric.
+/// The best `s` (or `f`, a polynomial of degree 3), follows by linear least squares from the mass matrices, which do not depend on a gauge;
+/// `F`, over the functions of a basis, follows from the momenta, both in the frame of `|M|` of `B`; the constant follows from the values.
+/// They are removed, and the residual is reported for each quantity. For two metrics `f` is a factor. Where `B` has the same value `B0` at
+/// all states, as on a mass shell, motion does not depend on `(B - B0)^2 h(q, v)`: `f` is a factor, and the part `h p p^T` of the mass
+/// matrices is ignored at every state.
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -106,7 +107,7 @@ struct Fit {
     factors: Vec<f64>,
     on_shell: bool,
     gauge: Vec<f64>,
-    /// The same without what the states do not determine.
+    /// The gauge function without coefficients that the states do not determine.
     known_gauge: Vec<f64>,
     constant: f64,
     rest: f64,
@@ -122,15 +123,15 @@ impl Fit {
     fn new((a, b): (&Sample, &Sample), terms: [&Terms<f64>; 2], basis: &Basis) -> Result<Self, SymmetryError> {
         let (n, states, functions) = (b.n, b.len(), basis.len());
         let (values, own) = (lagrangians(a), lagrangians(b));
-        // A function of one metric that is another one is a factor.
+        // If a function of a metric is a metric again, it is a factor.
         let powers = if b.homogeneous && !a.homogeneous { POWERS } else { 1 };
-        // Of two that are even in the velocities no difference is a dF/dt, which is odd.
+        // If both are even in the velocities, no difference is a dF/dt, which is odd.
         let functions = if a.even && b.even { 0 } else { functions };
         let frames = Frames::new(b)?;
         let rms = |x: &[f64]| norm(x) / (x.len() as f64).sqrt();
         let motion: Vec<f64> = b.p.chunks_exact(n).zip(b.v.chunks_exact(n)).map(|(p, v)| dot(p, v)).collect();
         let unit = 1.0 / rms(&motion).max(f64::MIN_POSITIVE.sqrt());
-        // Momenta in the frame of B, `(states, n)`, and values, `(states)`, both beside those of the motion of B.
+        // Momenta in the frame of B, `(states, n)`, and values, `(states)`, both relative to those of the motion of B.
         let at_states = |momentum: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> {
             (0..states).flat_map(|k| frames.down(k, &momentum(k))).collect()
         };
@@ -195,7 +196,7 @@ impl Fit {
         })
     }
 
-    /// Distances of mass matrices and of accelerations, states without the latter.
+    /// Distances of mass matrices and of accelerations, and the number of states without accelerations.
     fn mechanics(
         &self,
         [first, second]: [&Terms<f64>; 2],
@@ -307,8 +308,8 @@ fn without(matrix: &mut [f64], p: &[f64]) {
     }
 }
 
-/// Coefficients of `f`, from the first power: the best ones of `M_A = f' M_B + f'' p p^T`, beside parts along `p p^T` on a mass shell;
-/// `unit` is the size of `1/B`.
+/// Coefficients of `f`, from the first power: the best ones of `M_A = f' M_B + f'' p p^T`, plus parts along `p p^T` on a mass shell; `unit`
+/// is the size of `1/B`.
 fn factors(
     [first, second]: [&Terms<f64>; 2],
     (sample, own): (&Sample, &[f64]),
@@ -327,7 +328,7 @@ fn factors(
         };
         (0..sample.len()).flat_map(one).collect()
     };
-    // Of the power m of B times the unit, over the unit.
+    // The power m of B times the unit, over the unit.
     let power = |m: usize| {
         at_states(&|k, e| {
             let (m_, b, p) = (m as f64, own[k] * unit, &sample.p[k * n..(k + 1) * n]);

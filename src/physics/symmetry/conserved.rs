@@ -9,9 +9,9 @@ use super::{Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::singular;
 
-/// Part of the length of a column that must be left beside the others.
+/// Smallest independent part of the length of a column.
 const DEPENDENT: f64 = 1e-7;
-/// Part of a quantity that is not a combination of known ones, for it to be new.
+/// Smallest part that is independent of known quantities for a quantity to be new.
 const NEW: f64 = 1e-4;
 
 /// Factor of a function of the coordinates.
@@ -28,7 +28,7 @@ enum Monomial {
 }
 
 impl Monomial {
-    /// Value at state `k`, and its rate along the motion: `dp/dt = dL/dq + Q`, `dE/dt = v.Q`, with the forces `Q` beside those of `L`.
+    /// Value at state `k`, and its rate along the motion: `dp/dt = dL/dq + Q`, `dE/dt = v.Q`, with the forces `Q` that are not in `L`.
     fn at(self, sample: &Sample, k: usize) -> [f64; 2] {
         let p = |i: usize| sample.p[k * sample.n + i];
         let g = |i: usize| sample.g[k * sample.n + i] + sample.force(k, i);
@@ -55,7 +55,7 @@ impl Monomial {
 /// A conserved quantity `sum of coefficients * function(q) * monomial(p, E)`.
 #[derive(Clone, Debug)]
 pub struct Conserved {
-    /// Coefficients, functions and monomials; what is zero is left out.
+    /// Coefficients, functions and monomials; zero terms are left out.
     terms: Vec<(f64, usize, Monomial)>,
     basis: Basis,
 }
@@ -96,19 +96,19 @@ pub struct Quadratic {
     pub singular_values: Vec<f64>,
     /// Number of all conserved quantities that were found, known ones included, and the gap behind them.
     pub separation: Separation,
-    /// Those that are not combinations of the energy, of the charges of the point symmetries and of the products of these, in
-    /// reduced echelon form; empty if there is no gap.
+    /// Quantities that are not combinations of the energy, the charges of the point symmetries and their products, in reduced echelon form;
+    /// empty if there is no gap.
     pub conserved: Vec<Conserved>,
 }
 
 /// Finds conserved quantities `k^ij p_i p_j + h E + k^i p_i + k` whose factors are functions of a basis.
 ///
-/// Along the motion `dq/dt = v`, `dp/dt = dL/dq` and forces beside those of `L`, so that `dK/dt = 0` is linear in the unknown functions; it is written down at the
-/// states `(q, v)`, `(states, n)`. The function `h` times the energy `E` reaches quantities whose part without momenta is the
-/// potential times a function, or whose tensor has a part along the inverse metric, whatever formulas these have: in the Kepler
-/// problem and in Kerr's metric it is needed. Of a Lagrangian that is even in the velocities the even quantities are sought, the odd
-/// ones being the charges of point symmetries. On coordinates that `L` does not depend on the functions do not depend either, but
-/// for the first harmonics of one such angle at a time.
+/// Along the motion `dq/dt = v`, and `dp/dt` is `dL/dq` plus forces that are not in `L`, so that `dK/dt = 0` is linear in the unknown
+/// functions; it is imposed at the states `(q, v)`, `(states, n)`. The function `h` times the energy `E` reaches quantities whose part
+/// without momenta is the potential times a function, or whose tensor has a part along the inverse metric, whatever formulas these have;
+/// the Kepler problem and Kerr's metric need it. For a Lagrangian that is even in the velocities, only even quantities are sought, because
+/// the odd ones are the charges of point symmetries. The functions do not depend on coordinates that `L` does not depend on, except through
+/// the first harmonics of one such angle at a time.
 ///
 /// `fields` are the point symmetries, of the same basis; products of their charges are not new. For `tolerance` see
 /// [`symmetries`](super::symmetries).
@@ -144,7 +144,7 @@ pub fn quadratic(
     Ok(all.unwrap_or_else(|| unreachable!("there is a search without an angle")))
 }
 
-/// Number of unknown coefficients of the largest of the searches of [`quadratic`] over a basis of so many functions.
+/// Number of unknown coefficients in the largest search of [`quadratic`] over a basis of `functions` functions.
 pub fn quadratic_unknowns(n: usize, functions: usize) -> usize {
     (n * (n + 1) / 2 + n + 2) * functions
 }
@@ -162,7 +162,7 @@ impl Quadratic {
     }
 }
 
-/// Orthonormal columns of all that is known to be conserved: 1, the energy, the charges, the products of these.
+/// Orthonormal columns of all quantities known to be conserved: 1, the energy, the charges and their products.
 fn known(sample: &Sample, basis: &Basis, fields: &[Field]) -> Vec<Vec<f64>> {
     let n = sample.n;
     let mut at = Values::default();

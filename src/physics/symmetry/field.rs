@@ -8,7 +8,7 @@ use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::rollout::Trajectory;
 use serde::Serialize;
 
-/// Work of a force along a field, over that of its components, that is rounding.
+/// Work of a force along a field, relative to that of its components, that counts as rounding.
 const WORKLESS: f64 = 1e-9;
 
 /// `xi = sum of coefficients * function * d_i` and the gauge function `F` that goes with it.
@@ -46,7 +46,7 @@ impl Field {
         self.vector(at, p.len()).iter().zip(p).map(|(x, p)| x * p).sum::<f64>() - gauge
     }
 
-    /// `xi.dL/dq + (D xi v).dL/dv - dF/dt` at a state: what breaks the symmetry there, the rate of the charge.
+    /// `xi.dL/dq + (D xi v).dL/dv - dF/dt` at a state: the violation of the symmetry there, which is the rate of the charge.
     fn breaking(&self, at: &Values, v: &[f64], p: &[f64], g: &[f64]) -> f64 {
         let n = p.len();
         let pull: f64 = self.vector(at, n).iter().zip(g).map(|(x, g)| x * g).sum();
@@ -61,7 +61,7 @@ impl Field {
         pull + turn - gauge
     }
 
-    /// `true` if the forces beside those of `L` do no work along the field, to rounding.
+    /// `true` if the forces that are not in `L` do no work along the field, to rounding.
     pub(crate) fn is_workless(&self, sample: &Sample, basis: &Basis) -> bool {
         let (n, mut at, mut work, mut parts) = (sample.n, Values::default(), 0.0_f64, 0.0);
         for (k, q) in sample.q.chunks_exact(n).enumerate().filter(|_| !sample.force.is_empty()) {
@@ -81,7 +81,7 @@ impl Field {
         }
     }
 
-    /// Drops what is noise of the gauge function, compared with the momentum along the field, and its constant.
+    /// Removes noise from the gauge function, judged by the momentum along the field, and its constant.
     pub(crate) fn clean_gauge(&mut self, sample: &Sample, values: &[Vec<f64>], noise: f64) {
         let (n, functions, states) = (sample.n, self.gauge.len(), sample.len());
         let momentum = |k: usize| -> f64 {
@@ -166,8 +166,8 @@ pub struct Charge {
     pub values: Vec<f64>,
     /// Value at the end less that at the start, the sum of the two parts.
     pub drift: f64,
-    /// Part of the model: the integral over time of what breaks the symmetry, `xi.dL/dq + (D xi v).dL/dv - dF/dt`, or of the power
-    /// of friction, along the motion.
+    /// Part of the model: the integral over time of the violation of the symmetry, `xi.dL/dq + (D xi v).dL/dv - dF/dt`, or of the power of
+    /// friction, along the motion.
     pub by_model: f64,
     /// Part of the integrator: the rest, to the accuracy of the integral over the samples.
     pub by_integrator: f64,
@@ -178,8 +178,8 @@ const CHUNK: usize = 1024;
 
 /// The energy `E = p.v - L` and the charges `p.xi - F` of fields over a basis along a motion, the energy first.
 ///
-/// A charge would stay the same if the model had the symmetry and the integrator made no error. What the model contributes to its
-/// drift is integrated over the samples by Simpson's rule, so that they should be dense.
+/// A charge would stay the same if the model had the symmetry and the integrator made no error. The model's contribution to its drift is
+/// integrated over the samples by Simpson's rule, so the samples should be dense.
 ///
 /// # Errors
 /// [`SymmetryError::Basis`] for a basis or a motion of another number of coordinates, [`SymmetryError::States`] if terms are not
@@ -234,9 +234,9 @@ pub fn charges(
 
 /// The [`charges`] of an exact Lagrangian along the motion of a learned one.
 ///
-/// They do not depend on the factor and the gauge up to which a learned Lagrangian is determined. The part of the model is the
-/// integral of `xi.M (a_learned - a_exact)`, of the energy that of `v.M (a_learned - a_exact)`, `M` and `a_exact` of the exact
-/// Lagrangian, which is to have the symmetries and no friction; the rest is the integrator's.
+/// They do not depend on the factor and the gauge up to which a learned Lagrangian is determined. The part of the model is the integral of
+/// `xi.M (a_learned - a_exact)`, for the energy that of `v.M (a_learned - a_exact)`, with `M` and `a_exact` of the exact Lagrangian, which
+/// must have the symmetries and no friction; the rest is due to the integrator.
 ///
 /// # Errors
 /// As [`charges`].

@@ -14,7 +14,7 @@ const DEPENDENT: f64 = 1e-7;
 /// Largest factor by which the noise of a field may grow to need fewer functions.
 const WORSE: f64 = 3.0;
 
-/// Fields times the cube of their unknown coefficients up to which fields of few functions are sought, half a minute.
+/// Number of fields times the cube of their unknown coefficients up to which fields of few functions are sought, half a minute.
 const SIMPLE: f64 = 2e10;
 
 /// Noise of exact terms: singular values below it are zero.
@@ -31,16 +31,16 @@ pub struct Symmetries {
     pub separation: Separation,
     /// The symmetries, in reduced echelon form; empty if there is no gap.
     pub fields: Vec<Field>,
-    /// The Lie algebra that they form; `None` without symmetries and of more than 200.
+    /// The Lie algebra that they form; `None` without symmetries, or for more than 200.
     pub algebra: Option<Algebra>,
-    /// States that were examined, and those of them at which the mass matrix is singular to working precision. There `L` is
-    /// degenerate: it determines no motion, and whatever function multiplies a null direction of it may be a symmetry.
+    /// States that were examined, and those of them at which the mass matrix is singular to working precision. There `L` is degenerate: it
+    /// determines no motion, and any function times a null direction may be a symmetry.
     pub states: usize,
     /// See `states`.
     pub singular_states: usize,
     /// The quantity that is conserved because `L` does not depend on the parameter of the motion.
     pub invariant: Invariant,
-    /// For every field, whether its charge is conserved: forces beside those of `L`, such as friction, do no work along the field.
+    /// For every field, whether its charge is conserved: whether forces that are not in `L`, such as friction, do no work along the field.
     pub conserved: Vec<bool>,
 }
 
@@ -74,13 +74,12 @@ impl FunctionColumns {
 
 /// Finds the point symmetries of a Lagrangian whose fields are made of a basis.
 ///
-/// A field `xi(q)` is a symmetry if `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow changes `L` by a
-/// total derivative, and `p.xi - F` is conserved (Noether 1918). Of `L = g_ij v^i v^j / 2` these are the Killing fields.
-/// The equation is linear in the coefficients of `xi` and `F`; it is written down at the states `(q, v)`, `(states, n)`, each
-/// relative to the size of the terms of `L` there, `F` is projected out, and `xi` is measured by its length `|xi|_M` in an
-/// orthonormal frame of the mass matrix, averaged over the states. The singular values then do not depend on how the fields
-/// are written, and the zero ones are the symmetries. `L` that does not depend on time has the symmetry of time besides; it is
-/// not counted.
+/// A field `xi(q)` is a symmetry if `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow changes `L` by a total
+/// derivative, and `p.xi - F` is conserved (Noether 1918). Of `L = g_ij v^i v^j / 2` these are the Killing fields. The equation is linear
+/// in the coefficients of `xi` and `F`; it is imposed at the states `(q, v)`, `(states, n)`, each relative to the size of the terms of `L`
+/// there, `F` is projected out, and `xi` is measured by its length `|xi|_M` in an orthonormal frame of the mass matrix, averaged over the
+/// states. The singular values then do not depend on how the fields are written, and the zero ones are the symmetries. If `L` does not
+/// depend on time, it also has the symmetry of time, which is not counted.
 ///
 /// `tolerance` is the noise of the terms, [`EXACT`] for a Lagrangian written down; without one, for a learned model, the largest
 /// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
@@ -161,7 +160,7 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
         let unknowns = Unknowns { sample, columns: &columns, plain: &plain, gauge: &gauge, weight: &weight };
         match tolerance {
             Some(_) => unknowns.refine(&mut rows, &pivots, &sizes, last.max(f64::EPSILON)),
-            // A model has the fields nearly: those of few functions among all that are as good.
+            // For a model the fields hold only nearly: choose fields of few functions among all that are equally good.
             None => unknowns.simplify(&mut rows, &pivots, &sizes, last),
         }
     }
@@ -192,7 +191,7 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
     })
 }
 
-/// The equation of a symmetry in the coefficients of the functions as they are.
+/// The equation of a symmetry in the coefficients of the original functions.
 struct Unknowns<'a> {
     sample: &'a Sample,
     columns: &'a FunctionColumns,
@@ -245,7 +244,7 @@ impl Unknowns<'_> {
         (0..self.sample.len()).map(square).sum::<f64>().sqrt()
     }
 
-    /// Replaces rows of coefficients by such with few entries, as far as their equations hold as well to `noise`.
+    /// Replaces rows of coefficients by rows with few entries, as long as their equations hold equally well to `noise`.
     fn simplify(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
         let functions = self.columns.values.len();
         let places: Vec<usize> =
@@ -278,8 +277,8 @@ impl Unknowns<'_> {
     }
 }
 
-/// Orthonormal columns of `dF/dt` for all functions `F`; the constant has none. For `L` that is even in the velocity `dF/dt`
-/// can be no part of its change, which is even too.
+/// Orthonormal columns of `dF/dt` for all functions `F`; the constant has none. If `L` is even in the velocity, so is its change, and
+/// `dF/dt` cannot be part of it.
 fn gauge(sample: &Sample, rates: &[Vec<f64>], weight: &[f64]) -> Orthonormal {
     if sample.even {
         return orthonormal(&[], DEPENDENT);
@@ -288,8 +287,8 @@ fn gauge(sample: &Sample, rates: &[Vec<f64>], weight: &[f64]) -> Orthonormal {
     orthonormal(&rates.iter().map(weighed).collect::<Vec<Vec<f64>>>(), DEPENDENT)
 }
 
-/// Combinations of the fields `values[f] d_i` that are orthonormal in the mean over the states by the frame, as rows
-/// `(fields, n * functions)`.
+/// Combinations of the fields `values[f] d_i` that are orthonormal in the frame, on average over the states, as rows `(fields, n *
+/// functions)`.
 fn unit_fields(sample: &Sample, values: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, SymmetryError> {
     let (n, functions) = (sample.n, values.len());
     let count = n * functions;
@@ -334,7 +333,7 @@ fn combined(rows: &[Vec<f64>], columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
     product.chunks_exact(states.max(1)).map(<[f64]>::to_vec).collect()
 }
 
-/// Root mean squares of the fields `function d_i` by the frame.
+/// Root mean squares of the fields `function d_i` in the frame.
 fn sizes(sample: &Sample, values: &[Vec<f64>]) -> Vec<f64> {
     let (n, states) = (sample.n, sample.len() as f64);
     let field = |i: usize, value: &Vec<f64>| {

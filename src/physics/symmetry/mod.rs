@@ -1,13 +1,12 @@
-//! Symmetries found in a Lagrangian, not imposed on it; what they conserve; what two Lagrangians have in common.
+//! Symmetries found in a Lagrangian, not imposed on it; their conserved quantities; a comparison of two Lagrangians.
 //!
-//! A point symmetry is a vector field `xi(q)` with `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow maps
-//! motions to motions, and its charge `p.xi - F` is conserved (Noether 1918). Of geodesics these are the Killing fields of the
-//! metric. [`symmetries`] finds them over a [`Basis`] of functions of the coordinates, as the null space of linear equations at
-//! sampled states, names the Lie [`Algebra`] that they form, and says honestly where there is no gap between what vanishes and
-//! what does not. [`quadratic`] finds conserved quantities of second degree in the momenta, such as Carter's constant and the
-//! vector of Runge and Lenz; [`charges`] follows charges along a motion; [`compare`] takes the freedom of a Lagrangian, factor
-//! and gauge, out before it compares, and [`Canonical`] fixes both at a base state. All of them take systems, descriptions in files
-//! and learned models alike.
+//! A point symmetry is a vector field `xi(q)` with `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow maps motions
+//! to motions, and its charge `p.xi - F` is conserved (Noether 1918). Of geodesics these are the Killing fields of the metric.
+//! [`symmetries`] finds them over a [`Basis`] of functions of the coordinates, as the null space of linear equations at sampled states,
+//! names the Lie [`Algebra`] that they form, and reports if there is no gap between singular values that vanish and those that do not.
+//! [`quadratic`] finds conserved quantities of second degree in the momenta, such as Carter's constant and the vector of Runge and Lenz;
+//! [`charges`] follows charges along a motion; [`compare`] removes the freedom of a Lagrangian, its factor and gauge, before it compares,
+//! and [`Canonical`] fixes both at a base state. All of them accept systems, descriptions in files and learned models.
 //!
 //! ```
 //! use lnn::lagrangian::build;
@@ -29,9 +28,9 @@
 //! # Measures
 //!
 //! Equations are taken relative to the size of the terms of `L` at each state; fields are measured by their length `|xi|_M` in an
-//! orthonormal frame of the mass matrix, averaged over the states, never by their effect on `L`. Singular values are therefore the
-//! relative change of `L` along a field of unit size, whatever units, basis and linear dependences between its functions. Numbers are
-//! `f64`: a search is a fit over samples, whose errors are those of the model or of roundings.
+//! orthonormal frame of the mass matrix, averaged over the states, never by their effect on `L`. Singular values are therefore the relative
+//! change of `L` along a field of unit size, independent of the units, the basis and linear dependences between its functions. Numbers are
+//! `f64`: a search is a fit over samples, whose errors come from the model or from rounding.
 
 mod algebra;
 mod basis;

@@ -15,17 +15,15 @@ pub struct Separation {
     pub gap: Option<f64>,
 }
 
-/// Values below which a function may be meant to be zero, when nothing is known of the noise: a part in ten of what it would
-/// be without a symmetry.
+/// Largest value that may be meant to be zero if the noise is unknown: a tenth of its size without a symmetry.
 const SMALL: f64 = 0.1;
-/// Least gap by which values are distinguished when nothing is known of the noise.
+/// Smallest gap that separates values if the noise is unknown.
 const APART: f64 = 10.0;
 /// Noise that a model has at the least: smaller values are not distinguished.
 const NOISE: f64 = 1e-3;
 /// Least gap above a known noise.
 const ABOVE: f64 = 30.0;
-/// Tolerances by which values can be judged: from the rounding of a number near 1 to the part below which a function may be
-/// meant to be zero.
+/// Tolerances that can be used: from the rounding of a number near 1 to the largest value that may be meant to be zero.
 pub const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
 
 /// Refuses a tolerance outside [`TOLERANCES`].
@@ -43,11 +41,11 @@ pub(crate) fn check(tolerance: Option<f64>) -> Result<(), SymmetryError> {
 impl Separation {
     /// Cuts ascending values at a tolerance, the noise of exact terms, or, without one, at the largest gap.
     ///
-    /// With a tolerance the first value above it must exceed the last below it 30 times, and the tolerance itself three
-    /// times. Without one, values above 0.1 are not zero, and the cut is where the ratio of neighbours is largest, 10 at
-    /// least, values below 1e-3 taken as that. Otherwise there is no gap and no count.
+    /// With a tolerance the first value above it must exceed the last below it 30 times, and the tolerance itself three times. Without one,
+    /// values above 0.1 are not zero, and the cut is where the ratio of neighbours is largest. It must be at least 10, with values below
+    /// 1e-3 taken as 1e-3. Otherwise there is no gap and no count.
     pub(crate) fn new(values: &[f64], tolerance: Option<f64>) -> Self {
-        // Nothing is smaller than the rounding of a number near 1.
+        // No value is smaller than the rounding of a number near 1.
         let floor = f64::EPSILON;
         let ratio = |k: usize, below: f64| values.get(k).map(|above| above / below.max(floor));
         match tolerance {
@@ -70,8 +68,8 @@ impl Separation {
     }
 }
 
-/// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
-/// among many functions, also those of lower powers.
+/// The bases in which symmetries are sought: with these degrees, or the usual ones; for a model, whose errors hide symmetries among many
+/// functions, also bases of lower powers.
 pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact: bool) -> Vec<(Basis, Degrees)> {
     if let Some(degrees) = degrees {
         return vec![(Basis::new(names, charts, degrees), degrees)];
@@ -90,13 +88,13 @@ pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact
     all
 }
 
-/// States that are examined for so many unknown coefficients, of a Lagrangian that is written down or of a model.
+/// Number of states for this many unknown coefficients, for a Lagrangian that is written down or for a model.
 pub fn enough(unknowns: usize, exact: bool) -> usize {
     (2 * unknowns).max(if exact { 400 } else { 1000 })
 }
 
-/// Point symmetries: in the basis that shows the most of them, of such in the one with the widest gap; `tolerance` as in
-/// [`symmetries`], [`EXACT`] of exact terms if there is none.
+/// Point symmetries in the basis that shows the most of them, or, if several do, in the one with the widest gap; `tolerance` as in
+/// [`symmetries`], [`EXACT`] for exact terms if there is none.
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -118,12 +116,12 @@ pub fn most_symmetries(
     best.ok_or(SymmetryError::Basis { expected: model.coordinates(), found: 0 })
 }
 
-/// Brings `rows` into reduced echelon form, in place: every row has a pivot 1, which the others have 0.
+/// Brings `rows` into reduced echelon form, in place: every row has a pivot 1, where the others have 0.
 ///
-/// Columns are weighted by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots,
-/// as long as their entry is not much smaller than the largest that is left. What is below `noise` of the largest weighed entry of
-/// its row becomes 0. Rows are ordered by their pivots. The first `fixed` rows take part before the others. Entries beyond the
-/// weighed columns are carried along.
+/// Columns are weighted by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots, as long as
+/// their entry is not much smaller than the largest remaining one. Entries below `noise` of the largest weighted entry of their row become
+/// 0. Rows are ordered by their pivots. The first `fixed` rows take part before the others. Entries beyond the weighted columns are carried
+/// along.
 ///
 /// Returns the pivot of every row.
 pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: usize) -> Vec<usize> {
@@ -179,12 +177,12 @@ pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: us
     (0..rows.len()).filter_map(pivot).collect()
 }
 
-/// Orthonormal columns and how they are made of those that were kept.
+/// Orthonormal columns, and their coefficients over the columns that were kept.
 #[derive(Clone, Debug)]
 pub(crate) struct Orthonormal {
     /// The columns, each of length 1.
     pub columns: Vec<Vec<f64>>,
-    /// Places of the columns that were kept among those given.
+    /// Indices of the given columns that were kept.
     pub kept: Vec<usize>,
     /// Orthonormal column `k` is the sum of `mix[k][j]` times the kept column `j`, `j <= k`.
     pub mix: Vec<Vec<f64>>,
@@ -204,7 +202,7 @@ pub(crate) fn orthonormal(given: &[Vec<f64>], least: f64) -> Orthonormal {
             }
         }
         let left = norm(&rest);
-        // A column of zeros has nothing to give.
+        // A column of zeros adds nothing.
         if left <= least * length {
             continue;
         }
@@ -247,7 +245,7 @@ impl Orthonormal {
         self.columns.iter().map(|known| dot(known, column)).collect()
     }
 
-    /// Takes what lies along the orthonormal columns out of a column.
+    /// Removes the part of a column along the orthonormal columns.
     pub fn remove(&self, column: &mut [f64]) {
         for _ in 0..2 {
             for known in &self.columns {
@@ -287,12 +285,12 @@ const NEGLIGIBLE: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
 /// Residual of the null vector with few entries, in units of the one it replaces and of `1/NEGLIGIBLE` roundings.
 const WORSE: f64 = 10.0;
 
-/// Replaces a null vector of columns by one without its small entries, if that is one too.
+/// Replaces a null vector of columns by one without its small entries, if that is a null vector too.
 ///
-/// `column` gives the column of an entry of `vector`; `sizes` are those of the functions that they belong to. The largest entry keeps
-/// its value, the other large ones follow by least squares. The new vector is taken if the residual, over that of all entries one by
-/// one, is below ten times `noise` or below 1e-9: whatever it leaves out was noise. Once more, as long as that leaves out more: what was
-/// large before a fit may be small after it.
+/// `column` gives the column of an entry of `vector`; `sizes` are those of the functions that they belong to. The largest entry keeps its
+/// value, the other large ones follow by least squares. The new vector is accepted if the residual, relative to all entries one by one, is
+/// below ten times `noise` or below 1e-9: it then leaves out only noise. This is repeated while it leaves out more: an entry that was large
+/// before a fit may be small after it.
 pub(crate) fn refine(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
     let entries = |vector: &[f64]| vector.iter().filter(|x| **x != 0.0).count();
     loop {
@@ -362,8 +360,8 @@ fn fitted(
 /// A column that explains less than this many standard errors counts as chance.
 const CERTAIN: f64 = 3.0;
 
-/// Coefficients of the least-squares fit of columns to a target, 0 for those that the fit does not know: columns that explain no more beside
-/// those before them than chance does are left out and the others fitted again, as long as the rest grows no more than by chance.
+/// Coefficients of the least-squares fit of columns to a target, 0 for those that it does not determine: columns that explain no more than
+/// chance beyond the columns before them are left out and the others refitted, as long as the residual grows no more than by chance.
 pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) -> Vec<f64> {
     let mut support: Vec<usize> = (0..columns.len()).collect();
     let mut found: Option<(Vec<f64>, f64)> = None;
@@ -375,7 +373,7 @@ pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) 
         plain.remove(&mut rest);
         let free = target.len().saturating_sub(plain.columns.len()).max(1) as f64;
         let square = dot(&rest, &rest) / free;
-        // The columns left out explained no more than as many columns of noise do.
+        // The columns that were left out explained no more than the same number of noise columns.
         let left_out = (columns.len() - support.len()) as f64;
         if let Some((before, least)) = &found
             && square > least * (1.0 + CERTAIN * (2.0 * left_out).sqrt() / free)
@@ -415,11 +413,11 @@ const PRICE: f64 = 0.3;
 /// Largest growth of the residual that few entries justify.
 const WORTH: f64 = 2.0;
 
-/// The vector of fewest entries near `start` that solves `A x = 0` to about `noise`, where `gram` is `A^T A`; `None` if it is
-/// solved less well than twice as badly.
+/// The vector of fewest entries near `start` that solves `A x = 0` to about `noise`, where `gram` is `A^T A`; `None` if its residual is
+/// more than twice as large.
 ///
-/// `x^T A^T A x` is minimised beside a price for entries `sum of (s x)^2/((s x)^2 + d^2)`, reweighted with `d` falling, `s` being the
-/// `sizes` of the entries; the entry `pivot` is kept, the `taken` ones stay 0 (reweighted least squares, Chartrand and Yin 2008).
+/// `x^T A^T A x` is minimised together with a penalty on entries `sum of (s x)^2/((s x)^2 + d^2)`, reweighted with `d` falling, `s` being
+/// the `sizes` of the entries; the entry `pivot` is kept, the `taken` ones stay 0 (reweighted least squares, Chartrand and Yin 2008).
 pub(crate) fn sparsest(
     gram: &[f64],
     start: &[f64],
@@ -482,9 +480,9 @@ mod tests {
         assert_eq!(at(&[1e-14, 5e-9, 6e-9, 2e-8], exact).count, None);
         assert_eq!(at(&[1e-16, 1e-17], exact), Separation { count: Some(2), gap: None });
         assert_eq!(at(&[1e-4, 2e-3, 3e-3, 0.2], None).count, Some(3));
-        // Imposed symmetries beside learned ones.
+        // Imposed symmetries next to learned ones.
         assert_eq!(at(&[0.0, 1e-9, 2e-3, 0.05], None).count, Some(3));
-        // What two exact ones beside stand out from may still be noise.
+        // A value that stands out only from two exact ones may still be noise.
         assert_eq!(at(&[1e-6, 2e-6, 4e-3, 0.02], None).count, None);
         assert_eq!(at(&[1e-3, 5e-3, 2e-2, 0.09], None).count, None);
         assert_eq!(at(&[0.2, 0.3], None), Separation { count: Some(0), gap: Some(2.0) });
@@ -503,7 +501,7 @@ mod tests {
 
     #[test]
     fn few_entries_are_preferred() {
-        // a = b + c nearly, and a = d nearly: of a mixture that is mostly the latter, one entry is enough.
+        // a = b + c nearly, and a = d nearly: for a mixture that is mostly the latter, one entry is enough.
         let columns = vec![
             vec![1.0, 1.0, 0.0, 0.0],
             vec![1.0, 0.0, 0.001, 0.0],
@@ -525,7 +523,7 @@ mod tests {
         let target: Vec<f64> = a.iter().zip(&noise).map(|(a, x)| 3.0 * a + 0.1 * x).collect();
         let found = significant(&[a.clone(), b, c.clone()], &target, 1e-9);
         assert!((found[0] - 3.0).abs() < 0.05 && found[1..] == [0.0; 2], "{found:?}");
-        // Of two columns that explain it together, neither is left out.
+        // If two columns explain it together, neither is left out.
         let both: Vec<f64> = a.iter().zip(&c).map(|(a, c)| a - 0.5 * c).collect();
         let found = significant(&[a, c], &both, 1e-9);
         assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] + 0.5).abs() < 1e-12, "{found:?}");

@@ -1,4 +1,4 @@
-//! States at which the terms of a Lagrangian are evaluated, with typical sizes of motion and of terms there.
+//! States at which the terms of a Lagrangian are evaluated, with the typical sizes of the motion and of the terms.
 
 use super::SymmetryError;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -20,7 +20,7 @@ pub(crate) struct Sample {
     pub p: Vec<f64>,
     /// `dL/dq`, `(states, n)`.
     pub g: Vec<f64>,
-    /// Forces beside those of `L`, such as friction, `(states, n)`; empty without.
+    /// Forces that are not in `L`, such as friction, `(states, n)`; empty if there are none.
     pub force: Vec<f64>,
     /// `E = p.v - L`, `(states)`.
     pub energy: Vec<f64>,
@@ -28,26 +28,26 @@ pub(crate) struct Sample {
     pub frame: Vec<f64>,
     /// Size of the terms of `xi.g + (D xi v).p` at every state for a field of unit size, `(states)`.
     pub size: Vec<f64>,
-    /// Time in which momenta change by themselves at every state, `(states)`.
+    /// Time in which momenta change by their own size at every state, `(states)`.
     pub pace: Vec<f64>,
     /// States at which the mass matrix is singular to working precision: there `L` is degenerate and determines no motion.
     pub singular: usize,
     /// `true` if `L(q, -v) = L(q, v)`.
     pub even: bool,
-    /// `true` if `L` is a quadratic form of the velocity, as that of geodesics: then it is the energy.
+    /// `true` if `L` is a quadratic form of the velocity, as for geodesics: then it equals the energy.
     pub homogeneous: bool,
     /// States at which the mass matrix has positive and negative eigenvalues, as the metric of a space with a time.
     pub indefinite: usize,
 }
 
-/// What every motion conserves because `L` does not depend on the parameter of the motion, in words for people and for files.
+/// The quantity that every motion conserves because `L` does not depend on the parameter of the motion, in words for people and for files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Invariant {
     /// The energy.
     #[serde(rename = "energy")]
     Energy,
-    /// Of geodesics of a metric with a time, whose parameter is no time: their length squared. The energy is the charge of a translation of the
-    /// time, if the metric does not depend on it.
+    /// The squared length of geodesics of a metric with a time, whose parameter is not the time. The energy is the charge of a time
+    /// translation, if the metric does not depend on time.
     #[serde(rename = "g(v, v)")]
     Square,
     /// `p.v - L` of another Lagrangian with a time among its coordinates.
@@ -59,11 +59,10 @@ pub enum Invariant {
 }
 
 impl Invariant {
-    /// What the motions of a model conserve, by its terms at states `(states, n)`.
+    /// What the motions of a model conserve, judged by its terms at states `(states, n)`.
     ///
     /// # Errors
-    /// [`SymmetryError::Shape`] for slices of unfit lengths, [`SymmetryError::States`] if fewer than half of the states have finite
-    /// terms.
+    /// [`SymmetryError::Shape`] for slices of wrong length, [`SymmetryError::States`] if fewer than half of the states have finite terms.
     pub fn of(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Result<Self, SymmetryError> {
         Ok(Sample::new(model, q, v)?.invariant())
     }
@@ -162,8 +161,8 @@ impl Sample {
 
     /// Turns mass matrices into frames and finds the sizes of the terms.
     ///
-    /// Of a field of unit size `|xi|_M`, `xi.g` is at most `|g|` and `(D xi v).p` about `|v| |p|` over the length on which the
-    /// field changes, for which the spread of the coordinates stands; all norms are those of the frame.
+    /// For a field of unit size `|xi|_M`, `xi.g` is at most `|g|`, and `(D xi v).p` is about `|v| |p|` over the length on which the field
+    /// changes, estimated by the spread of the coordinates; all norms are those of the frame.
     fn measure(&mut self) {
         let (n, states) = (self.n, self.len());
         let (mut values, mut vectors) = (vec![0.0; states * n], vec![0.0; states * n * n]);
@@ -201,7 +200,7 @@ impl Sample {
         self.pace = momenta.iter().zip(&self.size).map(|(momentum, size)| momentum / size).collect();
     }
 
-    /// Force beside those of `L` on coordinate `i` at state `k`.
+    /// Force that is not in `L` on coordinate `i` at state `k`.
     pub fn force(&self, k: usize, i: usize) -> f64 {
         self.force.get(k * self.n + i).copied().unwrap_or(0.0)
     }
@@ -216,14 +215,14 @@ impl Sample {
         }
     }
 
-    /// For every coordinate whether `L` does not depend on it.
+    /// For every coordinate, whether `L` is independent of it.
     pub fn cyclic(&self) -> Vec<bool> {
         let size = |i: usize| self.g.iter().skip(i).step_by(self.n).fold(0.0, |m: f64, g| m.max(g.abs()));
         let momentum = self.p.iter().fold(f64::MIN_POSITIVE, |m: f64, p| m.max(p.abs()));
         (0..self.n).map(|i| size(i) <= EVEN * momentum).collect()
     }
 
-    /// Root mean square of every coordinate about its mean; 1 for one that is the same everywhere.
+    /// Root mean square of every coordinate about its mean; 1 for a constant one.
     pub fn spread(&self) -> Vec<f64> {
         let states = self.len() as f64;
         let one = |i: usize| {
@@ -239,9 +238,9 @@ impl Sample {
 /// A box of states: `[low, high]` of every coordinate and velocity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// Of the coordinates, `(n)`.
+    /// Ranges of the coordinates, `(n)`.
     pub position: Vec<[f64; 2]>,
-    /// Of the velocities, `(n)`.
+    /// Ranges of the velocities, `(n)`.
     pub velocity: Vec<[f64; 2]>,
 }
 
@@ -255,7 +254,8 @@ impl Region {
         if column < n { self.position[column] } else { self.velocity[column - n] }
     }
 
-    /// The states of both regions, of as many coordinates; a range without width is no bound, such as that of a velocity that a mass shell fixes.
+    /// The states in both regions, which have the same number of coordinates. A range without width, such as that of a velocity that a mass
+    /// shell fixes, is no bound.
     ///
     /// # Errors
     /// The first column whose ranges have nothing in common, or a single number, on which no functions could be distinguished.
@@ -305,7 +305,7 @@ impl Region {
     }
 }
 
-/// Share of every training range over which a model is examined: near the edges it is worst.
+/// Share of every training range over which a model is examined: it is worst near the edges.
 const INNER: f64 = 0.8;
 
 /// The middle of a range.

@@ -16,7 +16,7 @@ pub struct SymmetrySummary {
     pub system: String,
     /// Point symmetries; null if there is no gap between singular values.
     pub count: Option<usize>,
-    /// First singular value that is not zero over the last that is.
+    /// Ratio of the first singular value that is not zero to the last that is.
     pub gap: Option<f64>,
     /// Name of the algebra.
     pub name: Option<String>,
@@ -24,7 +24,7 @@ pub struct SymmetrySummary {
     pub fields: Vec<String>,
     /// Function `F` of every field whose flow changes `L` by `dF/dt`.
     pub gauge_functions: Vec<String>,
-    /// None of fields that are no algebra.
+    /// Empty for fields that form no algebra.
     pub structure_constants: Vec<Vec<Vec<f64>>>,
     /// Negative, positive and zero eigenvalues of the Killing form.
     pub killing_form_signature: Option<[usize; 3]>,
@@ -38,7 +38,7 @@ pub struct SymmetrySummary {
     pub time_translation: bool,
     /// The quantity that it conserves.
     pub invariant: Invariant,
-    /// Of every field, whether its charge is conserved: friction may change it.
+    /// For every field, whether its charge is conserved: friction may change it.
     pub conserved: Vec<bool>,
     /// Ascending.
     pub singular_values: Vec<f64>,
@@ -67,7 +67,7 @@ pub struct QuadraticSummary {
     pub count: Option<usize>,
     /// All of these functions, known ones included.
     pub with_known: Option<usize>,
-    /// First singular value that is not zero over the last that is.
+    /// Ratio of the first singular value that is not zero to the last that is.
     pub gap: Option<f64>,
     /// The new ones.
     pub conserved: Vec<String>,
@@ -210,7 +210,7 @@ impl SymmetrySummary {
     }
 }
 
-/// A factor with its sign, 1 left out.
+/// A factor with its sign; 1 is left out.
 fn factor(x: f64) -> String {
     let sign = if x < 0.0 { "-" } else { "+" };
     let size = x.abs();
@@ -234,7 +234,7 @@ impl QuadraticSummary {
     }
 }
 
-/// Relative distance of motions up to which they agree, and of Lagrangians from which these do not.
+/// Largest relative distance at which motions agree, and smallest one at which Lagrangians do not.
 const SAME: f64 = 1e-6;
 const OTHER: f64 = 1e-3;
 
@@ -277,7 +277,7 @@ impl ComparisonSummary {
         findings
     }
 
-    /// The fit, and what it does not determine, a sentence each.
+    /// The fit, and its undetermined parts, a sentence each.
     fn fit(&self) -> Vec<String> {
         let found = &self.comparison;
         let powers = found.factors.iter().enumerate().map(|(k, factor)| {
