@@ -21,7 +21,7 @@ pub enum Precision {
     F64,
 }
 
-/// Reaction to a state without a finite acceleration or a gradient that is not finite.
+/// Reaction to a state without a finite acceleration, or to a gradient that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -55,9 +55,9 @@ impl Scaling {
 
 /// Epochs of a phase or of multiple shooting at most, and iterations of L-BFGS: years.
 pub const MOST_EPOCHS: usize = 1 << 24;
-/// States of a set, or of a step, at most; their memory is looked at beside.
+/// Largest number of states of a set or of a step; their memory is checked separately.
 const MOST_STATES: usize = 1 << 30;
-/// Largest weight of a penalty: beside it single precision has no digit of the loss left.
+/// Largest weight of a penalty: a larger one leaves single precision no digit of the loss.
 const MOST_LAMBDA: f64 = 1e12;
 /// Weight of a penalty, if no other one is chosen.
 pub const PENALTY: f64 = 100.0;
@@ -67,7 +67,7 @@ pub const MOST_RATE: f64 = 1000.0;
 pub const MOST_SEED: u64 = i64::MAX as u64;
 
 table! {
-    /// A complete training run. Keys that are left out have the values of a black box by the preset `quick`; others are refused.
+    /// A complete training run. Missing keys take the values of a black box in the preset `quick`; unknown keys are rejected.
     pub struct Config {
         /// Name of the system.
         #[key("a name, see `lnn systems`", example = "\"double-pendulum\"", flag = "name")]
@@ -218,9 +218,9 @@ table! {
 
 /// States in a shell around a centre: directions uniform over the sphere, distances uniform in their logarithm.
 ///
-/// Velocities are those of free fall: rapidities uniform from 0 to `rapidity`, in any direction of the local frame of an observer whom the
-/// surface of equal time sees at rest. With [`Data::acceleration_weighting`] `f` a training state weighs `1/(|a| + f m)`, `m` the
-/// median of `|a|` among the states about as far from the centre: near and far count alike.
+/// Velocities have rapidities uniform from 0 to `rapidity`, in any direction of the local frame of an observer at rest in the surface of
+/// equal time. With [`Data::acceleration_weighting`] `f` a training state has the weight `1/(|a| + f m)`, with `m` the median of `|a|`
+/// among the states at about the same distance: near and far states count equally.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell<'a> {
     /// Names of the Cartesian coordinates around the centre.
@@ -397,7 +397,7 @@ impl Network {
     /// Index of the coordinate [`time_like`](Self::time_like) among these names, if there is one.
     ///
     /// # Errors
-    /// A name that is none of them.
+    /// A name that is not among them.
     pub(crate) fn time_like_index<'a>(
         &self,
         coordinates: impl Iterator<Item = &'a str>,
@@ -405,10 +405,10 @@ impl Network {
         self.time_like.as_ref().map(|name| place("network.time_like", name, coordinates)).transpose()
     }
 
-    /// Knowledge of the Lagrangian beforehand, for coordinates with these names.
+    /// Prior knowledge of the Lagrangian, for coordinates with these names.
     ///
     /// # Errors
-    /// A cyclic or radial coordinate that is none of them.
+    /// A cyclic or radial coordinate that is not among them.
     pub(crate) fn form<'a>(&self, coordinates: impl Iterator<Item = &'a str> + Clone) -> Result<Form, ConfigError> {
         let index = |name: &String| place("network.cyclic", name, coordinates.clone());
         let radial = |group: &Vec<String>| -> Result<Radial, ConfigError> {
@@ -448,7 +448,7 @@ impl Config {
         let mut faults = Faults::default();
         self.ranges("", &mut faults);
         self.common_faults(n, false, &mut faults);
-        // With a known system its own time counts.
+        // A known system brings its own time.
         self.penalty.time_faults(self.network.time_like.as_deref(), &mut faults);
         faults.0
     }
@@ -464,7 +464,7 @@ impl Config {
         faults.0
     }
 
-    /// What several keys decide together.
+    /// Checks conditions on several keys.
     fn common_faults(&self, n: usize, drawn: bool, faults: &mut Faults) {
         let (data, network) = (&self.data, &self.network);
         let most = format!("a system of at most {MAX_COORDINATES} coordinates, as a model has");
@@ -498,10 +498,10 @@ impl Config {
 }
 
 impl Phase {
-    /// What several keys of phase `k` decide together, for `n` coordinates.
+    /// Checks conditions on several keys of phase `k`, for `n` coordinates.
     fn faults(&self, k: usize, n: usize, drawn: bool, faults: &mut Faults) {
         let field = |name: &str| format!("phase[{k}].{name}");
-        // Beside a rate that is wrong itself nothing is known.
+        // If the rate itself is wrong, nothing follows for `eta_min`.
         let ok = (0.0..=self.rate).contains(&self.eta_min) || self.rate.is_nan() || self.rate <= 0.0;
         faults.check(ok, &field("eta_min"), "0 to the rate", self.eta_min.to_string());
         faults.bounds(&field("position"), &self.position, drawn, n);

@@ -18,7 +18,7 @@ pub struct ConfigError {
 /// Index of a coordinate by its name.
 ///
 /// # Errors
-/// A name that is none of them.
+/// A name that is not among them.
 pub fn place<'a>(field: &str, name: &str, coordinates: impl Iterator<Item = &'a str>) -> Result<usize, ConfigError> {
     let names: Vec<&str> = coordinates.collect();
     names.iter().position(|known| *known == name).ok_or_else(|| ConfigError {

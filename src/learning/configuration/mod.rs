@@ -1,4 +1,4 @@
-//! Configurations: every choice of a training, its ranges, and the penalty it asks for.
+//! Configurations: every choice of a training, its ranges and its penalty.
 
 mod config;
 mod error;

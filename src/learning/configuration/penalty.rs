@@ -1,5 +1,5 @@
-//! Which violations of the mass matrix's signature are penalised: all that is said of a penalty but its formula, which
-//! [`linalg`](crate::linalg) has.
+//! Which violations of the mass matrix's signature are penalised: everything about a penalty except its formula, which is in
+//! [`linalg`](crate::linalg).
 
 use crate::configuration::error::{ConfigError, Faults, place};
 use crate::linalg::{
@@ -96,7 +96,7 @@ pub enum Penalty {
     /// `s_k = c_1 .. c_k`, `c_i` the lower median of `|M_ii|` over the batch, a constant for the gradient, `eps` 1e-8.
     ///
     /// With a time-like coordinate: the same sum over the block without it, plus `relu(M_tt) / (c_t + eps)`. A metric whose `g_tt` is
-    /// positive, as inside of a horizon or of an ergosphere, is penalised for being right there.
+    /// positive, as inside a horizon or an ergosphere, is penalised although it is right.
     ///
     /// Invariant under `M -> s M` as long as `s_k` stays above `eps`. Where `s_k` falls below it, as after a learned
     /// Lagrangian shrank, the penalty fades with `s_k / eps` and at last no longer acts: the eigenvalue penalty or the
@@ -136,7 +136,7 @@ impl Penalty {
         }
     }
 
-    /// `true` if a matrix, `(n, n)`, is plainly as it should be.
+    /// `true` if a matrix, `(n, n)`, clearly has no violation.
     pub(crate) fn allows<S: Scalar>(self, n: usize, matrix: &[S], buffers: &mut SignatureBuffers<S>) -> bool {
         match self {
             Self::None => true,
@@ -188,7 +188,7 @@ impl Regularizer {
         }
     }
 
-    /// Faults of a penalty beside a time-like coordinate, whose metric has a negative eigenvalue.
+    /// Faults of a penalty combined with a time-like coordinate, whose metric has a negative eigenvalue.
     pub(super) fn time_faults(&self, time: Option<&str>, faults: &mut Faults) {
         let Some(time) = time.filter(|_| self.lambda() > 0.0) else { return };
         if self.is_classical() {
@@ -201,10 +201,10 @@ impl Regularizer {
         }
     }
 
-    /// The penalty for a system with these coordinates; a weight of 0 is none.
+    /// The penalty for a system with these coordinates; a weight of 0 means none.
     ///
     /// # Errors
-    /// A time-like coordinate that is none of them.
+    /// A time-like coordinate that is not among them.
     pub(crate) fn resolve<'a>(&self, coordinates: impl Iterator<Item = &'a str>) -> Result<Penalty, ConfigError> {
         Ok(match *self {
             _ if self.lambda() == 0.0 => Penalty::None,
@@ -220,7 +220,7 @@ impl Regularizer {
     }
 }
 
-/// The kinds of penalty that may stand beside a time-like coordinate.
+/// The kinds of penalty that can be combined with a time-like coordinate.
 const BESIDE_A_TIME: &str = "signature, lorentzian-sylvester or none";
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The declaration of a table of a configuration file: from one place come its type, defaults, ranges, documentation and options.
+//! The declaration of a table of a configuration file, the single source of its type, defaults, ranges, documentation and options.
 //!
 //! ```text
 //! table! {
@@ -14,10 +14,9 @@
 //! }
 //! ```
 //!
-//! The first paragraph of a field's documentation is its comment in printed configurations and its line of the reference; what
-//! follows a blank line is for readers of the code. `check` is a predicate of a value, of each element of a list, and of an
-//! optional value that is there; a fault is worded by the text of the allowed values. What several keys decide together is checked
-//! by hand.
+//! The first paragraph of a field's documentation is its comment in printed configurations and its line of the reference; text after a
+//! blank line is for readers of the code. `check` is a predicate of a value, of each element of a list, and of an optional value that is
+//! there; a fault is worded by the text of the allowed values. Conditions on several keys are checked by hand.
 
 use crate::configuration::ConfigError;
 use crate::configuration::error::Faults;
@@ -32,15 +31,15 @@ pub struct Key {
     doc: &'static str,
     /// Allowed values, with their unit.
     pub values: &'static str,
-    /// A value in TOML, by which an option is read, and which is shown for a key that may be left out.
+    /// A value in TOML, from which an option is parsed, and which is shown for an optional key.
     pub example: &'static str,
-    /// Name of its command-line option; empty for none. With `?` at its end it may stand without a value, which is the example then.
+    /// Name of its command-line option; empty for none. With `?` at its end it may be used without a value, and then takes the example.
     pub flag: &'static str,
     /// The keys below it.
     pub below: Below,
 }
 
-/// What stands below a key.
+/// The content below a key.
 #[derive(Clone, Copy, Debug)]
 pub enum Below {
     /// A value.
@@ -149,7 +148,7 @@ impl<T: Leaves> Leaves for Vec<T> {
 
 /// A table whose keys have ranges.
 pub trait Ranges {
-    /// Notes every value out of its range; the table stands at `path`.
+    /// Notes every value out of its range; `path` is the path of the table.
     fn ranges(&self, _path: &str, _faults: &mut Faults) {}
 }
 

@@ -1,5 +1,5 @@
-//! States with their accelerations, from which a network learns, and their weights by the size of the accelerations: few large
-//! ones do not outweigh the others.
+//! States with their accelerations, from which a network learns, and weights by the size of the accelerations, so that a few large ones do
+//! not outweigh the others.
 
 use crate::lagrangian::{Manifold, ManifoldRows, project, project_acceleration};
 use crate::network::file::StoredPrecision;
@@ -62,7 +62,7 @@ pub enum DatasetError {
     /// No states.
     #[error("a dataset needs at least one state")]
     Empty,
-    /// A state from which there is no way to a constraint.
+    /// A state from which a constraint cannot be reached.
     #[error("state {row} cannot be projected onto the constraint `{constraint}`")]
     Unreachable {
         /// State, from 0.
@@ -101,8 +101,8 @@ impl<S: Scalar> Dataset<S> {
         Ok(Self { coordinates, q, v, a, force, weight, rows, drift, force_scale })
     }
 
-    /// The same states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to
-    /// the coordinates: `Q.dq` is work in J.
+    /// These states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to the coordinates:
+    /// `Q.dq` is work in J.
     ///
     /// Accelerations alone leave the unit of `L` free. Forces fix it: with `M_ij` in scaled coordinates `s_i s_j` times
     /// that in physical ones, `M a = g - c - dD/dv + Q` takes the force `s_i Q_i` in J, so that `L` comes out in J and the
@@ -115,8 +115,8 @@ impl<S: Scalar> Dataset<S> {
         Ok(Self { force, ..self })
     }
 
-    /// The same states, learned from by the residuals of force `M a + c - g + dD/dv - Q`, each over its `scale`, `(n)` in physical units,
-    /// in place of those of the accelerations: nothing is solved for, and the mass matrix may be singular.
+    /// These states with residuals of force `M a + c - g + dD/dv - Q`, each over its `scale`, `(n)` in physical units, instead of residuals
+    /// of the accelerations: nothing is solved for, and the mass matrix may be singular.
     ///
     /// # Errors
     /// [`DatasetError`] for a scale that is not a positive number, and for states without forces or under constraints, whose forces are
@@ -131,8 +131,8 @@ impl<S: Scalar> Dataset<S> {
         }
     }
 
-    /// The same states under constraints `A a = -gamma`, rows `A` `(states, m, n)` and `gamma` `(states, m)` in physical units: what is
-    /// learned of them is the motion `M a = g - c + Q + A^T lambda`.
+    /// These states under constraints `A a = -gamma`, rows `A` `(states, m, n)` and `gamma` `(states, m)` in physical units: a network
+    /// learns the motion `M a = g - c + Q + A^T lambda`.
     ///
     /// # Errors
     /// [`DatasetError`] naming the first offending row.
@@ -143,7 +143,7 @@ impl<S: Scalar> Dataset<S> {
         Ok(Self { rows, drift, ..self })
     }
 
-    /// The same states under the constraints of a manifold.
+    /// These states under the constraints of a manifold.
     ///
     /// # Errors
     /// As [`Dataset::with_constraints`], where a constraint is not finite.
@@ -157,11 +157,11 @@ impl<S: Scalar> Dataset<S> {
         self.with_constraints(matrix, drift)
     }
 
-    /// The same states brought to a manifold by the least changes, positions, velocities and accelerations one after the other, under its
-    /// constraints; and how far the positions were away, root mean square.
+    /// These states projected onto a manifold, first positions, then velocities and accelerations, and put under its constraints; also the
+    /// root mean square distance of the positions.
     ///
     /// # Errors
-    /// [`DatasetError::Unreachable`] where there is no way; as [`Dataset::on`].
+    /// [`DatasetError::Unreachable`] where the projection fails; those of [`Dataset::on`].
     pub fn brought_to(mut self, manifold: &dyn Manifold<S>) -> Result<(Self, f64), DatasetError> {
         let n = self.coordinates;
         let mut square = 0.0;
@@ -178,7 +178,7 @@ impl<S: Scalar> Dataset<S> {
         Ok((self.on(manifold)?, (square / states).sqrt()))
     }
 
-    /// The same states, their residuals multiplied by these weights in the loss, `(states)`.
+    /// These states with weights, `(states)`, that multiply their residuals in the loss.
     ///
     /// # Errors
     /// [`DatasetError`] for a wrong number of weights or one that is not finite.
@@ -303,7 +303,7 @@ impl<S: Scalar> Dataset<S> {
         checksum(all.chain(&self.rows).chain(&self.drift).chain(&self.force_scale), StoredPrecision::F64)
     }
 
-    /// The same states in another precision.
+    /// These states in another precision.
     pub fn cast<T: Scalar>(&self) -> Dataset<T> {
         let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
         Dataset {
@@ -340,12 +340,12 @@ impl StateEstimate<'_> {
     }
 }
 
-/// Standard deviations of the noise of what was measured, in physical units.
+/// Standard deviations of the measurement noise, in physical units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    /// Of each position, `(n)`, positive.
+    /// Noise of each position, `(n)`, positive.
     pub q: Vec<f64>,
-    /// Of each velocity, `(n)`, positive; empty if velocities were not measured or shall not be used.
+    /// Noise of each velocity, `(n)`, positive; empty if velocities were not measured or are not used.
     pub v: Vec<f64>,
 }
 
@@ -376,7 +376,7 @@ const ALIKE: usize = 200;
 /// Sizes with which accelerations are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Weighting<'a> {
-    /// Part of the usual size below which accelerations count alike,
+    /// Part of the typical size below which accelerations count equally,
     /// [`Data::acceleration_weighting`](crate::configuration::Data::acceleration_weighting).
     pub floor: f64,
     /// Scales of the coordinates.
@@ -392,7 +392,7 @@ impl Weighting<'_> {
         values.chunks_exact(self.scale.len()).map(move |a| size(a) / self.scale.len() as f64)
     }
 
-    /// Mean size of every state's acceleration, and the same with its error.
+    /// Mean size of every state's acceleration, without and with its error.
     fn of<S: Scalar>(&self, set: &Dataset<S>) -> (Vec<f64>, Vec<f64>) {
         let sizes: Vec<f64> = self.sizes(set.a()).collect();
         let mut uncertain = sizes.clone();
@@ -400,7 +400,7 @@ impl Weighting<'_> {
         (sizes, uncertain)
     }
 
-    /// The states with the weights `f m/(f m + |a| + e)`, `m` the mean of `|a|` and `e` the error; as they are for `f = 0`.
+    /// The states with the weights `f m/(f m + |a| + e)`, `m` the mean of `|a|` and `e` the error; unchanged for `f = 0`.
     pub fn relative<S: Scalar>(&self, set: Dataset<S>) -> Result<Dataset<S>, DatasetError> {
         if self.floor == 0.0 {
             return Ok(set);
@@ -412,8 +412,8 @@ impl Weighting<'_> {
         set.with_weights(uncertain.into_iter().map(weight).collect())
     }
 
-    /// The states with the weights `1/(|a| + f m + e)`, `m` the median of `|a|` among [`ALIKE`] states about as far from the centre of
-    /// these coordinates; as they are for `f = 0`.
+    /// The states with the weights `1/(|a| + f m + e)`, `m` the median of `|a|` among [`ALIKE`] states at about the same distance from the
+    /// centre of these coordinates; unchanged for `f = 0`.
     pub fn by_distance<S: Scalar>(&self, set: Dataset<S>, around: &[usize]) -> Result<Dataset<S>, DatasetError> {
         if self.floor == 0.0 {
             return Ok(set);
@@ -428,7 +428,7 @@ impl Weighting<'_> {
             let mut alike: Vec<f64> = group.iter().map(|&k| sizes[k]).collect();
             alike.sort_by(f64::total_cmp);
             let floor = self.floor * alike[alike.len() / 2];
-            // Where nothing is accelerated every state counts the same.
+            // Without any acceleration every state counts the same.
             let weight = |size: f64| S::of_f64(if floor > 0.0 { (size + floor).recip() } else { 1.0 });
             group.iter().for_each(|&k| weights[k] = weight(uncertain[k]));
         }

@@ -1,11 +1,11 @@
-//! Sizes of known forces, of what they move, and of what a model may miss of them.
+//! Sizes of known forces, of the inertias that they move, and of the errors to expect from a model.
 
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::network::Sizes;
 use crate::recording::INERTIAL;
 use crate::scalar::Scalar;
 
-/// Share of the spread of a force that is added to its error besides noise: no model is more accurate.
+/// Share of the spread of a force that is added to its error besides noise: no model is more accurate than that.
 const MISSED: f64 = 0.1;
 
 /// Mean, standard deviation and root mean square of column `i` of `(states, n)` numbers.
@@ -43,8 +43,8 @@ pub(crate) fn sizes<S: Scalar>(data: &Dataset<S>, scale: &[f64]) -> Sizes {
     Sizes { velocity, potential: positive(potential), friction }
 }
 
-/// The states, learned from by residuals of force over the errors that are to be expected: the noise of the forces, that of the
-/// accelerations, which the inertia makes a force of, both `(n)` in physical units, and a part of the spread of the force.
+/// The states with residuals of force over the expected errors: the noise of the forces, the noise of the accelerations times the inertia,
+/// both `(n)` in physical units, and a part of the spread of the force.
 ///
 /// # Errors
 /// As [`Dataset::with_force_residuals`].
@@ -66,7 +66,7 @@ pub(crate) fn by_forces<S: Scalar>(
 mod tests {
     use super::*;
 
-    /// Forces of 4 kg and 1 kg, the second beside a constant weight.
+    /// Forces on 4 kg and 1 kg, the second together with a constant weight.
     fn driven() -> Dataset<f64> {
         let wave = |k: usize, phase: f64| (std::f64::consts::TAU * k as f64 / 40.0 + phase).sin();
         let rows = || (0..400).map(|k| [wave(k, 0.0), wave(k, 1.0)]);
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_forces_and_of_what_they_move() {
         let found = sizes(&driven(), &[1.0, 2.0]);
-        // Squares of the factors are inertias in scaled coordinates, the half of those that would need all of the force.
+        // Squares of the factors are inertias in scaled coordinates, half of those that would need all of the force.
         let inertia: Vec<f64> = found.velocity.iter().map(|v| v * v).collect();
         assert!((inertia[0] - 2.0).abs() < 1e-9 && (inertia[1] - 2.0).abs() < 1e-9, "{inertia:?}");
         assert!((found.potential / 60.0 - 1.0).abs() < 1e-3, "{}", found.potential);
@@ -96,7 +96,7 @@ mod tests {
         let spread = force_spreads(&data);
         let quiet = scale([0.0; 2], [0.0; 2]);
         assert!((quiet[0] / spread[0] - 0.1).abs() < 1e-12 && (quiet[1] / spread[1] - 0.1).abs() < 1e-12);
-        // Noise of a force is one of a residual, that of an acceleration by the inertia.
+        // Noise of a force enters the residual directly, noise of an acceleration through the inertia.
         assert!((scale([30.0, 0.0], [0.0; 2])[0] / 30.0 - 1.0).abs() < 1e-3);
         assert!((scale([0.0; 2], [0.0, 100.0])[1] / 50.0 - 1.0).abs() < 1e-3);
         let still = Dataset::new(1, vec![1.0; 3], vec![1.0; 3], vec![1.0; 3]).unwrap();

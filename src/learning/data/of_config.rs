@@ -1,4 +1,4 @@
-//! System, penalty, shape of the network and header of the model file that a configuration asks for.
+//! System, penalty, network shape and model file header for a configuration.
 
 use crate::configuration::{Config, ConfigError, Penalty, Precision};
 use crate::data::sampling::SamplingError;
@@ -18,7 +18,7 @@ impl Config {
         Ok(configure_values(self.system_entry()?, &self.parameters)?)
     }
 
-    /// The system: the catalogue's entry, or the one of its description.
+    /// The system: the catalogue entry, or the system of its description.
     ///
     /// # Errors
     /// Unknown system, or a description that is wrong or of another name.

@@ -45,7 +45,7 @@ impl Default for PrepareOptions {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingSplitError {
-    /// Too little to hold anything out.
+    /// Too little data to hold anything out.
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),
     /// No derivatives.
@@ -69,7 +69,7 @@ pub enum RecordingSplitError {
     },
 }
 
-/// A sample that is learned from.
+/// A sample that is used for learning.
 struct Row<'a> {
     track: &'a RecordedTrajectory,
     states: &'a Smoothed,
@@ -115,7 +115,7 @@ impl Split {
         })
     }
 
-    /// Samples that are not learned from: those at the ends of trajectories, and those near gaps, without full windows.
+    /// Numbers of samples that are not used for learning: at the ends of trajectories and near gaps, without full windows.
     pub(crate) fn left_out(&self, targets: Targets) -> [usize; 2] {
         let derived = self.recording.tracks.iter().zip(&self.states).filter(|(track, _)| !is_complete(track, targets));
         derived.fold([0; 2], |[ends, gaps], (track, states)| {
@@ -178,8 +178,8 @@ pub struct RecordingSplit {
 }
 
 impl RecordingSplit {
-    /// Chooses windows, takes derivatives and divides the trajectories. Where nothing is left to choose the best epoch,
-    /// what judges does that too.
+    /// Chooses windows, takes derivatives and divides the trajectories. If no part is left for validation, the test part also chooses the
+    /// best epoch.
     ///
     /// # Errors
     /// [`RecordingSplitError`].
@@ -263,8 +263,8 @@ impl RecordingSplit {
         Ok(Datasets { training, validation: of("validation states", validation)?, test: of("test states", test)? })
     }
 
-    /// The smoothed accelerations of the training states by polynomials of two more degrees: less bias, more noise. `None` where
-    /// the windows are too short for them.
+    /// The accelerations of the training states, smoothed by polynomials two degrees higher: less bias, more noise. `None` if the windows
+    /// are too short for them.
     pub(crate) fn finer_accelerations(&self) -> Option<Vec<f64>> {
         let mut finer = self.smoothing.clone();
         finer.degree += 2;

@@ -15,9 +15,9 @@ use thiserror::Error;
 
 /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
 ///
-/// A system with a mass shell is put on it: the velocity of its time-like coordinate follows from the other numbers, its
-/// bounds mean nothing. A state of a system under constraints is brought to them by the shortest way, wherever that leads. States
-/// outside the system's domain, or with an acceleration that is not finite, are drawn again.
+/// States of a system with a mass shell are put on it: the velocity of the time-like coordinate follows from the other numbers, and its
+/// bounds are ignored. States of a system under constraints are projected onto them, even out of the box. States outside the system's
+/// domain, or with an acceleration that is not finite, are drawn again.
 ///
 /// # Errors
 /// [`SamplingError::Domain`] if more than nine in ten draws are refused.
@@ -65,7 +65,7 @@ const SLOWEST: f64 = 0.03;
 /// Slows a `fraction` of geodesic states down and reverses half of them: `v -> u v`, `a -> u^2 a`, `|u|` between
 /// [`SLOWEST`] and 1, uniform in its logarithm.
 ///
-/// Their residuals weigh `1 / u^2`: an error of the connection counts at every speed alike.
+/// Their residuals have the weight `1 / u^2`, so that an error of the connection counts the same at every speed.
 fn rescale_geodesics(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
     let mut weights = Vec::with_capacity(set.len());
     for k in 0..set.len() {
@@ -92,7 +92,7 @@ pub fn sample_all<S: Scalar>(
     sample_all_until(config, system, &AtomicBool::new(false))
 }
 
-/// The same, ended by a flag.
+/// As [`sample_all`], unless a flag ends it.
 ///
 /// # Errors
 /// [`SamplingError`].
@@ -179,7 +179,7 @@ pub enum SamplingError {
     Dataset(#[from] DatasetError),
 }
 
-/// States of a system as they are drawn, with their exact accelerations.
+/// States of a system with their exact accelerations, as they are drawn.
 pub(crate) struct Drawn<'a> {
     system: &'a SystemInstance<f64>,
     /// The model of a system under constraints or forces.
@@ -189,12 +189,12 @@ pub(crate) struct Drawn<'a> {
     a: Vec<f64>,
 }
 
-/// Where a state is not finite, or cannot be brought.
+/// Condition that fails where a state is not finite or cannot be projected.
 const FINITE: &str = "a finite acceleration";
 const CONSTRAINTS: &str = "some constraint";
 
 impl<'a> Drawn<'a> {
-    /// None yet.
+    /// Starts without states.
     ///
     /// # Errors
     /// [`SamplingError::System`] for constraints that contradict each other or leave no motion, and for forces that depend on the time.
@@ -205,7 +205,7 @@ impl<'a> Drawn<'a> {
         Ok(Self { system, model, q: Vec::new(), v: Vec::new(), a: Vec::new() })
     }
 
-    /// Goes on unless a flag was raised.
+    /// Continues unless a flag was raised.
     ///
     /// # Errors
     /// [`SamplingError::Interrupted`].
@@ -213,14 +213,14 @@ impl<'a> Drawn<'a> {
         if interrupt.load(Ordering::Relaxed) { Err(SamplingError::Interrupted) } else { Ok(()) }
     }
 
-    /// Brings a state to the mass shell of the system, or the shortest way to its constraints; what is demanded where there is no way.
+    /// Puts a state on the mass shell of the system, or projects it onto its constraints; returns the unmet condition if that fails.
     pub fn impose(&self, q: &mut [f64], v: &mut [f64]) -> Result<Option<&'static str>, SamplingError> {
         self.system.impose_constraint(q, v)?;
         let manifold = self.model.as_ref().and_then(|model| model.manifold());
         Ok(manifold.and_then(|manifold| project(manifold, q, v).err()).map(|_| CONSTRAINTS))
     }
 
-    /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
+    /// Accepts a state; returns the unmet condition if it lies outside the system's domain or has no finite acceleration.
     pub fn take(&mut self, q: &[f64], v: &[f64]) -> Result<Option<&'static str>, SamplingError> {
         let a = match &self.model {
             Some(model) => model.acceleration(q, v).unwrap_or_default(),
@@ -282,7 +282,7 @@ pub(crate) fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
     bounds.iter().map(|&(low, high)| [low, high]).collect()
 }
 
-/// States that a motion of full length gives on average.
+/// Average number of states that a motion of full length contributes.
 const PER_MOTION: f64 = 10.0;
 
 /// Draws `states` states of exact motions from the starts of the system's trajectory test, every sample up to its end with
@@ -336,7 +336,7 @@ fn along_motions<'a>(
             }
             let (mut q, mut v) = (q.to_vec(), v.to_vec());
             if turn_back(&mut q, &coordinates, position, rng) {
-                // Integration left the mass shell by its tolerance.
+                // Integration left the mass shell by up to its tolerance.
                 if drawn.impose(&mut q, &mut v)?.is_none() {
                     drawn.take(&q, &v)?;
                 }

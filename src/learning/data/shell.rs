@@ -1,4 +1,4 @@
-//! Time-like states in a shell around a centre, and weights by which near and far count alike.
+//! Time-like states in a shell around a centre, and weights that make near and far states count equally.
 
 use crate::configuration::{ConfigError, Shell};
 use crate::data::dataset::{Dataset, Weighting};
@@ -88,8 +88,8 @@ fn moving(metric: &dyn EulerLagrange<f64>, time: usize, q: &[f64], rapidity: f64
     v.iter().all(|v| v.is_finite()).then_some(v)
 }
 
-/// The vector of length 1 in a positive definite metric `h` whose components in an orthonormal frame are `ahead`: `L^T e = ahead`,
-/// `h = L L^T`. `None` of a metric that is not positive definite.
+/// The vector of length 1 in a positive definite metric `h` whose components in an orthonormal frame are `ahead`: `L^T e = ahead`, `h = L
+/// L^T`. `None` if the metric is not positive definite.
 fn within(h: &[Vec<f64>], ahead: &[f64]) -> Option<Vec<f64>> {
     let n = h.len();
     let mut lower = vec![vec![0.0; n]; n];
@@ -110,7 +110,7 @@ fn within(h: &[Vec<f64>], ahead: &[f64]) -> Option<Vec<f64>> {
     Some(e)
 }
 
-/// The states with weights by which near and far count alike, see [`Weighting::by_distance`].
+/// The states with weights that make near and far states count equally, see [`Weighting::by_distance`].
 pub(crate) fn weigh_by_distance(
     set: Dataset<f64>,
     system: &SystemInstance<f64>,
@@ -160,7 +160,7 @@ mod tests {
                 let cosh = set.v()[4 * k] / (-up[0]).sqrt();
                 assert!(cosh >= 1.0 - 1e-9 && cosh <= shell.rapidity.cosh() + 1e-9, "{name}: {cosh}");
             }
-            // A relative error of the typical acceleration counts the same at every distance.
+            // A relative error of the typical acceleration counts equally at every distance.
             let size = |k: usize| set.a()[4 * k..][..4].iter().map(|a| a.abs()).sum::<f64>() / 4.0;
             let (mut inner, mut outer) = ((0.0, 0), (0.0, 0));
             for (k, q) in set.q().chunks(4).enumerate() {

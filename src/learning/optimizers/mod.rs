@@ -60,8 +60,8 @@ macro_rules! methods {
 }
 
 methods! {
-    /// RAdam in the eigenbases of Shampoo's preconditioner (Vyas et al. 2024): fewer steps to the same loss, each of them
-    /// dearer by four products of the size of each weight matrix and two squares of it.
+    /// RAdam in the eigenbases of Shampoo's preconditioner (Vyas et al. 2024): fewer steps to the same loss, but each step costs four more
+    /// products of the size of each weight matrix and two squares of it.
     Soap "soap" "SOAP" Traits { decay: [0.95, 0.99], rectified: true, eigenbases: true, ..ADAM };
     /// RAdam (Liu et al. 2020): no second moment until its variance is tractable, then rectified.
     Radam "radam" "RAdam" Traits { rectified: true, ..ADAM };
@@ -95,8 +95,8 @@ fn blocks(method: Method, matrices: impl IntoIterator<Item = (usize, usize, usiz
     matrices.into_iter().map(|(start, rows, cols)| Block { start, rows, cols }).collect()
 }
 
-/// Numbers that [`Moments::for_method`] keeps beside two for each parameter: what a checkpoint holds of them, and all;
-/// `None` if they cannot be counted.
+/// How many numbers [`Moments::for_method`] keeps in addition to two for each parameter: those in a checkpoint, and all; `None` if they
+/// cannot be counted.
 pub(crate) fn eigenbasis_numbers(
     method: Method,
     matrices: impl IntoIterator<Item = (usize, usize, usize)>,
@@ -140,7 +140,7 @@ impl<S: Scalar> Moments<S> {
         Self { bases: blocks.into_iter().map(Eigenbasis::new).collect(), ..Self::new(parameters) }
     }
 
-    /// `true` if these are moments of so many parameters, with all the numbers of their eigenbases.
+    /// `true` if these moments belong to this many parameters and have all numbers of their eigenbases.
     pub(crate) fn fit(&self, parameters: usize) -> bool {
         let blocks: Vec<Block> = self.bases.iter().map(Eigenbasis::block).collect();
         [&self.first, &self.second].iter().all(|moments| moments.len() == parameters)
@@ -148,7 +148,7 @@ impl<S: Scalar> Moments<S> {
             && self.bases.iter().all(Eigenbasis::is_whole)
     }
 
-    /// Updates `weights` in place and uses `gradient` up; returns its norm before clipping.
+    /// Updates `weights` in place and overwrites `gradient`; returns its norm before clipping.
     ///
     /// A gradient that is not finite changes nothing; its norm, infinite or `NaN`, is returned. All work is done on the
     /// caller's thread.
@@ -292,7 +292,7 @@ struct Part<'a, S> {
 }
 
 impl<S: Scalar> Part<'_, S> {
-    /// The parameters before number `at`, and those from there on.
+    /// The moments of the parameters before number `at`, and of those from there on.
     pub fn split(self, at: usize) -> (Self, Self) {
         let k = at - self.start;
         let (weights, gradient) = (self.weights.split_at_mut(k), self.gradient.split_at_mut(k));
@@ -395,7 +395,7 @@ mod tests {
         assert!((weights[0] - (1.0 - 0.6 - 0.5)).abs() < 1e-12 && (weights[1] - (1.0 - 0.8 - 0.5)).abs() < 1e-12);
     }
 
-    /// Beside a decay through the gradient, which the second moment divides out, AdamW's shrinks every weight alike.
+    /// A decay through the gradient is divided by the second moment; AdamW shrinks every weight by the same factor instead.
     #[test]
     fn a_decoupled_decay_does_not_depend_on_the_gradient() {
         let update = Update { weight_decay: 0.5, decaying: 2, ..plain(Method::AdamW, 0.1) };

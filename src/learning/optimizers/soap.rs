@@ -58,14 +58,14 @@ impl Block {
 #[serde(bound = "S: Scalar")]
 pub(crate) struct Eigenbasis<S> {
     block: Block,
-    /// Of the rows, and of the columns.
+    /// Sides for the rows and for the columns.
     sides: [Side<S>; 2],
     /// Half of the way of a turn; empty after it was read, until the first.
     #[serde(skip)]
     half: Vec<S>,
 }
 
-/// Equal in what a step leaves behind.
+/// Compares only the state that a step leaves behind.
 impl<S: PartialEq> PartialEq for Eigenbasis<S> {
     fn eq(&self, other: &Self) -> bool {
         (self.block, &self.sides) == (other.block, &other.sides)
@@ -106,7 +106,7 @@ impl<S: Scalar> Eigenbasis<S> {
     }
 }
 
-/// By which matrices to turn.
+/// Which matrices to rotate by.
 #[derive(Clone, Copy)]
 enum Choice {
     Vectors,
@@ -213,7 +213,7 @@ pub(super) struct Side<S> {
     pub turn: Vec<S>,
 }
 
-/// Equal in what a step leaves behind.
+/// Compares only the state that a step leaves behind.
 impl<S: PartialEq> PartialEq for Side<S> {
     fn eq(&self, other: &Self) -> bool {
         (&self.covariance, &self.vectors) == (&other.covariance, &other.vectors)
@@ -235,7 +235,7 @@ impl<S: Scalar> Side<S> {
         MatRef::new(data, self.size, self.size)
     }
 
-    /// Adds `g g^T` to the running mean; the first one gives the first eigenvectors.
+    /// Adds `g g^T` to the running mean; the first one also gives the first eigenvectors.
     pub fn observe(&mut self, g: MatRef<'_, S>, first: bool) {
         if self.size == 0 {
             return;
@@ -488,8 +488,8 @@ mod tests {
         assert!(!moments.fit(12));
     }
 
-    /// Least squares `|A W B - C|^2 / 2` with singular values from 1 to 1e-3 on both sides, in directions that are not the
-    /// axes: what Adam, which knows axes alone, is slow at.
+    /// Least squares `|A W B - C|^2 / 2` with singular values from 1 to 1e-3 on both sides, in directions that are not the axes: slow for
+    /// Adam, which only scales along the axes.
     #[test]
     fn a_valley_across_the_axes_is_descended_faster_than_by_adam() {
         const N: usize = 8;
@@ -553,7 +553,7 @@ mod tests {
             mean.iter_mut().for_each(|c| *c *= keep);
             gemm(MatMut::new(&mut mean, size, size), true, 1.0 - keep, g, g.t());
         }
-        // What lies beyond the diagonal is not made at every step.
+        // The triangle above the diagonal is not updated at every step.
         assert_ne!(side.covariance[size - 1], side.covariance[(size - 1) * size]);
         side.complete();
         assert!(side.covariance.iter().zip(&mean).all(|(a, b)| (a - b).abs() < 1e-14));

@@ -12,8 +12,8 @@ const STEPS: usize = 30_000;
 
 /// Steps of a training from known forces.
 const STEPS_BY_FORCES: usize = 10_000;
-/// Widths of the layers of a training from known forces, and its weight decay, by the rate times it: such recordings are few states
-/// of many coordinates, and what is learned of them has to be smooth.
+/// Widths of the layers for a training from known forces, and its decoupled weight decay: such recordings have few states of many
+/// coordinates, so the learned functions have to be smooth.
 const BY_FORCES: ([usize; 3], f64) = ([64; 3], 0.3);
 
 /// Changes the structure of a configuration that suits recorded motion: a black box in place of another one has its usual penalty.

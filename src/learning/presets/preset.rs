@@ -48,7 +48,7 @@ impl Preset {
     }
 }
 
-/// Gives a configuration of ours a structure with the rate, weight decay and clip that suit it; `rate` overrides the first.
+/// Gives one of our configurations a structure, with the rate, weight decay and clip that suit it; `rate` overrides the first.
 pub(crate) fn take_structure(config: &mut Config, structure: Structure, rate: Option<f64>) {
     config.take_structure(structure);
     if structure == Structure::BlackBox {
@@ -65,9 +65,8 @@ pub(crate) fn take_structure(config: &mut Config, structure: Structure, rate: Op
 }
 
 impl Config {
-    /// Changes the structure. But for a black box the signature holds by construction, and motion on a mass shell tells the
-    /// whole metric: there is no penalty, no state off the shell and no `alpha` to be learned. Without a time the factor is a
-    /// rectangle.
+    /// Changes the structure. Except for a black box, the signature holds by construction, and motion on a mass shell determines the whole
+    /// metric: no penalty, no state off the shell and no learned `alpha` are needed. Without a time the factor is a rectangle.
     pub fn take_structure(&mut self, structure: Structure) {
         self.network.structure = structure;
         let free = structure != Structure::BlackBox && self.network.time_like.is_none();
@@ -125,11 +124,11 @@ const TRIANGLE_RATE: f64 = 1e-2;
 /// Largest norm of a structure's gradient: above those of ordinary steps.
 const STRUCTURE_CLIP: f64 = 10.0;
 
-/// Weight decay where accelerations may have any size: it stands beside the loss, and the weights of geodesics by a clock, whose scaled
+/// Weight decay where accelerations may have any size: it adds to the loss, and the weights of geodesics by a clock, whose scaled
 /// accelerations are a thousandth, followed the decay alone.
 const ANY_SIZE: f64 = 0.0;
 
-/// Choices in which the presets of our own differ.
+/// Choices in which our own presets differ.
 #[derive(Clone, Copy)]
 struct Size {
     width: usize,
@@ -156,7 +155,7 @@ fn phase(epochs: usize) -> Phase {
 fn training_states(system: &SystemInstance<f64>) -> (Bounds, StateAdvice) {
     let n = system.coordinates;
     let mut bounds: Bounds = system.system.training(n);
-    // Embedded angles repeat: they are sampled over one turn, but for a described system, whose file says its bounds.
+    // Embedded angles repeat, so they are sampled over one turn, except for a described system, whose file states its bounds.
     let whole = system.system.described.is_none();
     for (bound, coordinate) in bounds.positions.iter_mut().zip(system.system.coordinates(n)) {
         if coordinate.periodic && whole {
@@ -198,8 +197,8 @@ fn off_shell(system: &SystemInstance<f64>) -> f64 {
     if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 }
 }
 
-/// Batch and epochs of the presets of our own around a centre, over those elsewhere: more epochs of larger batches cost no more
-/// time and end lower.
+/// Batch and epochs of our own presets around a centre, relative to those elsewhere: more epochs of larger batches take no longer and reach
+/// a lower loss.
 const SHELL_BATCH: usize = 4;
 const SHELL_EPOCHS: usize = 3;
 

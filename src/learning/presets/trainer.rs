@@ -140,7 +140,7 @@ impl<'a> Trainer<'a> {
         Self { constraints, ..self }
     }
 
-    /// Builds the signature of the mass matrix in; the penalty of a black box goes.
+    /// Builds the signature of the mass matrix in, which replaces the penalty of a black box.
     pub fn structure(mut self, structure: Structure) -> Self {
         take_structure(&mut self.config, structure, None);
         self
@@ -197,7 +197,7 @@ impl<'a> Trainer<'a> {
         self.train_watched(&Hooks::default())
     }
 
-    /// Trains as [`Self::train`] does, under hooks: a flag of theirs that is raised ends the training with the best weights so far.
+    /// Trains as [`Self::train`] does, with hooks: if their flag is raised, the training ends with the best weights so far.
     ///
     /// # Errors
     /// [`TrainerError`].
@@ -267,7 +267,7 @@ impl<'a> Trainer<'a> {
 }
 
 impl Learned {
-    /// The motion that was learned: that of the model under the constraints that it was learned under, if there are any.
+    /// The learned motion: that of the model, under its constraints if it has any.
     ///
     /// # Errors
     /// None of a model that was just learned.

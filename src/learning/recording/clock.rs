@@ -11,7 +11,7 @@ const REACH: f64 = 10.5;
 /// Steps of increasing times, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
-    /// Usual step: of equal steps their median, of uneven ones the mean of those that are not gaps.
+    /// Typical step: the median of equal steps; for uneven ones, the mean of those that are not gaps.
     pub step: f64,
     /// Standard deviation of the steps that are not gaps; of equal ones a robust one, which is rounding.
     pub spread: f64,
@@ -24,8 +24,8 @@ pub struct Clock {
 impl Clock {
     /// Looks at the steps of a trajectory.
     ///
-    /// A gap is a step longer than one and a half usual ones. Where sampling is uneven, it is longer than the median and six robust standard
-    /// deviations, and than one and a half times what nine steps of ten stay below.
+    /// A gap is a step longer than one and a half typical ones. Where sampling is uneven, it is longer than the median plus six robust
+    /// standard deviations, and than one and a half times the 90 % quantile.
     pub fn of(times: &[f64]) -> Self {
         let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
         let stride = (times.len() / MOST).max(1);
@@ -94,8 +94,8 @@ impl Clock {
         [times[at] - times[0] >= half, times[times.len() - 1] - times[at] >= half]
     }
 
-    /// Samples of a window of `window` usual steps around sample `at`, moved inwards at the ends; of uneven steps those in as many
-    /// seconds, and the `least` nearest where a gap leaves fewer.
+    /// Samples of a window of `window` typical steps around sample `at`, moved inwards at the ends; for uneven steps, those in the same
+    /// number of seconds, and the `least` nearest where a gap leaves fewer.
     pub fn window(&self, times: &[f64], at: usize, window: usize, least: usize) -> Range<usize> {
         let length = times.len();
         if self.even {
@@ -127,7 +127,7 @@ fn is_even(times: &[f64]) -> bool {
 mod tests {
     use super::*;
 
-    /// Times `k / 100` of the frames for which `kept` says so.
+    /// Times `k / 100` of the frames that `kept` accepts.
     fn frames(count: usize, kept: impl Fn(usize) -> bool) -> Vec<f64> {
         (0..count).filter(|k| kept(*k)).map(|k| 0.01 * k as f64).collect()
     }

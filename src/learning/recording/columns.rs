@@ -6,7 +6,7 @@ use crate::recording::heading::is_same;
 use crate::recording::units::factor;
 use thiserror::Error;
 
-/// Which columns hold what. A column is its name in the header, with or without the unit in brackets behind it, or its number from 1.
+/// The meaning of the columns. A column is given by its name in the header, with or without its unit in brackets, or by its number from 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Coordinates, at least one.
@@ -15,8 +15,8 @@ pub struct Columns {
     pub velocity: Vec<String>,
     /// Measured accelerations, one per coordinate; empty if there are none.
     pub acceleration: Vec<String>,
-    /// Known external generalized forces, one per coordinate; empty if there are none. Behind an equals sign stands a formula of the time `t`
-    /// and of other columns, such as `=0.3*cos(1.2*t)`.
+    /// Known external generalized forces, one per coordinate; empty if there are none. A force may also be a formula, after an equals sign,
+    /// of the time `t` and of other columns, such as `=0.3*cos(1.2*t)`.
     pub force: Vec<String>,
     /// Standard deviations of the positions, sample by sample, one per coordinate and in its unit; empty if there are none.
     pub error: Vec<String>,
@@ -30,15 +30,15 @@ pub struct Columns {
     pub trajectory: Option<String>,
     /// Coordinates that are angles, in rad after conversion.
     pub periodic: Vec<String>,
-    /// Column and its unit, such as `deg` or `mm`, or its factor to SI; a unit that is given here counts more than one in the header.
+    /// Column and its unit, such as `deg` or `mm`, or its factor to SI; it overrides a unit in the header.
     pub units: Vec<(String, String)>,
     /// Names of all columns of files without a header, by position.
     pub names: Option<Vec<String>>,
     /// Whether trajectories are side by side, those of coordinates `s` and `theta` in `s1`, `theta1`, `s2`, `theta2`. They share a column
     /// of time unless there are `t1`, `t2`; of shorter ones the last fields are empty.
     pub wide: bool,
-    /// Whether trajectories stay whole, for those who follow them by equations of motion: no gap cuts one, none is too short, and rows at the
-    /// same time are repeated measurements of one state.
+    /// Whether trajectories stay whole, for programs that follow them by equations of motion: no gap cuts one, none is too short, and rows
+    /// at the same time are repeated measurements of one state.
     pub whole: bool,
 }
 
@@ -50,7 +50,7 @@ pub struct ColumnsError(pub Vec<String>);
 /// Name of the time in formulas of forces, whatever its column is called.
 pub const TIME: &str = "t";
 
-/// The formula of a force that is one instead of a column.
+/// The formula, if a force is given by one instead of a column.
 pub fn formula_in(text: &str) -> Option<&str> {
     text.strip_prefix('=')
 }
@@ -80,9 +80,9 @@ impl Columns {
     /// Checks what can be checked without the data.
     ///
     /// # Errors
-    /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations, forces or errors than of coordinates, a
-    /// column used twice, an angle that is not a coordinate, an unknown unit, a unit of a column that is not used, time and
-    /// rate both given, a rate that is not positive, a column of trajectories that are side by side; all of it at once.
+    /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations, forces or errors than of coordinates, a column used
+    /// twice, an angle that is not a coordinate, an unknown unit, a unit of a column that is not used, time and rate both given, a rate
+    /// that is not positive, a trajectory column for trajectories side by side. All faults are reported at once.
     pub(crate) fn validate(&self) -> Result<(), ColumnsError> {
         let mut wrong = Vec::new();
         if self.coords.is_empty() {
@@ -130,7 +130,7 @@ impl Columns {
         if wrong.is_empty() { Ok(()) } else { Err(ColumnsError(wrong)) }
     }
 
-    /// Checks that there are as many of everything as coordinates.
+    /// Checks that the number of each kind of column matches the coordinates.
     ///
     /// # Errors
     /// [`ColumnsError`]: another number of velocities, accelerations, forces or errors.

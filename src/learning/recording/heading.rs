@@ -33,7 +33,7 @@ pub(crate) fn is_same(a: &str, b: &str) -> bool {
     a == b || parts(a).0 == b || a == parts(b).0
 }
 
-/// The name of a column with `_` for blanks; none of a text with a unit.
+/// The name of a column with `_` for blanks; none if the text has a unit.
 pub(crate) fn plain(text: &str) -> Option<String> {
     let (name, unit) = parts(text);
     unit.is_none().then_some(name)

@@ -8,16 +8,16 @@ use super::{Recording, quantile};
 /// Repetitions in a row at and above which a motion may rest, and at most.
 const MANY: usize = 4;
 const MOST_HELD: usize = 12;
-/// Change after many repetitions over that of a motion that continues as it did before.
+/// Largest change after many repetitions, over that of a continuing motion, at which the motion rests.
 const GOES_ON: f64 = 0.5;
-/// Change of a reading over the smallest one of its sensor at and above which a reading between does not stay the same.
+/// Change of a reading, in units of the smallest change of its sensor, at and above which a reading in between cannot repeat.
 const MOVING: f64 = 3.0;
-/// The usual change over the smallest one at and above which readings are hardly ever the same by chance, and the share of repetitions from which
-/// on it was not chance.
+/// Typical change, in units of the smallest one, at and above which readings hardly ever repeat by chance, and the share of repetitions
+/// that is too large for chance.
 const FINE: f64 = 20.0;
 const OFTEN: f64 = 0.01;
-/// Marks up to which changes are examined, how far a whole number of them may be off, so many changes at least, and the share that is whole: others
-/// are readings that were filled in.
+/// Largest change that is examined, in marks; its largest distance from a whole number; smallest number of such changes; and share of whole
+/// ones: the others are readings that were filled in.
 const FEW_MARKS: f64 = 8.0;
 const WHOLE: f64 = 0.05;
 const ENOUGH: usize = 20;
@@ -33,7 +33,7 @@ pub(crate) struct Filled {
 }
 
 impl Filled {
-    /// The same with readings that are missing, which `recording` has filled in.
+    /// Adds missing readings, which `recording` has filled in.
     pub fn without(this: Option<Self>, recording: &Recording, missing: &[Vec<bool>]) -> Option<Self> {
         if !missing.iter().flatten().any(|missing| *missing) {
             return this;
@@ -53,7 +53,7 @@ impl Filled {
     }
 }
 
-/// Fills in held readings; `None` if there are none. Trajectories that measure a state more than once hold what they measured.
+/// Fills in held readings; `None` if there are none. Trajectories with repeated measurements of a state keep their readings.
 pub(crate) fn filled(recording: &Recording) -> Option<Filled> {
     let n = recording.n();
     let mut filled = recording.clone();
@@ -174,7 +174,7 @@ mod tests {
         let repeated = held.windows(2).filter(|pair| pair[0] == pair[1]).count();
         assert!(found.count(0) <= repeated && repeated - found.count(0) < 5, "{repeated} {}", found.count(0));
         let worst = |values: &[f64]| {
-            // At its ends a run has no reading on either side of it.
+            // At the ends of the recording a run has readings on one side only.
             let far = exact.iter().zip(values).skip(5).take(790).filter(|(x, _)| x.abs() < 0.9);
             far.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
         };

@@ -48,11 +48,13 @@ pub enum HoldOutError {
 }
 
 impl HeldOut {
-    /// Chooses what is held out: takes in random order until they hold `fraction` of all samples, none that would
-    /// make it more than twice as many, one at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
-    /// smoothing reaches from one side to the other, and with `least` samples on both sides. Of a share of 0 nothing.
+    /// Chooses what to hold out: takes in random order until they contain `fraction` of all samples, skipping takes that would make it more
+    /// than twice as many, at least one and not all. Of a single trajectory it holds out the last part, after a gap of `gap` samples, so
+    /// that no smoothing window crosses from one side to the other, with at least `least` samples on both sides. A share of 0 holds nothing
+    /// out.
     ///
-    /// `takes` has the number of the take of every trajectory; those of one are held out together, unless there is no other take.
+    /// `takes` has the number of the take of every trajectory; trajectories of one take are held out together, unless there is no other
+    /// take.
     ///
     /// # Errors
     /// [`HoldOutError`].
@@ -168,7 +170,7 @@ pub fn hold_out(
     Ok(HeldOut::choose(recording, &takes, fraction, (gap, 2), seed)?.divide(recording))
 }
 
-/// The same coordinates without trajectories.
+/// A recording with the same coordinates and no trajectories.
 fn bare(recording: &Recording) -> Recording {
     let (coordinates, periodic) = (recording.coordinates.clone(), recording.periodic.clone());
     Recording { coordinates, periodic, tracks: Vec::new() }
@@ -235,7 +237,7 @@ mod tests {
             };
             assert!([&[0, 1][..], &[2, 3], &[4], &[5], &[4, 5]].contains(&held.as_slice()), "{held:?}");
         }
-        // Of a single take some of its parts are.
+        // If there is a single take, some of its parts are held out.
         let held = HeldOut::choose(&all, &[7; 6], 0.2, (5, 2), 0).unwrap();
         assert!(matches!(held, HeldOut::Tracks(held) if !held.is_empty() && held.len() < 6));
     }

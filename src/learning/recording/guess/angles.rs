@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 /// Largest deviation of a jump from a full turn, as a share of it: the motion of one step.
 const NEAR: f64 = 0.25;
-/// Share of a turn by which the range may exceed it, by noise.
+/// Share of a turn by which noise may take the range beyond it.
 const BEYOND: f64 = 1.05;
 
 /// An angle.

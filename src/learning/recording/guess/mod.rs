@@ -1,4 +1,4 @@
-//! A guess of what the columns of recorded motion are: time, trajectories, coordinates, angles, velocities, accelerations and forces.
+//! A guess at the meaning of the columns of recorded motion: time, trajectories, coordinates, angles, velocities, accelerations and forces.
 //!
 //! Names decide first, then the numbers: a time increases, a velocity is the derivative of a position, an angle jumps by a turn.
 
@@ -12,7 +12,7 @@ use crate::recording::{Columns, ColumnsError, DataError, LoadedRecording, read_r
 use serde::Serialize;
 use std::path::Path;
 
-/// What a column is taken as.
+/// The guessed meaning of a column.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ColumnGuess {
     /// Its name, `c` and its number in a file without a header.
@@ -23,10 +23,10 @@ pub struct ColumnGuess {
     pub because: String,
 }
 
-/// What the columns of a file are taken as.
+/// The guessed meaning of the columns of a file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Guess {
-    /// The meaning of the columns, as it is read; numbers that are left out are inputs.
+    /// The columns as they will be read; columns of numbers without another role are inputs.
     #[serde(skip)]
     pub columns: Columns,
     /// One entry for every column, in the order of the file.
@@ -34,10 +34,10 @@ pub struct Guess {
 }
 
 impl Guess {
-    /// Reads files as they are guessed. Nobody asked for inputs: where a file lacks one, all are left out.
+    /// Reads files according to the guess. Inputs were not requested, so if a file lacks one, all are left out.
     ///
     /// # Errors
-    /// As of [`read_recording`].
+    /// Those of [`read_recording`].
     pub fn read<P: AsRef<Path>>(&mut self, files: &[P]) -> Result<LoadedRecording, DataError> {
         read_recording(files, &self.columns).or_else(|_| {
             self.columns.input.clear();
@@ -46,9 +46,9 @@ impl Guess {
     }
 }
 
-/// Guesses the meaning of the columns of the first of some files, as far as `given` does not say it.
+/// Guesses the meaning of the columns in the first of some files, where `given` does not state it.
 ///
-/// A given time, rate, trajectory, force, velocity or acceleration is kept; given angles and units are added to those that are seen.
+/// A given time, rate, trajectory, force, velocity or acceleration is kept; given angles and units are added to the guessed ones.
 ///
 /// # Errors
 /// [`DataError`] for a file that cannot be read as a table, or in which no column can be a coordinate or the time.

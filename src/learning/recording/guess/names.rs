@@ -21,7 +21,7 @@ pub fn is_time(name: &str) -> bool {
         )
 }
 
-/// A name of what distinguishes trajectories.
+/// A name of a column that distinguishes trajectories.
 pub fn is_trajectory(name: &str) -> bool {
     let words = [
         "run",
@@ -49,7 +49,7 @@ pub fn is_trajectory(name: &str) -> bool {
     is(name, &words)
 }
 
-/// A name of what counts rows.
+/// A name of a column that counts rows.
 pub fn is_index(name: &str) -> bool {
     is(name, &["frame", "sample", "index", "idx", "row", "step", "count", "bild", "nr", "no", ""])
         && name.parse::<f64>().is_err()

@@ -14,23 +14,23 @@ use std::path::Path;
 const SAMPLES: usize = 4000;
 /// Rows between the samples of a difference; of noisy positions longer ones show more.
 const REACHES: [usize; 5] = [1, 2, 4, 8, 16];
-/// Difference of correlations that counts as none.
+/// Difference of correlations that is negligible.
 const EQUAL: f64 = 1e-3;
 /// Smallest correlation with the derivative of a position, for a column whose name says velocity and for any other.
 const NAMED: f64 = 0.8;
 const UNNAMED: f64 = 0.995;
-/// Largest relative difference from that derivative, for a column that no name tells.
+/// Largest relative difference from that derivative, for a column whose name says nothing.
 const LIKE: f64 = 0.03;
 
 /// Largest range of a fixed point, over the widest range of a coordinate and over its own distance from 0.
 const FIXED: f64 = 0.03;
 const OF_DISTANCE: f64 = 0.05;
 
-/// The same beside a velocity that was found.
+/// The same limits once another velocity was found.
 const BESIDE: f64 = 0.9;
 const BESIDE_LIKE: f64 = 0.2;
 
-/// What a column is.
+/// The role of a column.
 #[derive(Clone, Debug, PartialEq)]
 enum Role {
     Time,
@@ -128,7 +128,7 @@ impl Roles<'_> {
         }
     }
 
-    /// Sets aside what is no measurement: text, constants, counters, copies.
+    /// Sets aside columns that are no measurements: text, constants, counters, copies.
     fn set_aside(&mut self) {
         for k in self.open() {
             let Ok(values) = &self.table.numbers[k] else { continue };
@@ -145,7 +145,7 @@ impl Roles<'_> {
         }
     }
 
-    /// Finds the column that distinguishes trajectories: by its name, or where a time that begins anew is in order with it.
+    /// Finds the column that distinguishes trajectories: by its name, or because the time restarts in step with it.
     fn find_trajectories(&mut self, file: &Path) {
         let named = self.of(&Role::Trajectory);
         if !named.is_empty() {
@@ -194,16 +194,16 @@ impl Roles<'_> {
     fn find_forces(&mut self) {
         if self.of(&Role::Force).is_empty() {
             let forces: Vec<usize> = self.open().into_iter().filter(|&k| is_force(&self.table.names[k])).collect();
-            // Where nothing else is left, they are coordinates.
+            // If no other columns are left, they are coordinates.
             if forces.len() < self.open().len() {
                 forces.into_iter().for_each(|k| self.set(k, Role::Force, "its name"));
             }
         }
     }
 
-    /// Finds velocities and accelerations among what is left.
+    /// Finds velocities and accelerations among the remaining columns.
     fn find_derivatives(&mut self) {
-        // Where one velocity was found the others are likely to be there, also behind more noise.
+        // Once one velocity was found, the others are probably present, possibly with more noise.
         for (order, [least, like]) in [(2, [UNNAMED, LIKE]), (1, [UNNAMED, LIKE]), (1, [BESIDE, BESIDE_LIKE])] {
             let found = |(role, _): &(Role, String)| matches!(role, Role::Derivative(1, _));
             if least == BESIDE && !self.roles.iter().flatten().any(found) {
@@ -229,7 +229,7 @@ impl Roles<'_> {
                     let alike = correlation > least && (factor - 1.0).abs() < like && !back;
                     ((named && correlation > NAMED) || alike).then_some((j, correlation))
                 };
-                // On a circle each coordinate is nearly the derivative of the other: names that belong together decide.
+                // On a circle each coordinate is nearly the derivative of the other, so matching names decide.
                 let together =
                     |j: usize| name.starts_with(&*self.table.names[j]) || name.ends_with(&*self.table.names[j]);
                 let best = sources.filter_map(of);
@@ -277,11 +277,11 @@ impl Roles<'_> {
         };
         let found: Vec<(f64, f64)> = REACHES.iter().filter_map(|&reach| compared(reach)).collect();
         let most = found.iter().map(|(correlation, _)| *correlation).fold(f64::NEG_INFINITY, f64::max);
-        // Of differences that show as much, the shortest, which are nearest to the derivative.
+        // Among equally good differences, the shortest, which is closest to the derivative.
         found.into_iter().find(|(correlation, _)| *correlation >= most - EQUAL)
     }
 
-    /// Takes what is left as coordinates; beside positions whose velocities were measured, only what a name tells.
+    /// Takes the remaining columns as coordinates; if velocities were measured, only columns named as positions.
     fn find_coordinates(&mut self) {
         let sources: Vec<usize> = self
             .roles
@@ -320,7 +320,7 @@ impl Roles<'_> {
         }
     }
 
-    /// Leaves out places that hardly move, such as the pivot in a film, unless their names say that they are positions.
+    /// Leaves out positions that hardly move, such as the pivot in a film, unless their names say that they are positions.
     fn leave_out_fixed(&mut self) {
         let extent = |k: usize| {
             let values = self.table.numbers[k].as_deref().unwrap_or_default();
@@ -348,7 +348,7 @@ impl Roles<'_> {
         }
     }
 
-    /// The angles among the coordinates, and everything as it is read.
+    /// The angles among the coordinates, and the columns as they will be read.
     fn columns(&self) -> (Vec<(usize, Angle)>, Columns) {
         let names = |places: Vec<usize>| places.into_iter().map(|k| self.table.names[k].clone()).collect::<Vec<_>>();
         let coordinates = self.of(&Role::Coordinate);

@@ -1,7 +1,7 @@
 use super::*;
 use std::fs;
 
-/// What is guessed of a text.
+/// The guess for a text.
 fn of(text: &str, given: &Columns) -> Result<Guess, DataError> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("motion.csv");
@@ -77,7 +77,7 @@ fn degrees_and_milliseconds_are_seen() {
     let turns = rows("t,phi,s", 400, |t| vec![t, (4.0 * t) % std::f64::consts::TAU, t.sin()]);
     let columns = of(&turns, &Columns::default()).unwrap().columns;
     assert_eq!((columns.periodic, columns.units), (list(&["phi"]), vec![]));
-    // What an option says is kept.
+    // An option is kept.
     let given = Columns { units: vec![("phi".into(), "turn".into())], rate: Some(50.0), ..Columns::default() };
     let columns = of(&turns.replace("t,", "extra,"), &given).unwrap().columns;
     assert_eq!((columns.rate, columns.time, columns.units), (Some(50.0), None, given.units));
@@ -90,7 +90,7 @@ fn a_circle_has_two_coordinates() {
         let text = rows(header, 700, |t| vec![t, t.cos(), t.sin()]);
         assert_eq!(of(&text, &Columns::default()).unwrap().columns.coords.len(), 2, "{header}");
     }
-    // Without names, a derivative is one that no other reading explains.
+    // Without names, a column is a derivative only if no other reading explains it.
     let text = rows("0,1,0", 700, |t| vec![t + 0.01, (3.0 * t).cos(), -3.0 * (3.0 * t).sin()]);
     let columns = of(&text, &Columns::default()).unwrap().columns;
     assert_eq!((columns.coords, columns.velocity), (list(&["c2"]), list(&["c3"])));
@@ -115,7 +115,7 @@ fn columns_without_names_get_some_and_fixed_points_are_left_out() {
     assert_eq!(columns.names, Some(list(&["c1", "c2", "c3", "c4"])));
     assert_eq!((columns.time.as_deref(), columns.coords), (Some("c1"), list(&["c3", "c4"])));
     assert_eq!(table[1].meaning, "left out");
-    // A name that says position is believed, and so are measured velocities.
+    // A name that says position is trusted, and so are measured velocities.
     let named = of(&format!("t,x,c,d{text}"), &Columns::default()).unwrap();
     assert_eq!(named.columns.coords, list(&["x", "c", "d"]));
 }

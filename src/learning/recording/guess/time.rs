@@ -1,12 +1,12 @@
-//! Which column is the time, and where it begins anew.
+//! Which column is the time, and where it restarts.
 
 use super::names::{is_index, is_time, unit_of_time};
 use crate::names::number;
 use crate::recording::statistics::median;
 
-/// Rows, at least, on average between two places where a time begins anew.
+/// Smallest average number of rows between two restarts of a time.
 const RUN: usize = 16;
-/// Largest deviation of nine steps of ten from the median step, over it, of a time that no name tells.
+/// Largest relative deviation from the median step, for nine steps of ten, of a time that is not recognised by its name.
 const EVEN: f64 = 0.5;
 
 /// A column that can be the time.
@@ -16,7 +16,7 @@ pub struct Time {
     pub column: usize,
     /// Its unit, if it is not the second.
     pub unit: Option<&'static str>,
-    /// Rows at which it begins anew, from 0.
+    /// Rows at which it restarts, from 0.
     pub restarts: Vec<usize>,
     /// The reason.
     pub because: String,
@@ -26,7 +26,7 @@ pub struct Time {
 pub fn restarts(values: &[f64]) -> Option<Vec<usize>> {
     let falls: Vec<usize> = (1..values.len()).filter(|&k| values[k] < values[k - 1]).collect();
     let still = values.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    // Rows that are repeated are left out on reading.
+    // Repeated rows are left out on reading.
     (values.len() > 1 && falls.len() * RUN <= values.len() && still * RUN <= values.len()).then_some(falls)
 }
 
@@ -36,7 +36,7 @@ pub fn counts(values: &[f64]) -> bool {
         && values.iter().all(|x| x.fract() == 0.0)
 }
 
-/// `true` if the steps of an increasing column are alike.
+/// `true` if the steps of an increasing column are nearly equal.
 fn even(values: &[f64]) -> bool {
     let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     let middle = median(&mut steps);
@@ -44,7 +44,7 @@ fn even(values: &[f64]) -> bool {
     far * 10 <= steps.len()
 }
 
-/// The time among columns: by its name, or as the only one that increases by like steps and does not count rows.
+/// The time among columns: by its name, or as the only one that increases by nearly equal steps and does not count rows.
 pub fn find(names: &[String], numbers: &[Result<Vec<f64>, String>]) -> Option<Time> {
     let candidates = || {
         numbers.iter().enumerate().filter_map(|(k, values)| {

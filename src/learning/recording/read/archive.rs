@@ -7,12 +7,12 @@ use zip::result::ZipError;
 
 /// First bytes of an archive, and of one without a single entry.
 pub const MAGIC: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
-/// Most bytes that the used arrays may have for every byte that they take in the file, and bytes that they may have however
-/// few they take. Measured numbers shrink to a tenth at most; what shrinks to a hundredth holds hardly a number.
+/// Largest ratio of unpacked to packed bytes of the used arrays, and bytes that are allowed in any case. Measured numbers shrink to a tenth
+/// at most; data that shrinks to a hundredth contains hardly any number.
 const EXPANSION: u64 = 100;
 const ANYWAY: u64 = 1 << 26;
 
-/// Most bytes that so many packed ones may become.
+/// Largest number of bytes that `packed` bytes may unpack to.
 pub fn most_unpacked(packed: u64) -> u64 {
     ANYWAY.max(packed.saturating_mul(EXPANSION))
 }

@@ -69,7 +69,7 @@ impl<'a> Builder<'a> {
         &self.selection
     }
 
-    /// Says how many rows will come, so that room is made once.
+    /// Announces the number of rows, so that memory is reserved once.
     pub fn expect(&mut self, rows: usize) {
         self.expected = if self.selection.trajectory.is_none() { rows } else { 0 };
     }
@@ -131,7 +131,7 @@ impl<'a> Builder<'a> {
         }
         for (i, q) in scaled.by_ref().take(n).enumerate() {
             let q = q?;
-            // An angle goes on from its last reading.
+            // An angle continues from its last reading.
             let last = || track.q.iter().skip(i).step_by(n).rev().find(|q| !q.is_nan());
             let turns = match self.periodic[i] && !q.is_nan() {
                 true => last().map_or(0.0, |last| ((last - q) / TAU).round()),
@@ -161,7 +161,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Notes a row that lacks a reading and is left out for it. A trajectory that stays whole keeps rows with some of the positions.
+    /// Notes a row that is left out because a reading is missing. A trajectory that stays whole keeps rows with some of the positions.
     fn lacks(&mut self, row: u64, values: &[f64]) -> bool {
         let lacking = |x: &&f64| x.is_nan();
         let Some(first) = values.iter().position(|x| x.is_nan()) else { return false };

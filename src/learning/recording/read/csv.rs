@@ -14,9 +14,9 @@ use std::io::{BufRead, Read};
 /// Longest line in bytes.
 const LONGEST: u64 = 1 << 20;
 
-/// Trajectories of a text while its lines come in, and what was recognised in it.
+/// The trajectories of a text while its lines are read, and the recognised format.
 pub struct Text<'a> {
-    /// One trajectory or several that a column distinguishes, or several side by side.
+    /// One trajectory, several that a column distinguishes, or several side by side.
     lanes: Vec<Lane<'a>>,
     /// `true` if trajectories are side by side.
     wide: bool,
@@ -33,7 +33,7 @@ pub struct Text<'a> {
     pub separator: Separator,
 }
 
-/// Reads rows of numbers, with or without a header, into trajectories; `known` is the separator if it need not be recognised.
+/// Reads rows of numbers, with or without a header, into trajectories; `known` is the separator if it is given.
 ///
 /// The first line that is neither blank nor a comment, which begins with `#`, is a header if none of its fields is a number,
 /// and says how fields are separated: by commas, semicolons, tabs, bars or blanks. Without a header the last comment above
@@ -146,7 +146,7 @@ impl<'a> Text<'a> {
     /// Reads the numbers of one line, `text` being it without the blanks around.
     fn take<'b>(&mut self, line: &'b [u8], mut text: &'b [u8], row: u64) -> Result<(), Problem> {
         if self.separator == Separator::Tab {
-            // Tabs at the ends stand beside fields that are empty.
+            // Tabs at the ends separate empty fields.
             let whole = line.trim_ascii_end().len();
             let whole = &line[..whole + line[whole..].iter().take_while(|byte| matches!(byte, b'\t' | b' ')).count()];
             if whole.len() != text.len() && self.separator.fields(text).count() != self.slots.len() {
@@ -173,7 +173,7 @@ impl<'a> Text<'a> {
             self.examine(text, row);
             return Ok(());
         }
-        // Beside a mistake the others are looked for, and nothing is kept.
+        // After a mistake the rest is only searched for further mistakes, and nothing is kept.
         if !self.faults.is_empty() {
             return Ok(());
         }

@@ -7,14 +7,14 @@ use std::io::{self, Read};
 /// Encoding of a text file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Encoding {
-    /// UTF-8, of which ASCII is a part.
+    /// UTF-8, which includes ASCII.
     #[default]
     #[serde(rename = "utf-8")]
     Utf8,
-    /// UTF-16 behind a byte order mark, as of Excel's "Unicode text".
+    /// UTF-16 after a byte order mark, as in Excel's "Unicode text".
     #[serde(rename = "utf-16")]
     Utf16,
-    /// Windows-1252, of which the printable part of Latin-1 is a part.
+    /// Windows-1252, which includes the printable part of Latin-1.
     #[serde(rename = "windows-1252")]
     Windows1252,
 }
@@ -22,13 +22,13 @@ pub enum Encoding {
 /// Byte order mark of UTF-8.
 pub const MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Characters of the bytes `0x80` to `0x9f` of Windows-1252; those of five bytes that stand for nothing are left as they are.
+/// Characters of the bytes `0x80` to `0x9f` of Windows-1252; the five undefined bytes are unchanged.
 const WINDOWS: [char; 32] = [
     '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž', '\u{8f}', '\u{90}', '‘', '’',
     '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
 ];
 
-/// Text of bytes in UTF-8 or, if they are not, in Windows-1252; none if there are control characters in it.
+/// Text of bytes in UTF-8 or, if they are invalid, in Windows-1252; none if it contains control characters.
 pub fn decode(bytes: &[u8]) -> Option<(Cow<'_, str>, Encoding)> {
     if bytes.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace()) {
         return None;
@@ -62,7 +62,7 @@ pub struct Utf16<R> {
 }
 
 impl<R: Read> Utf16<R> {
-    /// A reader that stands before the byte order mark.
+    /// A reader positioned before the byte order mark.
     pub fn new(input: R) -> Self {
         Self { input, big_endian: None, high: None, ready: Vec::new() }
     }
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn utf16_becomes_utf8() {
-        // Pairs of words fall across the ends of what is read at a time.
+        // Surrogate pairs cross the ends of the blocks that are read.
         let text = format!("\u{feff}t;Länge\n{}", "0;𝄞\n".repeat(20_001));
         for big in [false, true] {
             let bytes: Vec<u8> =

@@ -44,12 +44,12 @@ pub enum Problem {
     /// Bytes that are not text.
     #[error("row {0}: bytes that are not text")]
     NotText(u64),
-    /// A file of another format, and how to make one that is read.
+    /// A file in a foreign format, and how to convert it.
     #[error("{name}, which is not read: {cure}")]
     Foreign {
         /// The format.
         name: &'static str,
-        /// How to make a file of the same numbers that is read.
+        /// How to convert the file to a readable format.
         cure: &'static str,
     },
     /// Several problems of one file.
@@ -83,7 +83,7 @@ pub enum Problem {
         row: u64,
         /// Description of what was expected.
         what: &'static str,
-        /// Its name and what is there.
+        /// Its name and what was found there.
         problem: String,
     },
     /// Neither times nor a rate.
@@ -125,7 +125,7 @@ pub enum Problem {
         /// Fields of the row.
         found: usize,
     },
-    /// Rows that lack a reading, more than those that do not.
+    /// More rows lack a reading than do not.
     #[error("row {row}, column {column}: no reading; {incomplete} rows lack one, and {whole} do not")]
     Missings {
         /// The first of them.
@@ -179,7 +179,7 @@ pub enum Problem {
         /// The unit and what was expected.
         problem: String,
     },
-    /// Time stands still or goes back.
+    /// Time does not increase.
     #[error("row {row}, column {column}: expected a time later than {before} of row {before_row}, found {found}{hint}")]
     Order {
         /// The row.
@@ -255,12 +255,12 @@ impl Faults {
         self.first.is_empty()
     }
 
-    /// Keeps what was found, and notes why nothing was.
+    /// Keeps a result, or notes why there is none.
     pub(super) fn good<T>(&mut self, found: Result<T, Problem>) -> Option<T> {
         found.map_err(|problem| self.add(problem)).ok()
     }
 
-    /// The problems as one.
+    /// The problems, combined into one.
     ///
     /// # Errors
     /// If there are any.

@@ -1,4 +1,4 @@
-//! What was recognised in a file that says little about itself.
+//! The format that was recognised in a file that does not state it.
 
 use super::encoding::Encoding;
 use super::text::Separator;
@@ -20,7 +20,7 @@ pub enum FileKind {
     Xlsx,
 }
 
-/// How a file was read: what it did not state and what was therefore recognised in it.
+/// How a file was read: everything that it did not state and that was recognised instead.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FileFacts {
     /// The file.

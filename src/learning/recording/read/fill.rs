@@ -19,9 +19,9 @@ pub struct Source<'a> {
     pub width: usize,
     /// Used elements of a row: place in the row, place among the used columns.
     pub wanted: Vec<(usize, usize)>,
-    /// `true` if nothing may stand behind them.
+    /// `true` if nothing may follow them.
     pub whole: bool,
-    /// Name in a message, with a space behind it, if it is one of several.
+    /// Name in a message, followed by a space, if it is one of several.
     pub name: String,
 }
 
@@ -52,7 +52,7 @@ pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>
             for (used, found) in builder.selection().used().zip(&values).filter(|(_, x)| x.is_infinite()) {
                 faults.add(Problem::Field { row, column: used.name.clone(), found: found.to_string() });
             }
-            // Beside a mistake the others are looked for, and nothing is kept.
+            // After a mistake the rest is only searched for further mistakes, and nothing is kept.
             if !faults.is_empty() {
                 continue;
             }

@@ -7,9 +7,9 @@ use crate::recording::{Columns, ColumnsError};
 
 /// The forces on the coordinates, some of which are formulas.
 pub struct ForceFormulas {
-    /// A formula for each coordinate; that of a column is its name.
+    /// A formula for each coordinate; for a column, its name.
     formulas: Vec<Given>,
-    /// Inputs that are read for the formulas, behind those that were asked for.
+    /// Inputs that are read only for the formulas, after the requested ones.
     read: Vec<String>,
     asked: usize,
 }
@@ -21,7 +21,7 @@ enum Given {
 }
 
 impl ForceFormulas {
-    /// Those of a description of columns, and the description of what has to be read for them; none if every force is a column.
+    /// The formulas of a description of columns, and the description of the columns to read for them; none if every force is a column.
     ///
     /// # Errors
     /// [`ColumnsError`]: a mistake in a formula, or another number of forces than of coordinates.

@@ -5,7 +5,7 @@ use super::Problem;
 /// Bytes from the beginning of a file that are looked at.
 pub const LOOKED_AT: u64 = 520;
 
-/// How to make a file that is read, of workbooks and of frames.
+/// How to convert workbooks and frames to a readable file.
 const SAVE_AS: &str = "save the sheet as .xlsx, or as CSV: File, Save As, CSV UTF-8";
 const FRAME: &str = "in Python write pandas.DataFrame(..).to_csv('motion.csv', index=False), or give the frame to the Python package lnn";
 const PANDAS: &str =
@@ -42,7 +42,7 @@ pub fn refuse(start: &[u8]) -> Result<(), Problem> {
     found.map_or(Ok(()), |&(.., name, cure)| Err(Problem::Foreign { name, cure }))
 }
 
-/// An archive with these entries is none of arrays: what it is.
+/// Identifies an archive that does not contain arrays, by its entries.
 pub fn archive<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<Problem> {
     let (name, cure) = names.find_map(|name| match name {
         "content.xml" => Some(("an OpenDocument sheet (.ods)", SAVE_AS)),

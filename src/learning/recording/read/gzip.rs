@@ -7,7 +7,7 @@ use std::io::{self, Read};
 /// First bytes of such a file.
 pub const MAGIC: &[u8] = b"\x1f\x8b";
 
-/// Reader of what is packed, as much as a hundred times its bytes.
+/// Reader of packed data, up to a hundred times its bytes.
 pub struct Gzip<R> {
     decoder: MultiGzDecoder<R>,
     /// Bytes that may still come.

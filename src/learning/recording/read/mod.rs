@@ -47,14 +47,13 @@ const MAX_BYTES: u64 = 1 << 36;
 
 /// Reads recorded trajectories.
 ///
-/// Every file holds one trajectory, or several distinguished by a column or side by side; long gaps in time cut them further. The
-/// format is recognised by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and
-/// byte order), the first sheet of an Excel workbook (`.xlsx`), anything else is text of numbers, separated by commas, semicolons,
-/// tabs, bars or blanks, with or without a header and with comments behind a `#`; lines end with LF, CR LF, or CR in all of the file.
-/// Text may be packed by gzip, and be in UTF-8, UTF-16 or Windows-1252; its decimals have a point or a comma. What was recognised is
-/// kept in the [`LoadedRecording`].
+/// Every file holds one trajectory, or several distinguished by a column or side by side; long gaps in time cut them further. The format is
+/// recognised by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order), the
+/// first sheet of an Excel workbook (`.xlsx`), anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks,
+/// with or without a header and with comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Text may be packed by gzip,
+/// and be in UTF-8, UTF-16 or Windows-1252; its decimals have a point or a comma. The [`LoadedRecording`] states the recognised format.
 ///
-/// Numbers are converted to SI, by the units of the description or else by those in brackets behind the names of a header; angles are
+/// Numbers are converted to SI, by the units of the description or else by those in brackets after the names of a header; angles are
 /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps
 /// trajectories whole across all gaps. Forces that are formulas are evaluated at the samples.
 ///
@@ -122,7 +121,7 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
     if most < LEAST && !columns.whole { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
 }
 
-/// Tells the format and reads the rows.
+/// Recognises the format and reads the rows.
 fn parse(mut file: File, size: u64, columns: &Columns) -> Result<(FileFacts, Vec<Builder<'_>>), Problem> {
     let mut start = Vec::new();
     (&mut file).take(foreign::LOOKED_AT).read_to_end(&mut start)?;

@@ -12,7 +12,7 @@ use std::io::{BufReader, Read};
 
 /// First bytes of such a file.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
-/// Longest header in bytes; NumPy itself takes no longer one without being asked to.
+/// Longest header in bytes; by default NumPy itself accepts no longer one.
 const LONGEST: usize = 10_000;
 
 /// An array before its numbers are read.
@@ -33,8 +33,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// Reads the header of an array that, with its header, has `available` bytes: as many as its shape says, no more and no
-    /// fewer, which is found out before a number is read.
+    /// Reads the header of an array that has `available` bytes including its header. Their number must match the shape exactly, which is
+    /// checked before a number is read.
     pub fn read(input: &mut impl Read, available: u64) -> Result<Self, Problem> {
         let short = |_| Problem::Array("the header of the array is cut off".to_string());
         let mut start = [0; 8];
@@ -117,8 +117,8 @@ pub fn read(file: Shared, available: u64, columns: &Columns) -> Result<Vec<Build
     table(&header, columns, |offset| Ok(Box::new(BufReader::with_capacity(1 << 16, file.at(offset)))))
 }
 
-/// Reads a table of numbers, columns by number or by the given names; `open` gives a reader that stands so many bytes behind
-/// the beginning of the array.
+/// Reads a table of numbers, columns by number or by the given names; `open` gives a reader at a number of bytes after the beginning of the
+/// array.
 pub fn table<'a, 'f>(
     header: &Header,
     columns: &'a Columns,

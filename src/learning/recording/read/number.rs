@@ -1,4 +1,4 @@
-//! Numbers of a text, whose decimals have a point or a comma, in all of a file the same.
+//! Numbers of a text, whose decimals have a point or a comma, the same throughout a file.
 
 use super::Problem;
 use super::encoding::decode;
@@ -7,7 +7,7 @@ use super::text::{unquoted, with_point};
 /// Words that stand for a reading that is missing.
 const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
 
-/// Mark of the decimals of a file as far as it is known.
+/// Decimal mark of a file, once it is known.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Numbers {
     /// Row of the first decimal point.
@@ -22,7 +22,7 @@ impl Numbers {
         self.comma.is_some()
     }
 
-    /// A finite number with the mark of the file, fast if nothing stands around it; the first mark decides.
+    /// A finite number with the decimal mark of the file, fast if nothing surrounds it; the first mark decides.
     #[inline]
     pub fn parse(&mut self, field: &[u8], row: u64) -> Option<f64> {
         let text = std::str::from_utf8(field).ok()?;
@@ -35,7 +35,7 @@ impl Numbers {
         }
     }
 
-    /// The same, `NaN` for a field without a reading: one that is empty or says so.
+    /// As `parse`, but `NaN` for a missing reading: a field that is empty or says so.
     #[inline]
     pub fn reading(&mut self, field: &[u8], row: u64) -> Option<f64> {
         self.parse(field, row).or_else(|| {
@@ -57,7 +57,7 @@ impl Numbers {
         Some(number)
     }
 
-    /// A number without a decimal point, where there has been none.
+    /// A number without a decimal point, in a file that had none so far.
     fn parse_comma(&mut self, text: &str, row: u64) -> Option<f64> {
         if self.point.is_some() || text.contains('.') {
             return None;

@@ -11,10 +11,10 @@ pub const LEAST: usize = 16;
 /// Difference in rad of two guesses of the way of an angle across a gap at and above which neither is believed.
 const UNSURE: f64 = 1.5;
 
-/// Adds the stretches of a trajectory between long gaps, those of few samples left out; gives the samples of the longest.
+/// Adds the stretches of a trajectory between long gaps, except those of few samples; returns the samples of the longest.
 ///
-/// A trajectory continues across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
-/// is a guess, and where gaps are longer, it is cut unless it is to stay whole.
+/// A trajectory continues across gaps of up to nine missing rows, an angle by the turn that suits its velocity before and after; where that
+/// is ambiguous, or a gap is longer, it is cut unless it has to stay whole.
 pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedRecording) -> usize {
     let TrackBuilder { label, rows, mut track, error, input, missing, .. } = builder;
     let clock = Clock::of(&track.times);
@@ -91,7 +91,7 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
 }
 
 /// Full turns by which the coordinates must be moved from sample `k + 1` on so that they continue across the gap before it as they moved
-/// before and after; none if that is a guess.
+/// before and after; none if that is ambiguous.
 fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize) -> Option<Vec<f64>> {
     let (n, gap) = (periodic.len(), track.times[k + 1] - track.times[k]);
     let pace = |i: usize, before: Option<usize>| {

@@ -16,7 +16,7 @@ pub struct Used {
     pub position: usize,
     /// Factor to SI.
     pub factor: f64,
-    /// Unit that its header gives, if that is the one in use.
+    /// Unit in its header, if that is the one in use.
     pub unit: Option<String>,
 }
 
@@ -38,7 +38,7 @@ pub struct Selection {
 /// The columns of a file, and which of them are wanted.
 struct File<'a> {
     columns: &'a Columns,
-    /// None in a file without names.
+    /// `None` in a file without names.
     headings: Option<Vec<Heading>>,
     width: usize,
     /// Row of the header.
@@ -65,7 +65,7 @@ impl Selection {
         Ok(vec![file.select(None)?])
     }
 
-    /// The used columns, that of the trajectory last.
+    /// The used columns, with the trajectory's column last.
     pub fn used(&self) -> impl Iterator<Item = &Used> {
         self.values.iter().chain(&self.trajectory)
     }
@@ -75,7 +75,7 @@ impl Selection {
         self.values.first().filter(|_| self.timed).map(|used| used.name.as_str())
     }
 
-    /// The columns as they are called here.
+    /// The columns by the names used in this file.
     pub fn called(&self, columns: &Columns) -> Columns {
         let mut called = columns.clone();
         if columns.wide {
@@ -103,7 +103,7 @@ impl Selection {
 }
 
 impl File<'_> {
-    /// The used columns, of trajectories side by side those with this number behind their names.
+    /// The used columns; for trajectories side by side, the columns with this number after their names.
     fn select(&self, number: Option<String>) -> Result<Selection, Problem> {
         let columns = self.columns;
         let mut faults = Faults::default();
@@ -132,8 +132,8 @@ impl File<'_> {
         ] {
             for (k, name) in list.iter().enumerate() {
                 let Some(mut used) = faults.good(self.find(what, name, &numbered(name))) else { continue };
-                // An error is in the unit of its coordinate unless it has one of its own; the sign of a factor turns positions
-                // around, not their errors.
+                // An error has the unit of its coordinate unless it has one of its own; the sign of a factor flips positions, not their
+                // errors.
                 if what == "error" && used.unit.is_none() && !self.has_unit(name, &used) {
                     used.factor = values.get(first + k).map_or(1.0, |coordinate| coordinate.factor.abs());
                 }
@@ -148,7 +148,7 @@ impl File<'_> {
         Ok(selection)
     }
 
-    /// Refuses a column that is used twice, and a unit of a time that is none.
+    /// Rejects a column that is used twice, and a unit of the time that is not one of time.
     fn check(&self, selection: &Selection) -> Result<(), Problem> {
         let all: Vec<&Used> = selection.used().collect();
         for (k, used) in all.iter().enumerate() {
@@ -168,7 +168,7 @@ impl File<'_> {
         }
     }
 
-    /// The column `name`, `asked` being how the description calls it.
+    /// The column `name`, which the description calls `asked`.
     fn find(&self, what: &'static str, asked: &str, name: &str) -> Result<Used, Problem> {
         let position = self.position(what, name)?;
         let heading = self.headings.as_ref().and_then(|headings| headings.get(position));
