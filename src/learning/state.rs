@@ -1,4 +1,4 @@
-//! The state of a computation in bytes: any type that serde knows, numbers as they are.
+//! The state of a computation in bytes: any type that serde supports, with exact numbers.
 
 use crate::names::one_line;
 use crate::scalar::Scalar;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// The bytes of a state; the same state gives the same bytes.
 ///
 /// # Errors
-/// [`ContainerError::Header`] for what serde cannot write.
+/// [`ContainerError::Header`] for types that serde cannot write.
 pub fn to_bytes(state: &impl Serialize) -> Result<Vec<u8>, ContainerError> {
     postcard::to_allocvec(state).map_err(refused)
 }
@@ -29,7 +29,7 @@ fn refused(error: postcard::Error) -> ContainerError {
     ContainerError::Header(format!("state: {}", one_line(&error.to_string())))
 }
 
-/// Numbers in the precision that they were written in.
+/// Numbers in the precision in which they were written.
 #[derive(Serialize, Deserialize)]
 enum Stored {
     F32(Vec<f32>),
@@ -85,7 +85,7 @@ mod tests {
         assert!(to_bytes(&State { numbers: vec![Dd::from(1.0)], loss: 0.0 }).is_err());
     }
 
-    /// A length that is only claimed takes no memory.
+    /// A claimed length allocates no memory.
     #[test]
     fn claims_are_not_believed() {
         assert!(from_bytes::<Vec<f64>>(&[0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]).is_err());

@@ -8,7 +8,7 @@ use super::{Recording, quantile};
 /// Repetitions in a row at and above which a motion may rest, and at most.
 const MANY: usize = 4;
 const MOST_HELD: usize = 12;
-/// Largest change after many repetitions, over that of a continuing motion, at which the motion rests.
+/// Change after many repetitions, over that of a continuing motion, below which the motion rests.
 const GOES_ON: f64 = 0.5;
 /// Change of a reading, in units of the smallest change of its sensor, at and above which a reading in between cannot repeat.
 const MOVING: f64 = 3.0;

@@ -1,4 +1,4 @@
-//! The files and rows that recorded samples come from, and what was left out.
+//! The files and rows that recorded samples come from, and the rows that were left out.
 
 use crate::recording::read::FileFacts;
 use crate::recording::smooth::{Chosen, Smoothing, noise};
@@ -92,8 +92,8 @@ pub struct LoadedRecording {
     pub duplicates: usize,
     /// Rows left out because a field is empty or `NaN`.
     pub incomplete: usize,
-    /// Readings of positions that are missing in rows of trajectories that stay whole, `(samples, n)` of each; those of the recording lie on
-    /// lines between their neighbours. Empty if none is missing.
+    /// Missing position readings in rows of trajectories that stay whole, `(samples, n)` for each; in the recording they are interpolated
+    /// linearly. Empty if none is missing.
     pub missing: Vec<Vec<bool>>,
     /// Gaps in time.
     pub cuts: Vec<Cut>,
@@ -105,11 +105,11 @@ pub struct LoadedRecording {
     pub errors: Vec<Vec<f64>>,
     /// Inputs of every trajectory, `(samples, inputs)` each, in the order of their columns; empty if there are none.
     pub inputs: Vec<Vec<f64>>,
-    /// Number of the take of every trajectory: those that gaps cut out of one have the same.
+    /// Number of the take of every trajectory: trajectories cut from one take by gaps share it.
     pub takes: Vec<usize>,
     /// Meaning of the columns, which have the names of the first file's header without units; without files it is empty.
     pub columns: Columns,
-    /// What was recognised in every file.
+    /// The format that was recognised in every file.
     pub formats: Vec<FileFacts>,
 }
 
@@ -156,7 +156,7 @@ impl From<Recording> for LoadedRecording {
 /// Relative error of accelerations by smoothing above which a fit should learn from the motion itself.
 pub const LARGE_ERROR: f64 = 0.1;
 
-/// Share of the spread of a known force that is taken to accelerate, where the size of an inertia is looked for.
+/// Share of the spread of a known force that is assumed to accelerate when the size of an inertia is sought.
 pub(crate) const INERTIAL: f64 = 0.5;
 
 /// Quantity that a network learns from.
@@ -168,7 +168,7 @@ pub enum Targets {
     Measured,
     /// Accelerations by local polynomials.
     Smoothed,
-    /// Known forces: what they are for measured accelerations, or for those by local polynomials.
+    /// Known forces, compared with the model's forces at measured accelerations, or at those by local polynomials.
     Forces,
     /// The motion itself, from the network that smoothed or measured accelerations give.
     Motion,
@@ -180,8 +180,8 @@ impl Targets {
         matches!(self, Self::Measured | Self::Forces)
     }
 
-    /// The way that suits the data: measured accelerations if there are any; known forces if these are noisier than the accelerations;
-    /// smoothed accelerations if they are good to `LARGE_ERROR`, the motion itself if not.
+    /// The way that suits the data: measured accelerations if there are any; known forces if they are noisier than the accelerations;
+    /// smoothed accelerations if they are accurate to `LARGE_ERROR`; otherwise the motion itself.
     pub(crate) fn advised(recording: &Recording, smoothing: &Smoothing) -> Self {
         if recording.has_accelerations() {
             Self::Measured
@@ -195,8 +195,8 @@ impl Targets {
     }
 }
 
-/// `true` if the noise of a known force is larger than what the error of the acceleration along its coordinate amounts to as a force,
-/// of any coordinate: a residual is best taken of what is noisier.
+/// `true` if, for any coordinate, the noise of a known force exceeds the error of the acceleration expressed as a force: residuals are best
+/// taken of the noisier quantity.
 fn forces_are_noisier(recording: &Recording, smoothing: &Smoothing) -> bool {
     let n = recording.n();
     let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));

@@ -3,7 +3,7 @@
 /// Median of one standard normal variable's magnitude: a median magnitude over this is a standard deviation.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
-/// The number a fraction `f` of all lies below; `NaN` of none. Reorders.
+/// The number below which a fraction `f` of all values lies; `NaN` without values. Reorders.
 pub fn quantile(values: &mut [f64], f: f64) -> f64 {
     if values.is_empty() {
         return f64::NAN;
@@ -12,7 +12,7 @@ pub fn quantile(values: &mut [f64], f: f64) -> f64 {
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// Median; `NaN` of none. Reorders.
+/// Median; `NaN` without values. Reorders.
 pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
@@ -25,13 +25,13 @@ pub fn robust_deviation(values: &mut [f64]) -> f64 {
     median(values) / NORMAL_MEDIAN
 }
 
-/// Root mean square; 0 of none.
+/// Root mean square; 0 without values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0usize), |(sum, count), x| (sum + x * x, count + 1));
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
-/// Standard deviation about the mean; 0 of none.
+/// Standard deviation about the mean; 0 without values.
 pub fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f64 {
     let count = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<f64>() / count;
@@ -49,7 +49,7 @@ mod tests {
         assert!(median(&mut []).is_nan());
         assert_eq!(rms([3.0, -4.0, 0.0, 0.0]), 2.5);
         assert_eq!((deviation([1.0, 3.0, 5.0, 7.0].iter()), deviation([].iter())), (5.0_f64.sqrt(), 0.0));
-        // A quarter of outliers moves the deviation little: the median of |x| is that of the others.
+        // A quarter of outliers hardly changes the deviation: the median of |x| is among the others.
         assert!((robust_deviation(&mut [1.0, -1.0, 1.0, 1e9]) - 1.0 / NORMAL_MEDIAN).abs() < 1e-15);
     }
 }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// One recorded trajectory of `n` coordinates: positions at increasing times, and what else was measured.
+/// One recorded trajectory of `n` coordinates: positions at increasing times, and other measured quantities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedTrajectory {
     /// Where it comes from, such as a file's name.
@@ -56,7 +56,7 @@ pub enum TrajectoryError {
         /// Sample, from 0.
         sample: usize,
     },
-    /// Time stands still or goes back.
+    /// Time does not increase.
     #[error("{track}: time of sample {sample} is not later than that of the sample before")]
     Order {
         /// Name of the trajectory.
@@ -82,8 +82,8 @@ impl RecordedTrajectory {
         self.times.is_empty()
     }
 
-    /// Fills in readings of positions that are missing, `NaN`, on lines between their neighbours; says which they were, `(samples, n)`, nothing if
-    /// none was.
+    /// Fills in missing readings of positions, `NaN`, by linear interpolation; returns which were missing, `(samples, n)`, or an empty
+    /// list.
     ///
     /// # Errors
     /// A coordinate of which every reading is missing.
@@ -164,7 +164,7 @@ impl Recording {
         !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.a.is_empty())
     }
 
-    /// `true` if every coordinate has known forces in every trajectory, and none stays what it is.
+    /// `true` if every trajectory has known forces on every coordinate, each of which varies.
     pub(crate) fn is_driven(&self) -> bool {
         let n = self.n();
         let moves = |i: usize| {

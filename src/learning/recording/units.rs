@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// Known units and what one of them is in SI (angles in rad).
+/// Known units with their values in SI (angles in rad).
 const UNITS: [(&str, f64); 26] = [
     ("rad", 1.0),
     ("deg", PI / 180.0),

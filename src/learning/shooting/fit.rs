@@ -57,8 +57,8 @@ pub struct Fitted<S> {
     pub segments: (usize, usize),
     /// Integration steps per segment.
     pub steps: usize,
-    /// Root mean square difference of predictions when steps are halved, in units of noise, at the parameters returned and
-    /// the estimated starts. Steps were chosen for the parameters given: much above 0.05, ask for more of them.
+    /// Root mean square difference of predictions when steps are halved, in units of noise, at the parameters returned and the estimated
+    /// starts. Steps were chosen for the given parameters: if it is far above 0.05, use more steps.
     pub integration_error: f64,
     /// Seconds spent.
     pub seconds: f64,
@@ -110,7 +110,7 @@ impl<S: Scalar> Task<'_, S> {
     fn check(&self) -> Result<(), ShootingError> {
         self.architecture.validate()?;
         let n = self.architecture.coordinates;
-        // Parameters of other terms of the motion may follow those of the network.
+        // Parameters of other terms of the motion may come after those of the network.
         let (expected, found) = (Layout::new(self.architecture).parameters, self.weights.len());
         if found < expected {
             return Err(NetworkError::Weights { expected, found }.into());
@@ -200,14 +200,13 @@ pub fn fit<S: Scalar>(
     resume(settings, task, threads, hooks, ResumeOptions { checkpoints: None, start: None })
 }
 
-/// [`fit`] with checkpoints, and from one: the result is that of a fit that was never stopped, but for the times.
+/// [`fit`] with checkpoints and resuming: the result equals that of a fit that was never stopped, except for the times.
 ///
-/// `session.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
-/// `CheckpointManager::restore` found of the same training, task and settings; without it no
-/// checkpoint is written.
+/// `session.start` is the training that gave the task its weights ([`Trained::snapshot`]), or the result of `CheckpointManager::restore`
+/// for the same training, task and settings; without it no checkpoint is written.
 ///
 /// # Errors
-/// As [`fit`]; a checkpoint of other segments.
+/// Those of [`fit`]; a checkpoint of other segments.
 ///
 /// [`Trained::snapshot`]: crate::training::Trained::snapshot
 pub fn resume<S: Scalar>(
@@ -242,7 +241,7 @@ pub fn resume<S: Scalar>(
         ),
         None => (None, None),
     };
-    // Checkpoints count them with those of the training that gave the weights, the history of the fit does not.
+    // Checkpoints count these epochs together with those of the training that gave the weights; the history of the fit does not.
     let epochs_before = writer.as_ref().map_or(0, |writer| writer.outcome.history.len());
     let others = || estimate("checkpoint".to_string(), format!("{} segments", segments.0), "others");
     let mut learner = ShootingLearner::new(&problem, settings.start_share, settings.curvature_every);

@@ -1,4 +1,4 @@
-//! Runge and Kutta's method on a chunk of segments, and its discrete adjoint.
+//! The Runge-Kutta method on a chunk of segments, and its discrete adjoint.
 //!
 //! For `q' = v`, `v' = a(q, v, t)` the four stages of a step of length `h` are
 //!
@@ -8,8 +8,8 @@
 //! q' = q + h v + h^2/6 (a1 + a2 + a3)        v' = v + h/6 (a1 + 2 a2 + 2 a3 + a4)
 //! ```
 //!
-//! The forward pass keeps states and accelerations of all stages; the reverse pass evaluates the network there once more,
-//! with what the adjoint identity needs. Every gradient is that of this map, exactly.
+//! The forward pass keeps states and accelerations of all stages; the reverse pass evaluates the network there again, with the quantities
+//! of the adjoint identity. Every gradient is the exact gradient of this map.
 
 use crate::configuration::Penalty;
 use crate::lagrangian::Manifold;
@@ -37,13 +37,13 @@ pub(super) struct SegmentIntegrator<S> {
     /// States at the starts of steps and at the end, `(steps + 1, rows, n)`.
     pub q: Vec<S>,
     pub v: Vec<S>,
-    /// Derivatives of the loss by those states; the reverse pass leaves those by the starts in the first rows.
+    /// Derivatives of the loss by those states; the reverse pass leaves the derivatives by the starts in the first rows.
     pub q_adjoint: Vec<S>,
     pub v_adjoint: Vec<S>,
     /// Segments whose motion is finite and in range so far.
     pub alive: Vec<bool>,
     external: Vec<S>,
-    /// Adjoints of the four accelerations of a step, and what the states of a stage get.
+    /// Adjoints of the four accelerations of a step, and the contributions to the states of a stage.
     a_adjoint: [Vec<S>; 4],
     dq: Vec<S>,
     dv: Vec<S>,
@@ -135,7 +135,7 @@ impl<S: Scalar> SegmentIntegrator<S> {
         }
     }
 
-    /// Segments that have left the range are no longer alive and wait at their starts.
+    /// Segments that have left the range are no longer alive and stay at their starts.
     fn give_up(&mut self, segments: &Segments<S>, node: usize) {
         let (n, size) = (self.n, self.rows * self.n);
         let (reach, speed) = segments.range.split_at(n);
@@ -154,8 +154,8 @@ impl<S: Scalar> SegmentIntegrator<S> {
         }
     }
 
-    /// Takes the adjoints of the steps' states back to the starts and adds to the gradient by the weights; returns value and
-    /// count of the penalty, taken with weight `lambda` at the start of every step.
+    /// Propagates the adjoints of the steps' states back to the starts and adds to the gradient by the weights; returns value and count of
+    /// the penalty, which has the weight `lambda` at the start of every step.
     pub fn reverse(&mut self, weights: &[S], penalty: (Penalty, S), gradient: &mut [S]) -> (S, usize) {
         let (n, size) = (self.n, self.rows * self.n);
         let (half, sixth, third) = (<S as Real>::half(), S::ratio(1, 6), S::ratio(1, 3));

@@ -1,4 +1,4 @@
-//! Segments of motion as what the loop over epochs learns from: their starts move beside the weights.
+//! Segments of motion as the data of the loop over epochs: their starts are fitted together with the weights.
 
 use crate::learning::state::{self, numbers};
 use crate::optimizers::{Method, Moments};
@@ -44,7 +44,7 @@ impl<S: Scalar> Starts<S> {
 pub(super) struct ShootingLearner<S> {
     /// Part of a Gauss-Newton step that a start takes per visit.
     share: f64,
-    /// Epochs between two linearisations by the starts.
+    /// Epochs between two linearisations with respect to the starts.
     curvature_every: u64,
     starts: Starts<S>,
     start_gradient: Vec<S>,
@@ -71,7 +71,7 @@ impl<S: Scalar> ShootingLearner<S> {
         }
     }
 
-    /// Resumes from what [`stored`](Learner::stored) gave; returns its seconds too, and `None` if that is of other segments.
+    /// Resumes from the output of [`stored`](Learner::stored); also returns its seconds, and `None` if it belongs to other segments.
     pub fn restored(mut self, problem: &ShootingProblem<S>, bytes: &[u8]) -> Option<(Self, f64)> {
         let state: ShootingState<S> = state::from_bytes(bytes).ok()?;
         let lengths = [self.starts.at.len(), self.validation_starts.at.len()];
@@ -165,7 +165,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
         record.kv.insert("gap".into(), (self.gap / batches).into());
     }
 
-    /// From starts that fit the weights; infinite if too many segments are left out.
+    /// Uses starts that fit the weights; infinite if too many segments are left out.
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let ShootingProblem { shots, validation, .. } = problem;
         self.validation_starts.refine(shots, weights, validation);
@@ -188,7 +188,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
             matrices: matrices.to_vec(),
             jacobian: jacobian.to_vec(),
         };
-        // Numbers that no file can hold are refused with the weights, which are of the same type.
+        // Numbers that no file can store are rejected with the weights, which are of the same type.
         state::to_bytes(&state).ok()
     }
 }

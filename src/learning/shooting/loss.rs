@@ -35,7 +35,7 @@ impl<S: Scalar> Huber<S> {
     }
 }
 
-/// One residual: predicted minus observed in units of noise, with the numbers that make the prediction.
+/// One residual: predicted minus observed in units of noise, with the factors that make the prediction.
 pub(super) struct Residual<S> {
     /// Coordinate.
     pub i: usize,
@@ -90,10 +90,10 @@ pub(super) fn gap<S: Scalar>(
     (end - next[k]) / segments.tau[k]
 }
 
-/// Loss of one row of a chunk; its derivatives are added to the adjoints of the steps' states, those by the start of the
-/// next segment written to `next_gradient`.
+/// Loss of one row of a chunk; its derivatives are added to the adjoints of the steps' states, and those by the start of the next segment
+/// are written to `next_gradient`.
 ///
-/// `weight` multiplies every residual, `continuity` every gap; the loss is counted without either, gaps apart.
+/// `weight` multiplies every residual, `continuity` every gap; the loss is summed without either, and gaps separately.
 pub(super) fn add_loss<S: Scalar>(
     integrator: &mut SegmentIntegrator<S>,
     segments: &Segments<S>,

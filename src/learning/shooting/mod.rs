@@ -1,25 +1,25 @@
 //! Learning through the motion: multiple shooting with gradients through the integrator.
 //!
-//! Recorded positions are noisy, and a second derivative of them is noisier still. Here nothing is differentiated: every
-//! trajectory is cut into short segments, each with a free start `(q0, v0)`; the network's own motion is integrated from
-//! there by Runge and Kutta's method, and what is compared are positions (and velocities, if they were measured). The loss is
+//! Recorded positions are noisy, and a second derivative of them is noisier still. Here nothing is differentiated: every trajectory is cut
+//! into short segments, each with a free start `(q0, v0)`; the network's own motion is integrated from there by a Runge-Kutta method, and
+//! its positions (and velocities, if measured) are compared with the data. The loss is
 //!
 //! ```text
 //! mean over all residuals of rho(r),  r = (q - q_observed)/sigma_i, and the same of v if it was measured,
 //!     + continuity * (sum over joints of rho(gap/tau)) / residuals,    rho(r) = r^2, linear beyond the Huber bound,
 //! ```
 //!
-//! so that a loss of 1 is noise and nothing else (a little less where the starts were fitted to it); a joint is where a segment ends and the next one starts, and `tau` is the
-//! noise of a position or of a velocity. Its gradient by weights and starts is that of the discrete map, exactly: the adjoint
-//! Runge-Kutta method over the adjoint identity of the network.
+//! so that a loss of 1 means noise alone (a little less where the starts were fitted to it). A joint is where a segment ends and the next
+//! one starts, and `tau` is the noise of a position or of a velocity. The gradient by weights and starts is the exact gradient of the
+//! discrete map: the adjoint Runge-Kutta method over the adjoint identity of the network.
 //!
 //! Bock, H. G. (1981), "Numerical treatment of inverse problems in chemical reaction kinetics" (multiple shooting);
 //! Hager, W. W. (2000), "Runge-Kutta methods in optimal control and the transformed adjoint system" (its discrete adjoint).
 //!
-//! Under constraints the network's motion is that with their multipliers, and starts stay where the constraints allow: each Gauss-Newton
-//! step is taken along them, and brought back to them.
+//! Under constraints the network's motion includes their multipliers, and starts satisfy the constraints: each Gauss-Newton step is taken
+//! along them and then projected back.
 //!
-//! [`fit`](fit()) does it all; [`Segments`] and [`ShootingObjective`] are its parts.
+//! [`fit`](fit()) does all of this; [`Segments`] and [`ShootingObjective`] are its parts.
 
 mod fit;
 mod integrator;

@@ -33,7 +33,7 @@ pub(super) struct Motion<S> {
     workspace: Workspace<S>,
     signature: Buffers<S>,
     violation: Violation<S>,
-    /// Constraints, if there are any, and their rows at the states evaluated last.
+    /// Constraints, if there are any, and their rows at the last evaluated states.
     manifold: Option<Arc<dyn Manifold<S>>>,
     held: ConstrainedMotion<S>,
     rows: ManifoldRows<S>,
@@ -88,7 +88,7 @@ impl<S: Scalar> Motion<S> {
     /// Accelerations `M^-1 (g - c - dD/dv + Q)` of the states evaluated last under scaled external forces, `(states, n)` or empty, or
     /// those under the constraints; their multipliers `-lambda`, `(states, m)`, are appended to `loads`.
     ///
-    /// A state without one is no longer alive; the acceleration of those that are not is 0.
+    /// A state without an acceleration is no longer alive; states that are not alive have the acceleration 0.
     pub fn accelerate(&mut self, external: &[S], alive: &mut [bool], acceleration: &mut [S], loads: &mut Vec<S>) {
         let n = self.scale.len();
         self.dynamics.right_hand_sides(&mut self.right);
@@ -110,8 +110,8 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
-    /// Adds `u da/dtheta` to `gradient` and the derivatives of `u a` by the scaled state to `dq`, `dv`, over the states that
-    /// are alive; evaluated to [`Depth::Training`] before. `a` are their accelerations, `loads` their multipliers.
+    /// Adds `u da/dtheta` to `gradient` and the derivatives of `u a` by the scaled state to `dq`, `dv`, over the states that are alive,
+    /// after an evaluation to [`Depth::Training`]. `a` are their accelerations, `loads` their multipliers.
     pub fn pull_back(
         &mut self,
         weights: &[S],
@@ -151,7 +151,8 @@ impl<S: Scalar> Motion<S> {
         self.dynamics.add_gradient(weights, &self.directions, gradient, Some((dq, dv)));
     }
 
-    /// Adds what the rows of the constraints change of `u a` with the scaled state, by the solution of [`pull_back`](Self::pull_back).
+    /// Adds the changes of `u a` with the scaled state through the rows of the constraints, from the solution of
+    /// [`pull_back`](Self::pull_back).
     fn pull_back_rows(&self, (a, loads): (&[S], &[S]), alive: &[bool], (dq, dv): (&mut [S], &mut [S])) {
         let Some(manifold) = &self.manifold else { return };
         let (n, m, zero) = (self.scale.len(), manifold.names().len(), <S as Real>::zero());
@@ -171,7 +172,7 @@ impl<S: Scalar> Motion<S> {
 
     /// Value of `lambda` times the sum of the states' violations and how many violate; adds its gradient by the weights.
     ///
-    /// The states are taken as given: the data decide them, not the penalty. Characteristic scales are those of this chunk.
+    /// The states count as given: they depend on the data, not on the penalty. Characteristic scales are those of this chunk.
     pub fn add_penalty(
         &mut self,
         weights: &[S],

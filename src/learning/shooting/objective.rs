@@ -1,7 +1,7 @@
-//! Loss of a batch of segments with its gradient by weights and starts, residuals, and linearisations by the starts.
+//! Loss of a batch of segments with its gradient by weights and starts, residuals, and linearisations with respect to the starts.
 //!
-//! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in
-//! their order: the same numbers on any number of threads.
+//! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in their order, so that
+//! the numbers do not depend on the number of threads.
 
 use crate::configuration::Penalty;
 use crate::lagrangian::Manifold;
@@ -25,7 +25,7 @@ const SHARDS: usize = 8;
 /// Outcome of a batch of segments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShootingReport<S> {
-    /// Mean of `rho` over the residuals that count, 1 where only noise is left; `NaN` if none does.
+    /// Mean of `rho` over the residuals that count, 1 for noise alone; `NaN` if none counts.
     pub loss: S,
     /// Mean of `rho` over the components of the gaps; 0 if there are none.
     pub gap: S,
@@ -33,7 +33,7 @@ pub struct ShootingReport<S> {
     pub penalty: S,
     /// Starts of steps at which it is active.
     pub penalised: usize,
-    /// Segments left out because their motion is not finite or leaves every sensible range.
+    /// Segments left out because their motion is not finite or leaves the plausible range.
     pub left_out: usize,
     /// Residuals that count.
     pub residuals: usize,
@@ -61,7 +61,7 @@ struct Given<'a, S> {
 pub(super) struct Shard<S> {
     pub integrator: SegmentIntegrator<S>,
     gradient: Vec<S>,
-    /// Gradients by the starts of the shard's segments and of those that follow them, `(rows, 2, n)`.
+    /// Gradients by the starts of the shard's segments and of the segments that follow them, `(rows, 2, n)`.
     start_gradient: Vec<S>,
     next_gradient: Vec<S>,
     /// Residuals, by request.
@@ -70,7 +70,7 @@ pub(super) struct Shard<S> {
     /// Curvatures, `(rows, 2n, 2n)`, and derivatives of residuals and gaps, by request.
     curvature: Vec<S>,
     jacobian: Vec<S>,
-    /// Of residuals and gaps.
+    /// Sums over residuals and gaps.
     sums: [Sum<S>; 2],
     counted: usize,
     gaps: usize,
@@ -116,7 +116,7 @@ impl<S: Scalar> Shard<S> {
         self.integrator.forward(given.weights, given.segments, rows);
     }
 
-    /// Loss of the chunk that was shot; its derivatives stand ready for the reverse pass.
+    /// Loss of the integrated chunk; its derivatives are stored for the reverse pass.
     fn add_losses(&mut self, given: &Given<'_, S>, rows: &[u32], huber: Huber<S>, weights: (S, S)) {
         let width = 2 * given.segments.n;
         let from = self.next_gradient.len();
@@ -158,7 +158,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Curvatures and gradients by the starts of a chunk, by differences of residuals and gaps.
+    /// Curvatures and gradients of a chunk with respect to the starts, by differences of residuals and gaps.
     fn add_curvature(&mut self, given: &Given<'_, S>, rows: &[u32], huber: Huber<S>, continuity: S) {
         self.shoot(given, rows);
         self.add_losses(given, rows, huber, (<S as Real>::one(), continuity));
@@ -184,7 +184,7 @@ impl<S: Scalar> Shard<S> {
         self.linear = linear;
     }
 
-    /// Gradients by the starts of a chunk, with the derivatives of an earlier linearisation.
+    /// Gradients of a chunk with respect to the starts, with the derivatives of an earlier linearisation.
     fn add_start_gradients(
         &mut self,
         given: &Given<'_, S>,
@@ -208,7 +208,7 @@ impl<S: Scalar> Shard<S> {
         self.values = values;
     }
 
-    /// All residuals and gaps of the chunk that was shot, row by row.
+    /// All residuals and gaps of the integrated chunk, row by row.
     fn collect(&self, given: &Given<'_, S>, rows: &[u32], out: &mut Vec<S>) {
         rows.iter().enumerate().for_each(|(row, &segment)| self.collect_row(given, (row, segment as usize), out));
     }
@@ -233,11 +233,11 @@ impl<S: Scalar> Segments<S> {
 }
 
 impl<S: Scalar> ShootingObjective<S> {
-    /// For networks of this shape on `threads` threads; `continuity` and `huber` as in
+    /// An objective for networks of this shape on `threads` threads; `continuity` and `huber` as in
     /// [`Shooting`](crate::shooting::Shooting).
     ///
     /// # Errors
-    /// When the threads cannot be started.
+    /// The threads cannot be started.
     pub fn new(
         architecture: &Architecture,
         penalty: Penalty,
@@ -250,7 +250,7 @@ impl<S: Scalar> ShootingObjective<S> {
         Ok(Self { model, penalty, huber, continuity, manifold: None, pool, shards: Vec::new() })
     }
 
-    /// The same under constraints; the segments have to be [under](Segments::under) them too.
+    /// The objective under constraints; the segments must be [under](Segments::under) them too.
     pub fn under(self, manifold: Arc<dyn Manifold<S>>) -> Self {
         Self { manifold: Some(manifold), shards: Vec::new(), ..self }
     }
@@ -285,9 +285,9 @@ impl<S: Scalar> ShootingObjective<S> {
     /// Loss and gradients of the segments `rows`; `gradient` by the weights and `start_gradient` by all starts,
     /// `(segments, 2, n)` scaled, are overwritten.
     ///
-    /// Differentiated is `loss + penalty`, gaps included, with the weight `1/residuals` of every residual and
-    /// `continuity/residuals` of every gap, `residuals` those of the report: all over the segments that are not left out. The
-    /// penalty takes the states as given.
+    /// The gradient is that of `loss + penalty`, gaps included, with the weight `1/residuals` of every residual and `continuity/residuals`
+    /// of every gap, where `residuals` is that of the report; segments that are left out do not count. The penalty treats the states as
+    /// given.
     pub fn step(
         &mut self,
         weights: &[S],
@@ -320,7 +320,7 @@ impl<S: Scalar> ShootingObjective<S> {
         self.report(shards)
     }
 
-    /// Gradients by the starts of the segments `rows` and of those that follow them.
+    /// Gradients by the starts of the segments `rows` and of the segments that follow them.
     fn gather_starts(&self, shards: usize, rows: &[u32], segments: &Segments<S>, start_gradient: &mut [S]) {
         let width = 2 * segments.n;
         start_gradient.fill(<S as Real>::zero());
@@ -363,8 +363,8 @@ impl<S: Scalar> ShootingObjective<S> {
         self.shards[..shards].iter().flat_map(|shard| shard.values.iter().copied()).collect()
     }
 
-    /// Linearises all segments by their starts, lets `curvature` hold what it is for [`Curvature::correct`], and moves
-    /// `starts` by `share` of a Gauss-Newton step; the report is of the starts before.
+    /// Linearises all segments with respect to their starts, stores the result in `curvature` for [`Curvature::correct`], and moves
+    /// `starts` by `share` of a Gauss-Newton step; the report belongs to the starts before.
     pub fn refine(
         &mut self,
         weights: &[S],

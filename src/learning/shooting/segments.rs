@@ -1,4 +1,4 @@
-//! Trajectories cut into segments: observations in scaled coordinates, where they lie between integration steps.
+//! Trajectories cut into segments: observations in scaled coordinates, and their positions between integration steps.
 //!
 //! The samples of a segment are its own; it is integrated over equal steps from its first sample to the first of the next
 //! segment, or to its last sample if none follows. A sample between two steps is predicted by the cubic Hermite polynomial
@@ -38,7 +38,7 @@ pub(super) struct Segment<S> {
     pub jump: Vec<S>,
 }
 
-/// Where a sample lies: the step, and how the states at both its ends make position and velocity.
+/// The position of a sample: its step, and the factors by which the states at the ends of the step give position and velocity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place<S> {
     pub step: usize,
@@ -70,8 +70,8 @@ pub struct Segments<S> {
     pub(super) places: Vec<Place<S>>,
     /// External forces at the steps' ends and middles, `(segments, 2 steps + 1, n)`; empty if there are none.
     pub(super) force: Vec<S>,
-    /// Tolerances `tau` of positions and velocities, `(2, n)`: their noise, that of velocities if not measured by the ratio
-    /// of the spreads of velocities and positions.
+    /// Tolerances `tau` of positions and velocities, `(2, n)`: their noise; for velocities that were not measured, from the ratio of the
+    /// spreads of velocities and positions.
     pub(super) tau: Vec<S>,
     /// Bounds of the distance of positions from the start and of velocities from zero, `(2, n)`.
     pub(super) range: Vec<S>,
@@ -87,7 +87,7 @@ struct Piece {
     has_next: bool,
 }
 
-/// Cuts `times` into pieces of about `per_segment` samples; none reaches over a pause as long as a whole segment.
+/// Cuts `times` into pieces of about `per_segment` samples; none crosses a pause as long as a whole segment.
 fn pieces(times: &[f64], per_segment: usize) -> Vec<Piece> {
     let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if intervals.is_empty() {
@@ -156,14 +156,14 @@ impl<S: Scalar> Segments<S> {
             let sigma = noise.v.get(i).copied().unwrap_or(noise.q[i] * ratio);
             all.tau.push(S::of_f64(sigma / scale(i)));
         }
-        // Where nothing moves, the noise is what moves.
+        // If nothing moves, the noise sets the range.
         all.range = (0..2 * n)
             .map(|k| S::of_f64(RANGE * largest[k] / scale(k % n)).max(S::of_f64(100.0 * RANGE) * all.tau[k]))
             .collect();
         all
     }
 
-    /// The same under constraints, to which the starts are brought.
+    /// The segments under constraints, onto which the starts are projected.
     pub fn under(mut self, architecture: &Architecture, manifold: Arc<dyn Manifold<S>>) -> Self {
         let allowed = StartsAllowed::new(architecture, manifold);
         self.starts.chunks_exact_mut(2 * self.n).for_each(|start| allowed.bring(start));
@@ -211,7 +211,7 @@ impl<S: Scalar> Segments<S> {
         self.starts.extend((0..n).map(|i| scaled(trajectory.v[start * n + i], i)));
         let jump = |i: usize| if has_next { scaled(origin(end, i) - origin(start, i), i) } else { <S as Real>::zero() };
         if let Some(force) = force {
-            // Zero for a track without forces beside others that have them.
+            // Zero for a track without forces if other tracks have them.
             let mut values = vec![0.0; n];
             for k in 0..=2 * self.steps {
                 if let Some(force) = force {
@@ -255,7 +255,7 @@ impl<S: Scalar> Segments<S> {
     pub fn starts(&self) -> &[S] {
         &self.starts
     }
-    /// Of about `count` segments from the longest to the shortest: their numbers.
+    /// Numbers of about `count` segments, evenly from the longest to the shortest.
     pub(super) fn cross_section(&self, count: usize) -> Vec<u32> {
         let mut rows: Vec<u32> = (0..self.len() as u32).collect();
         rows.sort_by(|&a, &b| self.list[b as usize].duration.total_cmp(&self.list[a as usize].duration));

@@ -1,11 +1,10 @@
-//! Corrections of the segments' starts by Gauss and Newton's method.
+//! Gauss-Newton corrections of the segments' starts.
 //!
-//! A start has `2n` unknowns and many observations, so that its curvature `H = sum of rho'(r)/r J^T J` over residuals and
-//! gaps is small and well conditioned. `J` is a difference of two integrations and may be some epochs old. Before the
-//! weights are moved by a segment its start settles, by a step `-H^-1 J^T rho'(r)` that takes no more than a forward
-//! integration: at the best start the gradient by the weights is that of the loss with starts eliminated, and the steep
-//! directions that starts can undo are gone from it (Golub and Pereyra 1973, variable projection). After that the exact
-//! gradient `g`, which is there anyway, corrects what is left by `-H^-1 g`.
+//! A start has `2n` unknowns and many observations, so that its curvature `H = sum of rho'(r)/r J^T J` over residuals and gaps is small and
+//! well conditioned. `J` is a difference of two integrations and may be some epochs old. Before a segment changes the weights, its start is
+//! corrected by a step `-H^-1 J^T rho'(r)`, which costs no more than a forward integration. At the best start the gradient by the weights
+//! is that of the loss with starts eliminated, without the steep directions that starts can compensate (Golub and Pereyra 1973, variable
+//! projection). After that the exact gradient `g`, which is available anyway, corrects the remainder by `-H^-1 g`.
 
 use crate::linalg::{Workspace, solve};
 use crate::scalar::{Real, Scalar};
@@ -40,7 +39,8 @@ impl<S: Scalar> Linearisation<S> {
         S::epsilon().sqrt() * S::of_f64(DIFFERENCE) * segments.range[k]
     }
 
-    /// Appends curvature, `(rows, 2n, 2n)`, and gradient, `(rows, 2n)`, of the rows; those given up stay where they are.
+    /// Appends curvature, `(rows, 2n, 2n)`, and gradient, `(rows, 2n)`, of the rows. Rows that were given up have the gradient 0, so that their
+    /// starts do not move.
     pub fn add(
         &self,
         segments: &Segments<S>,
@@ -94,7 +94,7 @@ impl<S: Scalar> Linearisation<S> {
     }
 }
 
-/// Derivatives of all residuals and gaps by their starts, and the curvature of the loss that they make.
+/// Derivatives of all residuals and gaps by their starts, and the resulting curvature of the loss.
 #[derive(Debug)]
 pub struct Curvature<S> {
     /// `(segments, 2n, 2n)`.
@@ -136,13 +136,13 @@ impl<S: Scalar> Curvature<S> {
         }
     }
 
-    /// Curvature, `(segments, 2n, 2n)`, and derivatives, `(residuals and gap of each segment, 2n)`: what
-    /// [`restore`](Self::restore) takes.
+    /// Curvature, `(segments, 2n, 2n)`, and derivatives, `(residuals and gap of each segment, 2n)`: the arguments of
+    /// [`restore`](Self::restore).
     pub(super) fn stored(&self) -> (&[S], &[S]) {
         (&self.matrices, &self.jacobian)
     }
 
-    /// The starts that [`stored`](Self::stored) gave; `None` if they are not of these segments.
+    /// Restores the output of [`stored`](Self::stored); `None` if it does not fit these segments.
     pub(super) fn restore(segments: &Segments<S>, matrices: &[S], jacobian: &[S]) -> Option<Self> {
         let width = 2 * segments.n;
         let rows = |k: usize| segments.residuals(k) + if segments.list[k].has_next { width } else { 0 };

@@ -29,7 +29,7 @@ impl<S: Scalar> StartsAllowed<S> {
         start.iter().zip(self.scale.iter().cycle()).map(|(&x, &s)| x * s).collect()
     }
 
-    /// Brings a start, `(2, n)`, to the constraints by the least change; one from which no way leads there stays.
+    /// Projects a start, `(2, n)`, onto the constraints; if that fails, the start stays.
     pub fn bring(&self, start: &mut [S]) {
         let n = self.scale.len();
         let mut state = self.physical(start);
@@ -41,7 +41,7 @@ impl<S: Scalar> StartsAllowed<S> {
     }
 
     /// The step `d` that solves `H d = g` along the constraints at a start: `C d = 0` with the derivatives `C` of `phi` and `A v - b` by
-    /// the start. `None` where there is none.
+    /// the start. `None` if there is no such step.
     pub fn step(&self, start: &[S], curvature: &[S], gradient: &[S], workspace: &mut Workspace<S>) -> Option<Vec<S>> {
         let (n, width, zero) = (self.scale.len(), gradient.len(), <S as Real>::zero());
         let state = self.physical(start);

@@ -1,8 +1,8 @@
-//! Motion under constraints in the scaled coordinates of a network: rows, loads and what a loss asks of them.
+//! Motion under constraints in the scaled coordinates of a network: rows, multipliers and adjoints.
 //!
-//! Of scaled coordinates `q_i = s_i q'_i` the rows are `A_ci s_i`; each is brought to unit length, since coordinates and constraints may
-//! have any size. [`ConstrainedMotion::motion`] solves `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, [`ConstrainedMotion::adjoint`] the same matrix for `[lam; nu]` with
-//! `[u; 0]` on the right.
+//! In scaled coordinates `q_i = s_i q'_i` the rows are `A_ci s_i`; each is scaled to unit length, since coordinates and constraints may
+//! have any size. [`ConstrainedMotion::motion`] solves `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, [`ConstrainedMotion::adjoint`] the same
+//! matrix for `[lam; nu]` with `[u; 0]` on the right.
 
 use crate::lagrangian::{Bordered, ReducedMass, independent_rows};
 use crate::linalg::{Violation, Workspace};
@@ -12,7 +12,7 @@ use crate::scalar::{Real, Scalar};
 pub(crate) struct ConstrainedMotion<S> {
     n: usize,
     m: usize,
-    /// Rows `A` at unit length, `(states, m, n)`, what they were multiplied with for it, and `-gamma` at that length, `(states, m)`.
+    /// Rows `A` at unit length, `(states, m, n)`, their scaling factors, and `-gamma` at that length, `(states, m)`.
     rows: Vec<S>,
     unit: Vec<S>,
     drift: Vec<S>,
@@ -29,7 +29,7 @@ impl<S> Default for ConstrainedMotion<S> {
 }
 
 impl<S: Scalar> ConstrainedMotion<S> {
-    /// Forgets all states; those that follow have `n` coordinates and `m` constraints.
+    /// Discards all states; the following ones have `n` coordinates and `m` constraints.
     pub fn clear(&mut self, (n, m): (usize, usize)) {
         (self.n, self.m) = (n, m);
         [&mut self.rows, &mut self.unit, &mut self.drift].into_iter().for_each(Vec::clear);
@@ -41,7 +41,7 @@ impl<S: Scalar> ConstrainedMotion<S> {
         for (gradient, &drift) in matrix.chunks_exact(self.n).zip(drift) {
             let scaled = gradient.iter().zip(scale).map(|(&a, &s)| a * s);
             let square = scaled.clone().fold(zero, |sum, a| sum + a * a);
-            // A row that vanishes is left to the solve, which finds it singular.
+            // A row of zeros is left for the solver, which finds it singular.
             let unit = if square > zero { Real::sqrt(square).recip() } else { <S as Real>::one() };
             self.rows.extend(scaled.map(|a| a * unit));
             self.unit.push(unit);
@@ -60,12 +60,12 @@ impl<S: Scalar> ConstrainedMotion<S> {
         self.bordered.solve(force, &self.drift, acceleration, &mut self.load, workspace)
     }
 
-    /// `lam` of a loss whose derivative by the accelerations is `u`, both `(states, n)`; `true` if no state failed.
+    /// `lam` for a loss whose derivative by the accelerations is `u`, both `(states, n)`; `true` if no state failed.
     pub fn adjoint(&mut self, u: &[S], lam: &mut [S], workspace: &mut Workspace<S>) -> bool {
         self.bordered.solve(u, &[], lam, &mut self.load, workspace)
     }
 
-    /// Appends what the last solve found below its accelerations, `-lambda` or `nu`, `(states, m)`, of the rows in physical units.
+    /// Appends the multipliers of the last solution, `-lambda` or `nu`, `(states, m)`, for the rows in physical units.
     pub fn loads(&self, out: &mut Vec<S>) {
         out.extend(self.load.iter().zip(&self.unit).map(|(&load, &unit)| load * unit));
     }

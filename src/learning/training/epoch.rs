@@ -23,7 +23,7 @@ pub struct Epoch {
     pub validation_loss: f64,
     /// Mean norm of the gradients before clipping.
     pub gradient_norm: f64,
-    /// States left out because they gave no finite acceleration.
+    /// States left out because they have no finite acceleration.
     pub left_out: usize,
     /// Steps skipped because they were not finite.
     pub skipped: usize,
@@ -52,7 +52,7 @@ impl Means {
     }
 }
 
-/// The failure of a state as its row and why there is no acceleration.
+/// Stores the failure of a state as its row and the reason.
 mod failure {
     use super::*;
 

@@ -1,8 +1,7 @@
 //! Full-batch refinement by limited-memory BFGS (Liu and Nocedal 1989) in double precision, hosted by argmin.
 //!
-//! Minimises loss plus penalty plus `weight_decay |w|^2 / 2` over all training states of the last phase. The loss is an
-//! absolute value, whose kinks end the line search sooner or later; what stands then is the iterate of the lowest
-//! validation loss, which may be the start.
+//! Minimises loss plus penalty plus `weight_decay |w|^2 / 2` over all training states of the last phase. The loss is an absolute value,
+//! whose kinks end the line search sooner or later; the result is the iterate with the lowest validation loss, which may be the start.
 
 use crate::configuration::Lbfgs;
 use crate::training::checkpoint::Clock;
@@ -17,7 +16,7 @@ use std::sync::atomic::Ordering;
 /// Evaluations an iteration may take on average; argmin's line searches know no limit.
 const EVALUATIONS: usize = 20;
 
-/// Start of a refinement, the same for every iteration.
+/// Start of a refinement, the same for all iterations.
 pub(crate) struct Start {
     /// Parameters to begin with.
     pub weights: Vec<f64>,
@@ -166,10 +165,10 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
     }
 }
 
-/// Polishes; a line search that fails ends it and what was reached stands.
+/// Polishes; a failed line search ends it and keeps the best iterate.
 ///
 /// # Errors
-/// The words of argmin if not even the start could be evaluated.
+/// The message of argmin if not even the start could be evaluated.
 pub(crate) fn lbfgs(settings: &Lbfgs, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Refined, String> {
     let Start { weights, validation_loss, last, clock, hooks } = start;
     let bounded = Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS) };

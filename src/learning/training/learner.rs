@@ -13,18 +13,18 @@ const LEFT_OUT: usize = 100;
 
 /// Loss of the validation samples.
 pub(crate) struct Validation {
-    /// As the history shows it.
+    /// The value shown in the history.
     pub loss: f64,
-    /// As parameters are compared by it, infinite if it means nothing.
+    /// The value by which parameters are compared, infinite if it is meaningless.
     pub cost: f64,
 }
 
-/// Samples that are learned from batch by batch, with whatever moves beside the weights.
+/// Samples for learning batch by batch, with any unknowns besides the weights.
 pub(crate) trait Learner<S: Scalar> {
     /// Evaluates batches.
     type Problem;
 
-    /// Moments of so many parameters before the first step of an update rule.
+    /// Moments of `parameters` weights before the first step of an update rule.
     fn moments(&mut self, problem: &mut Self::Problem, method: Method, parameters: usize) -> Moments<S>;
 
     /// Number of weights that decay; they come first among the parameters.
@@ -47,7 +47,7 @@ pub(crate) trait Learner<S: Scalar> {
     /// Loss, penalty and gradient of the samples `rows`; `gradient` is overwritten.
     fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S>;
 
-    /// After the weights were moved by the gradient of the last step.
+    /// Called after the gradient of the last step has changed the weights.
     fn follow(&mut self, problem: &mut Self::Problem) {
         let _ = problem;
     }
@@ -58,7 +58,7 @@ pub(crate) trait Learner<S: Scalar> {
         1
     }
 
-    /// Adds what the log should say of an epoch of so many batches.
+    /// Adds the learner's values for the log of an epoch of `batches` batches.
     fn record(&self, batches: f64, record: &mut KV) {
         let _ = (batches, record);
     }
@@ -66,14 +66,14 @@ pub(crate) trait Learner<S: Scalar> {
     /// Loss of the validation samples.
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation;
 
-    /// What moves beside the weights, after `seconds` of this phase, in bytes for a checkpoint; `None` if nothing does.
+    /// Unknowns besides the weights, after `seconds` of this phase, in bytes for a checkpoint; `None` if there are none.
     fn stored(&self, seconds: f64) -> Option<Vec<u8>> {
         let _ = seconds;
         None
     }
 }
 
-/// States of a [`TrainingProblem`]; nothing moves beside the weights.
+/// States of a [`TrainingProblem`]; only the weights are fitted.
 pub(crate) struct States<'a>(PhantomData<&'a ()>);
 
 impl States<'_> {
@@ -102,7 +102,7 @@ impl<'a, S: Scalar> Learner<S> for States<'a> {
         problem.step(weights, rows, gradient)
     }
 
-    /// A loss that is not finite, or that passes over more than a few of the states, is never the best.
+    /// A loss that is not finite, or leaves out more than a few of the states, is never the best.
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let report = problem.validation_loss(weights);
         let loss = report.loss.to_f64();

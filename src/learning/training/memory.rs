@@ -13,10 +13,10 @@ const VECTORS: u64 = 12;
 const COPIES: u64 = 4;
 /// Vectors of all weights in a checkpoint, as often as each is held while it is written.
 const CHECKPOINT: u64 = 6 * COPIES;
-/// Vectors of all weights that polishing holds beside two for each pair it remembers.
+/// Vectors of all weights that polishing holds in addition to two for each pair that it remembers.
 const LBFGS: u64 = 14;
 
-/// Bytes that a training takes at most, about; `None` if they cannot be counted in 64 bits.
+/// Approximate upper bound of the bytes that a training takes; `None` if they cannot be counted in 64 bits.
 ///
 /// With `s` bytes per number, `n` coordinates, `f` features, `w` units in all layers, `P` weights, `K` phases of `N`
 /// training states, `V` validation and `T` test states, it is the sum of

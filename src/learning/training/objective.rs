@@ -4,21 +4,20 @@
 //! derivative, the first `n` equal by construction: half the mean absolute error of the scaled accelerations. States of a
 //! dataset may have [weights](Dataset::with_weights).
 //!
-//! Accelerations solve `M a = g - c - dD/dv + Q` with the network's dissipation `D` and the data's known forces `Q`, if there
-//! are any. A loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as
-//! without friction, at the `a` that has it.
+//! Accelerations solve `M a = g - c - dD/dv + Q` with the network's dissipation `D` and the data's known forces `Q`, if there are any. A
+//! loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as without friction, but at
+//! the `a` with friction.
 //!
-//! States may be learned from by their [residuals of force](Dataset::with_force_residuals) `r = M a + c - g + dD/dv - Q` instead, at the
-//! accelerations of the data: a loss `l(r)` has the gradient of one on accelerations with `lam = -dl/dr` and this `a`, and nothing is
-//! solved for. Under constraints only that part of `r` counts which no force `A^T lambda` makes.
+//! States may instead have [residuals of force](Dataset::with_force_residuals) `r = M a + c - g + dD/dv - Q` at the accelerations of the
+//! data: a loss `l(r)` has the gradient of one on accelerations with `lam = -dl/dr` and this `a`, and nothing is solved for. Under
+//! constraints, only the part of `r` that no force `A^T lambda` explains counts.
 //!
-//! Under constraints, rows `A` of the data, they solve `[M A^T; A 0] [a; -lambda] = [g - c + Q; -gamma]`. With the same matrix and
-//! `[lam; nu]` for `[dl/da; 0]` the gradient is that without constraints, at this `lam` and this `a`: `A lam = 0`. Penalties act on
-//! the eigenvalues of `Z^T M Z`, `Z` a basis of the directions that the constraints leave, whichever penalty it is: across them no
-//! motion tells the mass matrix.
+//! Under constraints, rows `A` of the data, they solve `[M A^T; A 0] [a; -lambda] = [g - c + Q; -gamma]`. With the same matrix and `[lam;
+//! nu]` for `[dl/da; 0]` the gradient is that without constraints, at this `lam` and this `a`: `A lam = 0`. Every penalty acts on the
+//! eigenvalues of `Z^T M Z`, where `Z` is a basis of the null space of `A`: motion does not determine the mass matrix across it.
 //!
-//! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in
-//! their order: the same numbers on any number of threads.
+//! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in their order, so that
+//! the numbers do not depend on the number of threads.
 
 use crate::configuration::Penalty;
 use crate::data::Dataset;
@@ -41,13 +40,13 @@ pub(crate) const SHARDS: usize = 8;
 /// Outcome of a batch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatchReport<S> {
-    /// Loss in the paper's convention, without penalty, over the states that count; `NaN` if none does.
+    /// Loss in the paper's convention, without penalty, over the states that count; `NaN` if there are none.
     pub loss: S,
     /// Penalty with its weight.
     pub penalty: S,
     /// States whose penalty is active.
     pub penalised: usize,
-    /// States left out because they give no finite acceleration, or force if forces are learned from.
+    /// States left out because they have no finite acceleration, or no finite force if forces are learned from.
     pub left_out: usize,
     /// First state, by its row in the dataset, that failed, and why.
     pub failure: Option<MechanicsError>,
@@ -160,9 +159,10 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Loss and gradient of one chunk, with its penalty; leaves what a penalty that needs scales needs of all states.
+    /// Loss and gradient of one chunk, with its penalty; for a penalty that needs scales, stores its inputs for all states.
     ///
-    /// `weight` is `1/(2 n counted)`, with the states of the batch that count; the penalty comes with its weight over the batch.
+    /// `weight` is `1/(2 n counted)`, where `counted` is the number of states of the batch that count; the penalty has its weight over the
+    /// batch.
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
         self.gather(data, rows);
         self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
@@ -181,8 +181,7 @@ impl<S: Scalar> Shard<S> {
         self.violations.add_gradient(weights, false, &mut self.gradient);
     }
 
-    /// Evaluates the chunk once more with states that have an acceleration in place of those that have none; whether there is
-    /// one.
+    /// Evaluates the chunk again with valid states in place of those without an acceleration; `true` if there is a valid one.
     fn replace_failed(&mut self, weights: &[S]) -> bool {
         let n = self.scale.len();
         let failed = |row: &[S]| row[0].is_nan();
@@ -209,7 +208,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// The penalty and its gradient of the states in doubt, by the scales of the whole batch.
+    /// The penalty of the suspect states and its gradient, with the scales of the whole batch.
     fn add_suspects(
         &mut self,
         weights: &[S],
@@ -265,8 +264,8 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Solves for `right`, into the accelerations if it is what moves the states, or with `A x = 0` into the multipliers of the loss; `true`
-    /// if no state failed.
+    /// Solves for `right`: into the accelerations for the motion of the states, otherwise with `A x = 0` into the multipliers of the loss;
+    /// `true` if no state failed.
     fn solve_motion(&mut self, n: usize, m: usize, motion: bool) -> bool {
         let Self { held, right, workspace, .. } = self;
         let solution = if motion { &mut self.acceleration } else { &mut self.multiplier };
@@ -292,7 +291,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Absolute residuals of the states; leaves what [`add_directions`](Self::add_directions) takes.
+    /// Absolute residuals of the states; stores the input of [`add_directions`](Self::add_directions).
     fn add_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
         if data.force_scale().is_empty() {
             self.solve(data, rows);
@@ -331,7 +330,7 @@ impl<S: Scalar> Shard<S> {
                 right.fill(zero);
                 continue;
             }
-            // What the constraints can carry is no residual: no motion determines it.
+            // A force that the constraints can carry is not a residual: motion does not determine it.
             let carried = if held { self.held.carried(state, &units) } else { Vec::new() };
             right.iter_mut().zip(&units).for_each(|(r, &unit)| *r *= unit);
             take_out(right, &carried);
@@ -375,7 +374,7 @@ impl<S: Scalar> Shard<S> {
         self.directions.clear(true);
         if data.force_scale().is_empty() {
             self.multiplier.resize(self.right.len(), <S as Real>::zero());
-            // The same matrices failed before, and their rows are passed over.
+            // The same matrices failed before, and their rows are skipped.
             self.solve_motion(n, data.constraints(), false);
             self.directions.s.extend_from_slice(&self.multiplier);
         } else {
@@ -416,7 +415,7 @@ impl<S: Scalar> Shard<S> {
     }
 }
 
-/// The sign of a number; that of zero is zero.
+/// The sign of a number; 0 for zero.
 fn sign<S: Scalar>(x: S) -> S {
     let zero = <S as Real>::zero();
     if x > zero {
@@ -477,8 +476,8 @@ impl<S: Scalar> Objective<S> {
 
     /// Loss, penalty and gradient of the states `rows` of `data`; `gradient` is overwritten.
     ///
-    /// Differentiated is `loss + penalty` of the report: the loss is the mean over the states that are not left out, the
-    /// penalty over all of them.
+    /// The gradient is that of `loss + penalty` of the report: the loss is the mean over the states that are not left out, the penalty that
+    /// over all states.
     pub fn step(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
         let penalty = self.penalty;
         let lambda = S::of_f64(penalty.lambda()) / S::of_f64(rows.len() as f64);
@@ -498,8 +497,8 @@ impl<S: Scalar> Objective<S> {
         self.report(shards.len(), rows.len(), data.coordinates())
     }
 
-    /// Sums of loss, penalty and gradient over the batch, of which `counted` states are not left out; a penalty that needs
-    /// scales apart. Returns the number of shards.
+    /// Sums of loss, penalty and gradient over the batch, where `counted` states are not left out; a penalty that needs scales is separate.
+    /// Returns the number of shards.
     fn evaluate(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], counted: usize, lambda: S) -> usize {
         let weight = (S::of_f64(2.0 * data.coordinates() as f64) * S::of_f64(counted as f64)).recip();
         let penalty = self.penalty;

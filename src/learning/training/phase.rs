@@ -14,9 +14,9 @@ use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationSta
 pub enum StopReason {
     /// All epochs were run.
     Finished,
-    /// The interrupt flag was raised; the best model so far stands.
+    /// The interrupt flag was raised; the best model so far is kept.
     Interrupted,
-    /// A step failed; the best model so far stands.
+    /// A step failed; the best model so far is kept.
     Failed(StepError),
 }
 
@@ -24,7 +24,7 @@ pub enum StopReason {
 pub(crate) struct Epochs<S: Scalar, L: Learner<S>> {
     /// Problem that was learned from; nothing if argmin lost it.
     pub problem: Option<L::Problem>,
-    /// State that moved beside the weights.
+    /// State of the unknowns besides the weights.
     pub learner: L,
     /// One row per epoch.
     pub history: Vec<Epoch>,
@@ -49,11 +49,11 @@ impl<I: State> Observe<I> for Log {
     }
 }
 
-/// Runs all epochs of a solver from `weights`, or those that are left of the run `in_progress`, on a thread of its pool: to
-/// hand work from there to the pool wakes nobody up.
+/// Runs all epochs of a solver from `weights`, or the remaining ones of the run `in_progress`, on a thread of its pool: handing work from
+/// there to the pool wakes no thread.
 ///
 /// # Errors
-/// The words of argmin.
+/// The message of argmin.
 pub(crate) fn run_epochs<S: Scalar, L: Learner<S, Problem: Send> + Send>(
     mut solver: EpochSolver<S, L>,
     mut problem: L::Problem,

@@ -9,9 +9,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Problem of an argmin run: a network's parameters, its training states and its validation states.
 ///
-/// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among
-/// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's or of
-/// your own takes it; what goes by batches calls [`TrainingProblem::step`], and [`Moments::update`] with its gradients.
+/// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among them, and the
+/// gradient is its derivative; a line search that needs both at one point costs one evaluation. Every solver of argmin, or your own,
+/// accepts it; a batch method calls [`TrainingProblem::step`], and [`Moments::update`] with its gradients.
 pub struct TrainingProblem<'a, S> {
     evaluator: Mutex<Evaluator<S>>,
     training: &'a Dataset<S>,
@@ -19,7 +19,7 @@ pub struct TrainingProblem<'a, S> {
     weight_decay: f64,
 }
 
-/// The objective, and what it found at the last point asked for.
+/// The objective, and its result at the last point.
 struct Evaluator<S> {
     objective: Objective<S>,
     rows: Vec<u32>,
@@ -33,7 +33,7 @@ pub(crate) struct Evaluated<S> {
     pub at: Vec<S>,
     pub cost: S,
     pub gradient: Vec<S>,
-    /// Nothing if there is no point yet, or its cost is not finite.
+    /// `None` if there is no point yet, or its cost is not finite.
     pub report: Option<BatchReport<S>>,
 }
 

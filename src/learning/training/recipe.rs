@@ -9,7 +9,7 @@ use crate::training::solver::Hooks;
 use crate::training::trainer::{Trained, TrainingError, train};
 use thiserror::Error;
 
-/// A trained network with what led to it.
+/// A trained network with its system and history.
 #[derive(Debug)]
 pub struct TrainingResult<S> {
     /// The system it learned from.

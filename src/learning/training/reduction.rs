@@ -1,4 +1,4 @@
-//! Sums over the shards of a batch in their order: the same numbers on any number of threads.
+//! Sums over the shards of a batch in order, so that the numbers do not depend on the number of threads.
 
 use crate::scalar::Scalar;
 use rayon::prelude::*;

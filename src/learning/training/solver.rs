@@ -1,7 +1,7 @@
 //! Learning by batches as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 //!
-//! The parameters argmin sees are those that are validated (averaged, if averaging is on); the solver keeps the weights
-//! that move, their moments, the order of the data and the random state, which a checkpoint can hold between any two steps.
+//! argmin sees the validated parameters (averaged, if averaging is on); the solver keeps the current weights, their moments, the order of
+//! the data and the random state, which a checkpoint can store between any two steps.
 
 use crate::configuration::{OnFailure, Optimizer, Phase};
 use crate::lagrangian::MechanicsError;
@@ -110,7 +110,7 @@ pub(crate) struct EpochSolver<S, L> {
     optimizer: Optimizer,
     rates: LearningRateSchedule,
     phase_number: usize,
-    /// Epochs before those of its history.
+    /// Epochs before those in its history.
     epochs_before: usize,
     optimizer_state: OptimizerState<S>,
     /// `true` if this run was resumed.
@@ -124,11 +124,11 @@ pub(crate) struct EpochSolver<S, L> {
     writer: Option<CheckpointWriter<S>>,
 }
 
-/// The checkpoint writer, and what went before this phase.
+/// The checkpoint writer, and everything before this phase.
 pub(crate) struct CheckpointWriter<S> {
     pub(crate) checkpoints: Arc<CheckpointManager>,
     pub(crate) outcome: Outcome<S>,
-    /// Seconds of what went before, where this run's clock does not count them.
+    /// Seconds before this phase, if this run's clock does not include them.
     pub(crate) seconds: Option<f64>,
 }
 
@@ -138,11 +138,11 @@ pub(crate) struct Run<S> {
     pub phase_number: usize,
     /// Epochs before this phase.
     pub epoch: usize,
-    /// Those of them that belong to another history.
+    /// Those that belong to another history.
     pub epochs_before: usize,
     /// Steps before this phase.
     pub step: usize,
-    /// Steps of all phases, if there are others.
+    /// Steps of all phases, if there are other phases.
     pub steps: Option<usize>,
     /// Time since training began.
     pub clock: Clock,
@@ -152,7 +152,7 @@ pub(crate) struct Run<S> {
     pub writer: Option<CheckpointWriter<S>>,
 }
 
-/// Samples of a step: no more than there are, at least one.
+/// Samples of a step: at least one, at most all.
 fn batch(optimizer: &Optimizer, samples: usize) -> usize {
     optimizer.batch.min(samples).max(1)
 }
@@ -219,7 +219,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         self.clock.seconds()
     }
 
-    /// Its rows, why it stopped, if a step failed, and what moved beside the weights.
+    /// Its history, the failed step if there was one, and the learner.
     pub(crate) fn finish(self) -> (Vec<Epoch>, Option<StepError>, L) {
         (self.history, self.stopped, self.learner)
     }

@@ -1,4 +1,4 @@
-//! Runs the phases of a training and gathers what came out.
+//! Runs the phases of a training and collects the results.
 
 use crate::configuration::Penalty;
 use crate::configuration::{Config, ConfigError};
@@ -41,8 +41,7 @@ pub struct Trained<S> {
 }
 
 impl<S: Scalar> Trained<S> {
-    /// The end of this training as a checkpoint holds it, for what continues from there, such as
-    /// [`shooting::resume`](crate::shooting::resume).
+    /// The end of this training as a checkpoint, to continue from, as with [`shooting::resume`](crate::shooting::resume).
     #[doc(hidden)]
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
         let outcome = Outcome {
@@ -84,7 +83,7 @@ pub enum TrainingError {
     NothingLearned(Option<StepError>),
 }
 
-/// Where a training keeps its checkpoints and what it continues from.
+/// Where a training keeps its checkpoints, and the checkpoint that it continues from.
 pub struct ResumeOptions<S> {
     /// Checkpoint writer, if enabled.
     pub checkpoints: Option<Arc<CheckpointManager>>,
@@ -109,12 +108,12 @@ pub fn train<S: Scalar>(
     resume(config, architecture, penalty, data, threads, hooks, ResumeOptions { checkpoints: None, start: None })
 }
 
-/// [`train`] with checkpoints, and from one: the result is that of a training that was never stopped, but for the times.
+/// [`train`] with checkpoints and resuming: the result equals that of a training that was never stopped, except for the times.
 ///
-/// A checkpoint must be of the same configuration and data, which [`CheckpointManager::restore`] sees to.
+/// A checkpoint must be of the same configuration and data, which [`CheckpointManager::restore`] ensures.
 ///
 /// # Errors
-/// As [`train`].
+/// Those of [`train`].
 pub fn resume<S: Scalar>(
     config: &Config,
     architecture: &Architecture,
@@ -143,7 +142,7 @@ pub fn resume<S: Scalar>(
     });
     let clock = Clock::after(seconds);
     let mut stop = StopReason::Finished;
-    // Then this training is over, and its checkpoint is that of what came after it.
+    // Then this training is over, and its checkpoint belongs to the next stage.
     let shooting = in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some());
     for (number, (phase, training)) in pairs().enumerate().skip(outcome.phases) {
         let problem = TrainingProblem::new(objective(), training, &data.validation, config.optimizer.weight_decay);
@@ -219,9 +218,9 @@ fn in_double<S: Scalar>(data: &Dataset<S>) -> Cow<'_, Dataset<f64>> {
     (data as &dyn Any).downcast_ref().map_or_else(|| Cow::Owned(data.cast()), Cow::Borrowed)
 }
 
-/// Runs one phase, from its beginning or from where it was; adds what it came to and says why it ended.
+/// Runs one phase, from its beginning or from its checkpoint; adds its results and returns why it ended.
 ///
-/// Its best parameters stand if they beat those of the phases before.
+/// Its best parameters are kept if they beat those of earlier phases.
 fn run_phase<'a, S: Scalar>(
     problem: TrainingProblem<'a, S>,
     solver: EpochSolver<S, States<'a>>,

@@ -8,12 +8,12 @@ use crate::tape::{Depth, MixedDirections, STATES};
 /// States whose mass matrices have a penalty, and the directions of its gradient.
 pub(crate) struct Violations<S> {
     model: Model<S>,
-    /// Made when there is a violation for the first time.
+    /// Created at the first violation.
     dynamics: Option<Dynamics<S>>,
     q: Vec<S>,
     v: Vec<S>,
     directions: MixedDirections<S>,
-    /// Those of the states under way.
+    /// Directions of the current states.
     chunk: MixedDirections<S>,
     /// Penalties with their weights.
     pub penalty: Sum<S>,
@@ -35,7 +35,7 @@ impl<S: Scalar> Violations<S> {
         }
     }
 
-    /// Forgets what was counted.
+    /// Resets the sums.
     pub fn reset(&mut self) {
         (self.penalty, self.count) = (Sum::default(), 0);
         self.q.clear();
@@ -59,7 +59,7 @@ impl<S: Scalar> Violations<S> {
         }
     }
 
-    /// Adds the gradients of what is kept, to the last one if `all`, or else in full chunks.
+    /// Adds the gradients of the stored states: all of them if `all`, otherwise only full chunks.
     pub fn add_gradient(&mut self, weights: &[S], all: bool, gradient: &mut [S]) {
         let width = STATES * self.model.coordinates();
         while self.q.len() >= width || (all && !self.q.is_empty()) {

@@ -189,7 +189,7 @@ impl File<'_> {
         Ok(used)
     }
 
-    /// The unit that the description gives a column.
+    /// The unit of a column according to the description.
     fn unit(&self, asked: &str, used: &Used) -> Option<&str> {
         let units = || self.columns.units.iter();
         let exact = units().find(|(column, _)| column == asked);
@@ -227,7 +227,7 @@ impl File<'_> {
         }
     }
 
-    /// The column called `t` or `time`, the one of a trajectory's number first.
+    /// The column called `t` or `time`, preferably the one with the trajectory's number.
     fn usual_time(&self, number: Option<&str>) -> Result<&str, Problem> {
         let headings = || self.headings.iter().flatten();
         let taken = |name: &str| self.columns.used().any(|(_, other)| is_same(other, name));

@@ -5,7 +5,7 @@ use crate::recording::{Columns, DataError};
 use crate::storage::open_regular;
 use std::path::Path;
 
-/// Most columns of which each is read on its own, if some do not hold numbers.
+/// Largest number of columns that are read one by one if some contain no numbers.
 const MOST: usize = 256;
 
 /// The columns of a file in its order.
@@ -34,7 +34,7 @@ impl RawTable {
     }
 
     fn of(path: &Path, named: Option<&[String]>) -> Result<Self, Problem> {
-        // One sample a second: no column needs to be the time.
+        // One sample per second, so that no column needs to be the time.
         let asked = |coords: &[String]| Columns {
             coords: coords.to_vec(),
             rate: Some(1.0),
@@ -59,7 +59,7 @@ impl RawTable {
                 .map(|name| rows(path, &asked(std::slice::from_ref(name))).map_err(|problem| problem.to_string()))
                 .collect(),
         };
-        // Columns that lack readings do not stand beside the others.
+        // Columns that lack readings are not compared with the others.
         let most = numbers.iter().flatten().map(Vec::len).max().unwrap_or(0);
         let beside = |column: Result<Vec<f64>, String>| {
             column.and_then(|own| match most - own.len() {

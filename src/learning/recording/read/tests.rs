@@ -333,7 +333,7 @@ fn archives_that_promise_too_much_are_refused_unread() {
     // 70 MB of zeros in 70 kB.
     let bomb = refusal(deflated(&[("q.npy", zeros(9_000_000)), ("r.npy", zeros(1))]), &rate);
     assert!(bomb.contains("more than 100 times as many"), "{bomb}");
-    // Fewer are taken, and so is what is not used.
+    // Fewer are accepted, and so are unused ones.
     assert!(read(deflated(&[("q.npy", zeros(4_000)), ("r.npy", zeros(9_000_000))]), &rate).is_ok());
     // A table whose columns follow each other, packed.
     let columns: Vec<f64> = (0..60).map(|k| f64::from(k % 20) + f64::from(k / 20) * 100.0).collect();
@@ -341,7 +341,7 @@ fn archives_that_promise_too_much_are_refused_unread() {
     let numbered = Columns { time: Some("1".into()), ..coordinates("3,2") };
     let reading = read(deflated(&[("a.npy", table)]), &numbered).unwrap();
     assert_eq!(reading.recording.tracks[0].q[6..8], [203.0, 103.0]);
-    // One bit of the packed numbers.
+    // One flipped bit of the packed numbers.
     let mut broken = deflated(&[("q.npy", npy("'<f8'", false, "(100,)", &bytes(&[1.5; 100], f64::to_le_bytes)))]);
     let at = broken.len() / 3;
     broken[at] ^= 4;

@@ -19,9 +19,8 @@ pub enum Separator {
 }
 
 impl Separator {
-    /// The separator of a line: the first of `;`, `,`, tab and `|` that stands outside of double quotes, or blanks
-    /// between words. A comma is none if other separators stand between what commas separate, or if blanks stand between numbers
-    /// with decimal commas.
+    /// The separator of a line: the first of `;`, `,`, tab and `|` that stands outside of double quotes, or blanks between words. A comma
+    /// is not the separator if another separator divides the line differently, or if blanks separate numbers with decimal commas.
     pub fn of(line: &str) -> Self {
         let outside: String =
             line.split('"').enumerate().map(|(k, part)| if k % 2 == 0 { part } else { "q" }).collect();
@@ -85,7 +84,7 @@ pub(crate) fn with_point(text: &str) -> Option<f64> {
     std::str::from_utf8(plain).ok()?.parse().ok()
 }
 
-/// The byte that ends the lines of a text that begins so: LF (with a CR before it or not), or CR alone where there is no LF.
+/// The byte that ends the lines of a text with this beginning: LF (with or without a CR before it), or CR alone if there is no LF.
 pub fn line_end(beginning: &[u8]) -> u8 {
     if beginning.contains(&b'\r') && !beginning.contains(&b'\n') { b'\r' } else { b'\n' }
 }
@@ -126,7 +125,7 @@ pub fn comment(line: &[u8]) -> Option<&[u8]> {
     })
 }
 
-/// The names of columns that the last comment above the numbers gives, if it gives as many as there are columns.
+/// The names of columns in the last comment above the numbers, if it has one for every column.
 pub fn names_in(comment: &str, width: usize) -> Option<Vec<String>> {
     let names: Vec<&str> = split(comment, Separator::of(comment));
     let good = names.len() == width && names.iter().all(|name| !name.is_empty() && name.parse::<f64>().is_err());
@@ -135,7 +134,7 @@ pub fn names_in(comment: &str, width: usize) -> Option<Vec<String>> {
 
 /// The fields of a line of text without the spaces and quotes around them.
 pub fn split(line: &str, separator: Separator) -> Vec<&str> {
-    // A separator is one byte of ASCII: what stands between two of them is text as the line is.
+    // A separator is one ASCII byte, so a field between two of them is valid text if the line is.
     separator.fields(line.as_bytes()).map(|field| unquoted(std::str::from_utf8(field).unwrap_or_default())).collect()
 }
 

@@ -129,19 +129,19 @@ fn units_of_headers_are_taken_and_names_are_plain() {
         assert!((track.times[1] - 2.5e-4).abs() < 1e-18 && (track.q[1] - 0.25_f64.to_radians()).abs() < 1e-15);
         assert_eq!((reading.time.as_deref(), reading.coordinate_units()), (Some("t"), vec!["rad".to_string()]));
     }
-    // Units of the description count more; the factor 1 says SI.
+    // Units of the description take precedence; the factor 1 means SI.
     let (units, given) = (list("arm_angle"), |unit: &str| vec![("arm_angle".to_string(), unit.to_string())]);
     let reading = read(&text, &Columns { units: given("1"), ..coordinates("arm_angle") }).unwrap();
     assert_eq!((reading.recording.tracks[0].q[1], reading.recording.coordinates.clone()), (0.25, units));
     assert!(!reading.formats[0].units.contains_key("arm_angle") && reading.formats[0].units["t"] == "ms");
-    // A unit that is not known matters only where it is used.
+    // An unknown unit matters only where it is used.
     let odd = rows("t,x [parsec]", ",", ".", "");
     assert!(refusal(&odd, &coordinates("x")).contains("column x: unknown unit \"parsec\""));
     let known = Columns { units: vec![("x".into(), "km".into())], ..coordinates("x") };
     assert_eq!(read(&odd, &known).unwrap().recording.tracks[0].q[0], 1250.0);
     assert!(read(rows("x,Time [fortnight]", ",", ".", ""), &Columns { rate: Some(1.0), ..coordinates("x") }).is_ok());
     assert!(refusal(rows("t,x [cm]", ",", ".", ""), &coordinates("x [mm]")).contains("missing coordinate"));
-    // A unit of the time that is called otherwise has no silent effect.
+    // A unit given for a time column of another name is not silently ignored.
     let other = Columns { units: vec![("t".into(), "ms".into())], ..coordinates("x") };
     assert!(refusal(rows("time,x", ",", ".", ""), &other).contains("the time is the column time"));
     let time = Columns { units: vec![("Time".into(), "ms".into())], ..coordinates("x") };
@@ -174,7 +174,7 @@ fn missing_readings_leave_out_rows_or_are_marked() {
     let reading = read(&file, &coordinates("q1,q2")).unwrap();
     assert_eq!((reading.incomplete, reading.recording.samples(), reading.missing.len()), (4, 36, 0));
     assert_eq!(reading.bridged.rows, 4);
-    // Columns that are not asked for may lack anything.
+    // Columns that were not requested may lack anything.
     assert_eq!(read(&file, &coordinates("q2")).unwrap().incomplete, 2);
     // Who follows whole trajectories takes the other readings of such rows.
     let whole = Columns { whole: true, ..coordinates("q1,q2") };
@@ -185,7 +185,7 @@ fn missing_readings_leave_out_rows_or_are_marked() {
     assert_eq!(marked, [4, 10]);
     let (a, b) = (full.recording.tracks[0].q[2], full.recording.tracks[0].q[8]);
     assert!((track.q[4] - (a + (b - a) / 3.0)).abs() < 1e-12, "{:?}", &track.q[..12]);
-    // An angle goes on from its last reading.
+    // An angle continues from its last reading.
     let turns =
         |k: usize| if k % 3 == 1 { String::new() } else { (k as f64 * 1.3 % std::f64::consts::TAU).to_string() };
     let rows: String = (0..30).map(|k| format!("{k},{},{k}\n", turns(k))).collect();

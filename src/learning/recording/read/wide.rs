@@ -9,9 +9,9 @@ use super::number::Numbers;
 pub struct Lane<'a> {
     /// What it has become.
     pub builder: Builder<'a>,
-    /// Used numbers of the row that is read.
+    /// Used numbers of the current row.
     pub values: Vec<f64>,
-    /// First row behind its beginning in which it has no numbers.
+    /// First row after its beginning without numbers.
     empty: Option<u64>,
 }
 
@@ -22,7 +22,7 @@ impl<'a> Lane<'a> {
         Self { builder, values, empty: None }
     }
 
-    /// Reads its numbers among the fields of a row; a row in which all its fields but the time are empty is none of its own.
+    /// Reads its numbers from the fields of a row; a row in which all its fields except the time are empty is skipped.
     pub fn take(
         &mut self,
         fields: &[&[u8]],
@@ -39,7 +39,7 @@ impl<'a> Lane<'a> {
             return Ok(());
         }
         if let (Some(row), false) = (self.empty, selection.timed) {
-            // Without times nothing says how long such a gap is.
+            // Without times the length of such a gap is unknown.
             let column = own.first().map(|used| used.name.clone()).unwrap_or_default();
             return Err(Problem::Field { row, column, found: String::new() });
         }

@@ -12,7 +12,7 @@ pub const MARK: &str = "xl/workbook.xml";
 /// Most rows and columns of a sheet, which are Excel's own.
 const ROWS: usize = 1 << 20;
 const COLUMNS: usize = 1 << 14;
-/// Most bytes of the text that is made of it.
+/// Largest size in bytes of the text that it is converted to.
 const BYTES: usize = 1 << 28;
 
 /// The cells of the first sheet, separated by tabs, every row on the line of its number.
@@ -105,7 +105,7 @@ impl Cells {
             ("row", true, _) => {
                 let row = tag.attribute("r").map_or(Some(self.row + 1), |text| text.parse().ok());
                 let row = row.filter(|row| *row > self.row && *row <= ROWS).ok_or_else(damaged)?;
-                // Rows that are left out are blank lines.
+                // Missing rows become blank lines.
                 self.lines.extend(std::iter::repeat_n('\n', row - self.row - 1));
                 self.row = row;
             }
@@ -127,7 +127,7 @@ impl Cells {
         Ok(())
     }
 
-    /// Keeps the value of a cell: a number as it is, a text in quotes.
+    /// Keeps the value of a cell: a number unchanged, a text in quotes.
     fn end_cell(&mut self) -> Result<(), Problem> {
         let mut value = std::mem::take(&mut self.value);
         if self.kind == "s" {

@@ -6,7 +6,7 @@ use std::io::{BufRead, Read};
 /// Longest text or tag in bytes.
 const LONGEST: u64 = 1 << 20;
 
-/// A tag and what stands before it.
+/// A tag and the text before it.
 #[derive(Debug, Default)]
 pub struct Tag {
     /// Text between the tag before and this one, escapes resolved.
@@ -67,7 +67,7 @@ pub fn next(input: &mut impl BufRead) -> Result<Option<Tag>, Problem> {
     }
 }
 
-/// A workbook that is none.
+/// The error for an invalid workbook.
 pub fn damaged() -> Problem {
     Problem::Array("an incomplete or damaged workbook".to_string())
 }

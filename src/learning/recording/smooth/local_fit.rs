@@ -7,7 +7,7 @@
 
 use crate::linalg::dot;
 
-/// Weights of one window for one degree `d`, and what two more degrees would change.
+/// Weights of one window for one degree `d`, and their change with two more degrees.
 #[derive(Clone, Debug, Default)]
 pub struct LocalFit {
     /// Rows of position, velocity and acceleration, `(3, measurements)`: positions of the window, then, if they were

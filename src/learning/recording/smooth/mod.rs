@@ -22,17 +22,17 @@ use signal::{Fits, Signal};
 use thiserror::Error;
 use window::best;
 
-/// Settings of derivatives; those that are not given are chosen from the data.
+/// Settings of derivatives; settings that are not given are chosen from the data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothOptions {
     /// Degree of the polynomials, 2 to 8.
     pub degree: usize,
-    /// Length of the windows in samples, odd and at least `degree + 3`, the same everywhere; if not given, a usual length is chosen per
-    /// coordinate, and windows follow pace and noise along every trajectory.
+    /// Length of the windows in samples, odd and at least `degree + 3`, the same everywhere; if not given, a typical length is chosen per
+    /// coordinate, and windows adapt to speed and noise along every trajectory.
     pub window: Option<usize>,
     /// Standard deviations of the positions' noise, one per coordinate; estimated if not given.
     pub noise: Option<Vec<f64>>,
-    /// `true` if measured velocities take part where there are any.
+    /// `true` to use measured velocities if there are any.
     pub velocities: bool,
 }
 
@@ -83,13 +83,13 @@ pub struct Chosen {
     pub noise: Noise,
     /// Noise of its velocities, if they take part.
     pub velocity_noise: Option<Noise>,
-    /// The window and what it gives.
+    /// The window and the quality of its derivatives.
     pub quality: Quality,
     /// Length of the window in s.
     pub seconds: f64,
 }
 
-/// Smoothing of a recording: a usual window per coordinate, the same in seconds for all trajectories.
+/// Smoothing of a recording: a typical window per coordinate, the same in seconds for all trajectories.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoothing {
     /// Degree of the polynomials.
@@ -105,14 +105,14 @@ pub struct Smoothing {
     /// `true` if windows are shorter than usual where the motion is fast, and longer where it is slow; `false` if their length
     /// was given.
     pub varying: bool,
-    /// Degrees by which polynomials are above `degree`, for which the windows were chosen.
+    /// Degrees added to `degree`, for which the windows were chosen.
     pub more: usize,
 }
 
 /// A trajectory with derivatives; all arrays are `(samples, n)`.
 ///
-/// The errors are of two kinds: standard errors say what noise does, biases what the polynomial cannot follow. Their
-/// root of the sum of squares is the error to expect.
+/// The errors are of two kinds: standard errors come from noise, biases from motion that the polynomial cannot follow. Their root sum of
+/// squares is the expected error.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Smoothed {
     /// Times in s, `(samples)`.
@@ -137,7 +137,7 @@ pub struct Smoothed {
     pub a_bias: Vec<f64>,
     /// Last sample that each state is estimated from, `(samples)`.
     pub reach: Vec<usize>,
-    /// Samples left and right that have no full window around them: their errors are several times larger.
+    /// Numbers of samples at the left and right end without a full window: their errors are several times larger.
     pub margins: [usize; 2],
     /// Samples between the margins that a gap leaves without enough others around them, ascending.
     pub lacking: Vec<usize>,
@@ -224,7 +224,7 @@ impl Smoothing {
         Ok(Self { degree: options.degree, coordinates, own, step, varying: options.window.is_none(), more: 0 })
     }
 
-    /// The same windows with polynomials of two more degrees: more noise and hardly any bias, for what is averaged afterwards.
+    /// The same windows with polynomials of two more degrees: more noise and hardly any bias, for results that are averaged afterwards.
     pub(crate) fn sharper(&self) -> Self {
         Self { more: self.more + 2, ..self.clone() }
     }
@@ -261,8 +261,8 @@ impl Smoothing {
         self.coordinates.iter().map(|chosen| chosen.quality.window).max().unwrap_or(0)
     }
 
-    /// Samples between two parts of a trajectory that no window reaches from one to the other, and samples that each part
-    /// needs: a full window and one more, or what a polynomial takes where nothing has to be derived.
+    /// Samples between two parts of a trajectory such that no window reaches from one to the other, and samples that each part needs: a
+    /// full window and one more, or enough for a polynomial if nothing has to be derived.
     pub(crate) fn apart(&self, recording: &Recording) -> (usize, usize) {
         let window = self.window();
         let derived = !(recording.has_velocities() && recording.has_accelerations());
@@ -324,15 +324,15 @@ impl Smoothing {
     }
 }
 
-/// Noise of positions over noise of velocities in s, within what steps of time can distinguish.
+/// Noise of positions over noise of velocities in s, within the range that the time step can resolve.
 fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
     let ratio = (position.sigma / velocity.sigma).clamp(1e-6 * step, 1e6 * step);
     ratio.is_finite().then_some(ratio)
 }
 
-/// Variance of an acceleration near a gap, over that of a full window of equal steps, above which the sample is not learned from.
+/// Largest variance of an acceleration near a gap, over that of a full window of equal steps, for the sample to be used for learning.
 const LACKING: f64 = 4.0;
-/// Time that a window spans near a gap, over its length, above which its sample is not learned from.
+/// Largest time span of a window near a gap, over its length, for its sample to be used for learning.
 const STRETCHED: f64 = 1.5;
 
 /// Fills column `signal.i` of all arrays by a window of its own around every sample.

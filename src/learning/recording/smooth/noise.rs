@@ -70,14 +70,14 @@ pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, 
     }
 }
 
-/// Contrasts to either side that tell the noise at a sample.
+/// Number of contrasts on either side that determine the noise at a sample.
 const NEAR: usize = 64;
-/// Noise at a sample over that of the recording, or the inverse, up to which they are taken to be the same.
+/// Ratio of the noise at a sample to that of the recording, or its inverse, up to which they count as equal.
 const SAME: f64 = 2.0;
 
-/// Noise at every sample of column `i` of a trajectory: where the contrasts near it say plainly another than that of the recording, theirs.
+/// Noise at every sample of column `i` of a trajectory: from the nearby contrasts if these clearly differ from the noise of the recording.
 ///
-/// Squares above those of four standard deviations count as four: a spoilt sample is not noise.
+/// Contrasts beyond four standard deviations count as four: a bad sample is not noise.
 pub(super) fn along((times, x): (&[f64], &[f64]), regular: bool, (n, i): (usize, usize), noise: Noise) -> Vec<f64> {
     let Noise { sigma, order, resolved } = noise;
     let count = times.len().saturating_sub(order);

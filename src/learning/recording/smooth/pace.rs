@@ -8,14 +8,14 @@ const LEAST: i32 = -12;
 const MOST: i32 = 9;
 /// Places per window at which it is tried.
 const PLACES: usize = 8;
-/// Squared error of the usual windows up to which they are kept, over the least.
+/// Typical windows are kept up to this squared error, relative to the smallest.
 const TOLERATED: f64 = 2.0;
 /// Squared error over the least at which longer windows are no longer tried.
 const HOPELESS: f64 = 4.0;
 
 /// A coordinate of one trajectory with its usual window in samples.
 pub struct Typical<'a> {
-    /// The coordinate of the trajectory, the only one of the signal.
+    /// The coordinate on this trajectory, the only one of the signal.
     pub signal: Signal<'a>,
     /// Noise at every sample.
     pub sigmas: Vec<f64>,
@@ -42,7 +42,7 @@ struct Tried {
 const INDEPENDENT: f64 = 4.0;
 
 impl Tried {
-    /// Tries a window at places spread evenly; none if it is as long as half the trajectory, or too short for the polynomials.
+    /// Tries a window at evenly spaced samples; none if it is longer than half the trajectory, or too short for the polynomials.
     fn new(Typical { signal, sigmas, .. }: &Typical<'_>, window: usize) -> Option<Self> {
         let track = &signal.tracks[0];
         if window > track.len() / 2 || window < signal.degree + 3 {
@@ -91,7 +91,7 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
     let told: Vec<&Typical<'_>> = usual.iter().filter(|u| u.error > 0.0).collect();
     let tried: Vec<(i32, Vec<Tried>)> = (LEAST..=MOST)
         .filter_map(|k| {
-            // Windows below the least are the least: tried once, by the longest such factor.
+            // Windows are clamped to the smallest one; factors for which all would be below it are skipped.
             let shortest = told.iter().any(|u| scaled(u.window, f64::from(k)) >= least);
             let all = told.iter().map(|u| Tried::new(u, of(u, f64::from(k)))).collect::<Option<Vec<_>>>()?;
             (shortest && !all.is_empty()).then_some((k, all))
@@ -104,7 +104,7 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
             let place = sample / grid;
             let reach = of(first, f64::from(chosen[place])) / (4 * grid);
             let near = &chosen[place.saturating_sub(reach)..(place + reach + 1).min(chosen.len())];
-            // In halves, so that few different windows are computed.
+            // In half steps, so that few different windows are computed.
             (2.0 * near.iter().map(|&k| f64::from(k)).sum::<f64>() / near.len() as f64).round() as i32
         })
         .collect();

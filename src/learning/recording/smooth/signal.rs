@@ -28,7 +28,7 @@ pub struct Signal<'a> {
     pub degree: usize,
 }
 
-/// Fits of local polynomials on one trajectory: those of full windows of equal steps are the same everywhere, and computed once.
+/// Fits of local polynomials on one trajectory. Full windows of equal steps have the same fit everywhere, which is computed once.
 #[derive(Default)]
 pub struct Fits {
     centred: BTreeMap<usize, LocalFit>,
@@ -75,7 +75,7 @@ impl Signal<'_> {
         fit.variance[2]
     }
 
-    /// Position, velocity and acceleration at sample `at` by the rows of the samples `range`.
+    /// Position, velocity and acceleration at sample `at`, from the rows of the samples `range`.
     pub fn estimate(&self, fit: &LocalFit, track: usize, range: Range<usize>, at: usize) -> Estimate {
         let track = &self.tracks[track];
         let part = range.start * self.n..range.end * self.n;
@@ -85,9 +85,9 @@ impl Signal<'_> {
         fit.apply(track.q[at * self.n + self.i], q, v.iter().skip(self.i).step_by(self.n).map(|v| ratio * v))
     }
 
-    /// Calls `visit` with the estimate of a window and its rows at places spread evenly over all trajectories, with the number of the
-    /// trajectory and the sample; windows that would reach over an end are moved inwards. `length` is the window of a trajectory. Gives
-    /// the share of the places on trajectories long enough.
+    /// Calls `visit` with the estimate of a window and its rows at evenly spaced samples of all trajectories, with the number of the
+    /// trajectory and the sample; windows that would cross an end are moved inwards. `length` is the window of a trajectory. Returns the
+    /// share of the samples on trajectories that are long enough.
     pub fn visit(
         &self,
         length: impl Fn(usize) -> usize,
@@ -96,8 +96,8 @@ impl Signal<'_> {
         self.visit_places(length, |fit, range, track, at| visit(&self.estimate(fit, track, range, at), fit, track, at))
     }
 
-    /// Calls `visit` with the rows at the places of [`visit`](Self::visit), the samples of their window, the trajectory and the sample: rows
-    /// that serve every coordinate with the same ratio of noises.
+    /// Calls `visit` with the rows at the samples of [`visit`](Self::visit), the samples of their window, the trajectory and the sample:
+    /// the rows are shared by all coordinates with the same ratio of noises.
     pub fn visit_places(
         &self,
         length: impl Fn(usize) -> usize,

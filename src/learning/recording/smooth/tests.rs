@@ -41,7 +41,7 @@ fn acceleration_error(smoothed: &Smoothed, i: usize) -> f64 {
     (sum / inside.len() as f64).sqrt()
 }
 
-/// Errors of position, velocity and acceleration of coordinate `i` over those said, with or without bias, inside.
+/// Errors of position, velocity and acceleration of coordinate `i` over the stated ones, with or without bias, away from the ends.
 fn relative_errors(smoothed: &Smoothed, i: usize, biased: f64) -> [Vec<f64>; 3] {
     let arrays = [
         (&smoothed.q, &smoothed.q_error, &smoothed.q_bias),
@@ -86,7 +86,7 @@ fn errors_are_as_large_as_said() {
                 let actual = acceleration_error(&smoothed, i);
                 assert!((actual / said - 1.0).abs() < 0.25, "{sigma} {i}: error {actual}, said {said}");
                 for (k, relative) in relative_errors(&smoothed, i, biased).iter().enumerate() {
-                    // Errors of neighbours are correlated over about half a window: so many are independent.
+                    // Errors are correlated over about half a window, which gives the number of independent ones.
                     let independent = 2.0 * relative.len() as f64 / chosen.quality.window as f64;
                     let scatter = |p: f64| 3.0 * (p * (1.0 - p) / independent).sqrt() + 0.01;
                     let (one, two) = (within(relative, 1.0), within(relative, 2.0));

@@ -6,16 +6,16 @@ use serde::Serialize;
 
 /// Longest window that is tried, in samples.
 const LONGEST: usize = 2001;
-/// Standard deviations by which an estimated squared bias lies above 0 that noise does not explain.
+/// Standard deviations by which an estimated squared bias must exceed 0 to be more than noise.
 const SURE: f64 = 3.0;
 
-/// The part of an estimated squared bias that is no chance: `square` is the mean over so many independent places of a number's square less
-/// the variance that noise gives it.
+/// The significant part of an estimated squared bias: `square` is the mean, over `independent` samples, of the square of a number less its
+/// noise variance.
 fn sure(square: f64, variance: f64, independent: f64) -> f64 {
     (square - SURE * variance * (2.0 / independent.max(1.0)).sqrt()).max(0.0)
 }
 
-/// Squared error of the usual window up to which a trajectory keeps it, over its least.
+/// Largest squared error of the typical window, over the smallest, at which a trajectory keeps it.
 const TOLERATED: f64 = 2.0;
 
 /// Errors of one coordinate's derivatives, on average over the recording.
@@ -23,14 +23,14 @@ const TOLERATED: f64 = 2.0;
 pub struct Quality {
     /// Length of the window in samples, odd.
     pub window: usize,
-    /// Standard errors of position, velocity and acceleration: what noise does to them.
+    /// Standard errors of position, velocity and acceleration due to noise.
     pub error: [f64; 3],
-    /// Their bias, root mean square: what the polynomial cannot follow. Estimated by two more degrees, which miss part of
-    /// short bursts themselves: there it is too small, for a chaotic double pendulum by a third.
+    /// Their root mean square bias, from motion that the polynomial cannot follow. It is estimated with two more degrees, which also miss
+    /// part of short bursts and make it too small there, for a chaotic double pendulum by a third.
     pub bias: [f64; 3],
     /// Root mean square of velocity, error taken out.
     pub velocity: f64,
-    /// The same about its mean: of a drift with oscillations the velocity of these.
+    /// Root mean square velocity about its mean: for a drift with oscillations, the velocity of the oscillations.
     pub velocity_deviation: f64,
     /// Root mean square of acceleration, error taken out.
     pub acceleration: f64,
@@ -49,12 +49,12 @@ impl Quality {
     }
 }
 
-/// Squared bias that longer windows have at least: the most that a shorter one surely has.
+/// Lower bound of the squared bias of longer windows: the largest significant one of a shorter window.
 ///
 /// The bias of a window is estimated by the change that two more degrees make. Over several periods of the motion polynomials of either
-/// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it. Bias grows from
-/// window to window until then. What falls with the error itself, before that has plainly risen, was none: noise that neighbours share, such as
-/// an encoder's marks.
+/// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it. Until then bias grows
+/// from window to window. A supposed bias that falls with the error itself, before that has clearly risen, was correlated noise, such as an
+/// encoder's marks.
 #[derive(Clone, Copy, Debug)]
 pub struct Missed {
     square: f64,
@@ -62,7 +62,7 @@ pub struct Missed {
     risen: bool,
 }
 
-/// Squared error over the least that is plainly a rise.
+/// Squared error, over the smallest, that is clearly a rise.
 const RISEN: f64 = 1.5;
 
 impl Default for Missed {
@@ -83,7 +83,7 @@ impl Missed {
         square.max(self.square)
     }
 
-    /// `true` if this squared error says that what was missed so far was noise.
+    /// `true` if this squared error shows that the bias so far was noise.
     fn falls(&self, error: f64) -> bool {
         !self.risen && error <= self.least
     }
@@ -106,10 +106,10 @@ struct Accelerations {
 }
 
 impl Accelerations {
-    /// Squared bias that a longer window surely has beside this one: the mean square of their difference at the same samples. Its variance
-    /// is the difference of the two, because the longer window has the least variance of all that its samples allow (Hausman, Econometrica
-    /// 46 (1978) 1251). Over several periods of the motion, where changes of degree say nothing, the difference is all that is missed (a
-    /// comparison as that of Lepski, Theory of Probability and its Applications 35 (1991) 454).
+    /// Significant additional squared bias of a longer window compared with this one: the mean square of their difference at the same
+    /// samples. Its variance is the difference of the two, because the longer window has the least variance of all that its samples allow
+    /// (Hausman, Econometrica 46 (1978) 1251). Over several periods of the motion, where changes of degree say nothing, the difference is
+    /// the whole bias (a comparison like that of Lepski, Theory of Probability and its Applications 35 (1991) 454).
     fn missed_by(&self, longer: &Self) -> f64 {
         let same = longer.values.iter().filter_map(|(at, a)| {
             let k = self.values.binary_search_by_key(at, |(at, _)| *at).ok()?;
@@ -124,12 +124,12 @@ impl Accelerations {
     }
 }
 
-/// Errors of accelerations on one trajectory by the length of the window.
+/// Errors of the accelerations on one trajectory, by window.
 #[derive(Clone, Debug, Default)]
 struct Course {
-    /// Squared errors, bias and variance together, of the windows in their order; of those too long for the trajectory none.
+    /// Squared errors, bias and variance together, of the windows in order, up to the longest that fits the trajectory.
     squares: Vec<f64>,
-    /// The part of each that is not due to chance.
+    /// The significant part of each.
     sure: Vec<f64>,
     /// Number of the window with the least error, up to where the error is plainly larger again.
     best: usize,
@@ -159,12 +159,12 @@ impl Course {
         }
     }
 
-    /// Squared error of window number `k`; of one too long for the trajectory that of the longest.
+    /// Squared error of window number `k`; for one too long for the trajectory, that of the longest.
     fn at(&self, k: usize) -> Option<f64> {
         self.squares.get(k).or(self.squares.last()).copied()
     }
 
-    /// Number of its own window beside the usual one.
+    /// Number of its own window, given the typical one.
     fn own(&self, usual: usize) -> usize {
         match (self.squares.get(self.best), self.sure.get(usual).or(self.sure.last())) {
             (Some(least), Some(kept)) if *kept > TOLERATED * least => self.best,
@@ -191,8 +191,8 @@ fn lengths(least: usize, longest: usize) -> impl Iterator<Item = usize> {
 }
 
 impl Signal<'_> {
-    /// Errors by windows, the same in all trajectories or one for each: variance from the noise; squared bias from the change by two more
-    /// degrees, whose own variance is taken out. None if fewer than half the samples are on trajectories long enough.
+    /// Errors by windows, the same in all trajectories or one for each: variance from the noise; squared bias from the change with two more
+    /// degrees, less its own variance. None if fewer than half the samples are on trajectories that are long enough.
     pub fn quality(&self, window: usize, own: &[usize]) -> Option<Quality> {
         let noise = self.sigma * self.sigma;
         let (mut variance, mut bias) = ([0.0; 3], [0.0; 3]);
@@ -224,7 +224,7 @@ impl Signal<'_> {
 /// The search for the windows of one signal.
 struct Search<'a> {
     signal: &'a Signal<'a>,
-    /// Those of the trajectories.
+    /// Errors of the trajectories.
     courses: Vec<Course>,
     /// Number of the usual window with the least mean so far, and that mean.
     best: Option<(usize, f64)>,
@@ -237,8 +237,8 @@ impl<'a> Search<'a> {
         Self { signal, courses, best: None, past: false }
     }
 
-    /// Adds the errors of a window to the courses of the trajectories that are long enough, of signals whose noises have the same ratio;
-    /// `false` if these hold fewer than half the samples.
+    /// Adds the errors of a window on the trajectories that are long enough, for signals with the same ratio of noises; `false` if these
+    /// trajectories have fewer than half the samples.
     fn try_window(window: usize, alike: &mut [&mut Self]) -> bool {
         let Some(signal) = alike.first().map(|search| search.signal) else { return true };
         let mut sums: Vec<_> =
@@ -268,7 +268,7 @@ impl<'a> Search<'a> {
             for ((sums, course), track) in tracks.filter(|((s, _), _)| s.count > 0.0) {
                 let [variance, square, change] =
                     [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
-                // Neighbours within half a window have the same errors.
+                // Samples within half a window share their errors.
                 let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
                 course.push(Accelerations { values: sums.values, variance, independent }, square - change, change);
             }
@@ -287,7 +287,7 @@ impl<'a> Search<'a> {
         sum / count
     }
 
-    /// Compares window number `k`, the last that was tried, with those before.
+    /// Compares window number `k`, the last one tried, with those before.
     fn compare(&mut self, k: usize) {
         let mean = self.mean(k);
         self.past |= self.best.is_some_and(|(_, least)| mean > least + PAST.ln());
@@ -296,18 +296,19 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// `true` if no window is of use beyond so many.
+    /// `true` if no window beyond this number is useful.
     fn has_ended(&self, windows: usize) -> bool {
         self.past && self.courses.iter().all(|course| course.past || course.squares.len() < windows)
     }
 }
 
-/// The usual window of every signal and that of each of its trajectories. The signals have the same trajectories.
+/// The typical window of every signal and the window of each of its trajectories. The signals have the same trajectories.
 ///
-/// On a trajectory the best window is the one whose accelerations have the least squared bias and variance together (Fan and Gijbels,
-/// Local Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree). The usual one has the least mean over
-/// the samples of the logarithm of that error: by its size itself a single fast trajectory would choose for all. Trajectories on which
-/// the usual one is nearly as good as their best keep it. None if fewer than half the samples are on trajectories long enough.
+/// On a trajectory the best window is the one whose accelerations have the least squared bias and variance together (Fan and Gijbels, Local
+/// Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree). The typical window minimises the mean of the
+/// logarithm of that error over the samples; with the error itself, a single fast trajectory would decide for all. Trajectories on which
+/// the typical window is nearly as good as their best keep it. None if fewer than half the samples are on trajectories that are long
+/// enough.
 pub fn best(signals: &[Signal<'_>]) -> Option<Vec<(usize, Vec<usize>)>> {
     let Signal { tracks, degree, .. } = signals.first()?;
     let longest = tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);

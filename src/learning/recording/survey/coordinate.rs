@@ -6,7 +6,7 @@ use crate::recording::smooth::{Chosen, Smoothing};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Range, noise and motion of one coordinate, and what smoothing would make of it; in SI.
+/// Range, noise and motion of one coordinate, and the errors after smoothing; in SI.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CoordinateSurvey {
     /// Its name.
@@ -25,12 +25,12 @@ pub struct CoordinateSurvey {
     pub noise_resolved: bool,
     /// Root mean square of the velocity.
     pub velocity: f64,
-    /// The same about its mean.
+    /// Root mean square velocity about its mean.
     pub velocity_deviation: f64,
     /// Root mean square of the acceleration.
     pub acceleration: f64,
-    /// Period in s of the fast part of the motion, `2 pi rms(v) / rms(a)`, the velocity about its mean: of a sine its period, of many frequencies that
-    /// of their root mean square in the velocity's spectrum (Rice 1944).
+    /// Period in s of the fast part of the motion, `2 pi rms(v) / rms(a)`, with the velocity about its mean: the period of a sine, or the
+    /// period at the root mean square frequency of the velocity's spectrum (Rice 1944).
     pub period: f64,
     /// Samples in such a period.
     pub samples_per_period: f64,
@@ -42,7 +42,7 @@ pub struct CoordinateSurvey {
     pub velocity_error: f64,
     /// Error of accelerations by smoothing.
     pub acceleration_error: f64,
-    /// The latter over the size of the accelerations.
+    /// The error of the accelerations over their size.
     pub acceleration_error_relative: f64,
     /// Measured velocities against derivatives of positions.
     pub measured_velocity: Option<Consistency>,
@@ -55,7 +55,7 @@ pub struct CoordinateSurvey {
 }
 
 impl CoordinateSurvey {
-    /// Looks at coordinate `i`. `alone` smooths positions only, `planned` is what a fit would do.
+    /// Surveys coordinate `i`. `alone` smooths positions only, `planned` is the smoothing of a fit.
     pub fn new(recording: &Recording, i: usize, alone: &Smoothing, planned: &Chosen) -> Self {
         let n = recording.n();
         let values = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n).copied());

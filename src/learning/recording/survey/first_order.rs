@@ -1,5 +1,5 @@
-//! Whether velocities follow from positions and other measured quantities, as of tanks and circuits: such motion is of first order, and no
-//! Lagrangian with a kinetic energy describes it.
+//! Whether velocities are functions of positions and other measured quantities, as for tanks and circuits: such motion is of first order,
+//! and no Lagrangian with a kinetic energy describes it.
 
 use crate::linalg::{Workspace, dot, solve_symmetric};
 use crate::names::percent;
@@ -11,8 +11,8 @@ const DEGREE: usize = 3;
 const TERMS: usize = 84;
 /// Windows for each term, at least.
 const WINDOWS_PER_TERM: usize = 8;
-/// Largest residual of a velocity over its error; share of its spread up to which the polynomial may miss it all the same, and from which on it
-/// says nothing; and how many times larger the residual is at least without the other quantities, of one velocity. By the rates of
+/// Largest residual of a velocity over its error; residual, over its spread, that is always accepted, and the one from which on the fit
+/// says nothing; and the smallest factor by which, for one velocity, the residual grows without the other quantities. Chosen by
 /// `lnn-studies rates --part check`.
 const AT_ERROR: f64 = 2.5;
 const MISSED: f64 = 0.03;
@@ -23,7 +23,8 @@ const MEASURED: f64 = 0.995;
 /// Windows in half the width of one, and their largest number.
 const OVERLAP: f64 = 8.0;
 const MOST_WINDOWS: f64 = 4000.0;
-/// Windows in a block, of which every other one is fitted, and the smallest number of windows, half a block to try the fit on.
+/// Number of windows in a block, where every other block is fitted, and the smallest number of windows, which leaves half a block to test
+/// the fit.
 const BLOCK: usize = 64;
 const LEAST_WINDOWS: usize = BLOCK + BLOCK / 2;
 /// Ridge, over the largest entry of the normal matrix.
@@ -42,19 +43,19 @@ struct Window {
     weights: Vec<f64>,
 }
 
-/// A velocity by windows, and what it may follow from.
+/// The mean velocities of a coordinate and the quantities that may determine them.
 struct Equation<'a> {
     /// Positions, then other quantities, of every trajectory, `(samples, columns)`, with mean 0 and standard deviation 1.
     known: &'a [Vec<f64>],
     columns: usize,
     windows: Vec<Window>,
     velocities: Vec<f64>,
-    /// Standard error of the velocities by the noise of the positions.
+    /// Standard error of the velocities due to the noise of the positions.
     error: f64,
 }
 
 impl<'a> Equation<'a> {
-    /// That of coordinate `i`, with windows as wide as those that smooth it.
+    /// The equation of coordinate `i`, with windows as wide as those that smooth it.
     fn of(reading: &LoadedRecording, known: &'a [Vec<f64>], columns: usize, smoothing: &Smoothing, i: usize) -> Self {
         let (recording, n, chosen) = (&reading.recording, reading.recording.n(), &smoothing.coordinates[i]);
         let half = chosen.seconds / 2.0;
@@ -112,8 +113,8 @@ impl<'a> Equation<'a> {
         spread > 0.0 && dot(&centred, &self.velocities).abs() < MEASURED * column.len() as f64 * spread * self.spread()
     }
 
-    /// Root mean square over the odd blocks of what a polynomial of some of the known columns leaves of the velocity, fitted to the even ones:
-    /// that of the best degree. `None` of too few windows.
+    /// Root mean square residual of the velocity on the odd blocks, for a polynomial of some of the known columns fitted to the even
+    /// blocks; the best degree counts. `None` for too few windows.
     fn residual(&self, of: &[usize]) -> Option<f64> {
         let least = |count: usize| (WINDOWS_PER_TERM * count).max(LEAST_WINDOWS);
         let enough = |count: usize| count <= TERMS && self.windows.len() >= least(count);
@@ -123,7 +124,7 @@ impl<'a> Equation<'a> {
         degrees().filter_map(|degree| self.residual_of(&rows, terms(of.len(), degree))).min_by(f64::total_cmp)
     }
 
-    /// The same by the first so many functions of every row.
+    /// The same residual with the first `count` functions of every row.
     fn residual_of(&self, rows: &[Vec<f64>], count: usize) -> Option<f64> {
         let rows = || rows.iter().map(|row| &row[..count]).zip(&self.velocities).enumerate();
         let block = |odd: usize| rows().filter(move |(at, _)| at / BLOCK % 2 == odd).map(|(_, row)| row);
@@ -160,21 +161,22 @@ fn standardised(reading: &LoadedRecording, inputs: usize) -> Vec<Vec<f64>> {
     known
 }
 
-/// Number of monomials of so many variables up to a degree.
+/// Number of monomials of `variables` variables up to a degree.
 fn terms(variables: usize, degree: usize) -> usize {
     (1..=degree).fold(1, |product, k| product * (variables + k) / k)
 }
 
 /// All monomials of some variables up to a degree, the lower degrees first.
 struct Monomials {
-    /// Of each but the first, which is 1: another one, and the variable it is multiplied by.
+    /// For each monomial except the first, which is 1: the monomial and the variable whose product it is.
     factors: Vec<(usize, usize)>,
 }
 
 impl Monomials {
     fn new(variables: usize, degree: usize) -> Self {
         let mut factors = Vec::new();
-        // Those of the last degree with the last of their variables, from which on others join them: each comes once.
+        // Monomials of the last degree, each with its last variable: only that and later variables multiply it, so that each product occurs
+        // once.
         let mut last = vec![(0, 0)];
         for _ in 0..degree {
             let mut next = Vec::new();
@@ -193,7 +195,7 @@ impl Monomials {
         self.factors.len() + 1
     }
 
-    /// Their values, `(count)`, of which the first is 1.
+    /// Their values, `(count)`; the first is 1.
     fn write(&self, x: impl Fn(usize) -> f64, values: &mut [f64]) {
         for (k, (at, variable)) in self.factors.iter().enumerate() {
             values[k + 1] = values[*at] * x(*variable);
@@ -211,9 +213,11 @@ pub struct FirstOrder {
 }
 
 impl FirstOrder {
-    /// Whether the velocities follow, to within their errors, from the positions and the inputs of a recording, and not from the positions alone.
+    /// Whether the velocities are determined, to within their errors, by the positions and the inputs of a recording, and not by the
+    /// positions alone.
     ///
-    /// A polynomial of both is fitted to one half of the motion and tried on the other half. Motion that repeats itself under one tone looks alike.
+    /// A polynomial of both is fitted to one half of the motion and tested on the other half. Periodic motion under a single tone also
+    /// looks like this.
     pub(super) fn of(reading: &LoadedRecording, smoothing: &Smoothing) -> Option<Self> {
         let (recording, n, inputs) = (&reading.recording, reading.recording.n(), &reading.columns.input);
         if inputs.is_empty() || reading.inputs.len() != recording.tracks.len() || recording.is_driven() {
@@ -229,7 +233,7 @@ impl FirstOrder {
         for equation in &equations {
             let spread = equation.spread();
             let (with, without) = (equation.residual(&all)?, equation.residual(&positions)?);
-            // A window that holds no sample has no mean.
+            // A window without samples has no mean.
             if with.is_nan() || with > (AT_ERROR * equation.error).max(MISSED * spread).min(OF_SPREAD * spread) {
                 return None;
             }
@@ -302,11 +306,11 @@ mod tests {
             assert!(tanks.as_ref().is_some_and(|found| found.from == ["u"]), "{noise} {tanks:?}");
             assert_eq!(found(masses, [0.0; 4]), None, "{noise}");
         }
-        // Without the other quantity nothing can be said.
+        // Without the other quantity no statement is possible.
         let mut short = recorded(tanks, [3.0, 2.0, 0.0, 0.0], 1e-3);
         let unknown = LoadedRecording::from(short.recording.clone());
         assert_eq!(first_order(&unknown), None);
-        // Nor where no block is left to try a polynomial on.
+        // Nor if no block is left to test a polynomial on.
         let track = &mut short.recording.tracks[0];
         track.times.truncate(200);
         track.q.truncate(400);

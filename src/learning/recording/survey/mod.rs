@@ -31,7 +31,7 @@ pub struct SurveyOptions {
     pub smooth: SmoothOptions,
     /// Share of the samples that would be held out for validation.
     pub validation: f64,
-    /// Seed of the choice of what is held out.
+    /// Seed for the choice of held-out data.
     pub seed: u64,
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct TrajectorySurvey {
     pub start: f64,
     /// Last time in s.
     pub end: f64,
-    /// Samples per second, by the usual step.
+    /// Samples per second, from the typical step.
     pub rate: f64,
     /// Standard deviation of the steps that are not gaps over the usual one.
     pub jitter: f64,
@@ -67,7 +67,7 @@ pub(crate) struct TrajectorySurvey {
 pub struct Survey {
     /// Files read.
     pub files: usize,
-    /// What was recognised in every file.
+    /// The format that was recognised in every file.
     pub formats: Vec<FileFacts>,
     /// Column of time; none if times follow from the rate.
     pub time: Option<String>,
@@ -99,13 +99,13 @@ pub struct Survey {
     pub targets: Targets,
     /// Part that would be held out for validation.
     pub(crate) held_out: Option<HeldOut>,
-    /// The same in words.
+    /// The held-out data in words.
     pub held_out_text: String,
     /// `true` if a coordinate leaves uniform motion by more than its noise.
     pub accelerates: bool,
     /// Names of coordinates that stand still: nothing can be learned about them.
     pub motionless: Vec<String>,
-    /// Names of coordinates that follow from those before them: nothing can be learned of both.
+    /// Names of coordinates that are functions of those before them: nothing can be learned about both.
     pub copies: Vec<String>,
     /// Whether the motion is of first order, if other columns were read.
     pub first_order: Option<FirstOrder>,
@@ -113,8 +113,7 @@ pub struct Survey {
     pub warnings: Vec<String>,
 }
 
-/// Smoothings: of positions alone, and as a fit takes it. Measured velocities take part only where they
-/// are what they are called.
+/// Smoothings of positions alone, and as a fit uses them. Measured velocities take part only if they agree with the positions.
 ///
 /// # Errors
 /// [`SmoothError`] for options out of range, or trajectories too short for any window.

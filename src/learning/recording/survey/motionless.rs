@@ -34,10 +34,10 @@ impl std::fmt::Display for Stillness {
 
 /// About how many samples are examined for copies; more are thinned evenly.
 const SAMPLES: usize = 1 << 16;
-/// Part of a coordinate's motion below which what others leave of it is rounding.
+/// Part of a coordinate's motion below which the remainder after subtracting others is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Coordinates that stand still, and those that are copies of others, in their order, each with the way it is so.
+/// Coordinates that stand still, and copies of others, in order, each with the reason.
 pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let alone = |i: usize| standing(recording, i, smoothing);
     let mut found: Vec<_> = (0..recording.n()).filter_map(|i| Some((i, alone(i)?))).collect();
@@ -54,7 +54,7 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
     let values = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
     let tracks = 0..recording.tracks.len();
     let first = tracks.clone().find_map(|track| values(track).next())?;
-    // A coordinate that differs from one trajectory to the next moves in none of them.
+    // A coordinate that changes only from one trajectory to the next does not move.
     if tracks.clone().all(|track| values(track).all(|x| Some(x) == values(track).next())) {
         return Some(Stillness::Constant(*first));
     }
@@ -86,7 +86,7 @@ fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for track in &recording.tracks {
         let samples = track.len() as f64;
-        // From the first sample and from the mean of that, so that no constant leaves rounding.
+        // Relative to the first sample, then to the mean, so that a large constant causes no rounding.
         let centred = |values: Vec<f64>| {
             let first = values.first().copied().unwrap_or_default();
             let mean = values.iter().map(|x| (x - first) / samples).sum::<f64>();
@@ -102,8 +102,8 @@ fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
     (square / count).sqrt()
 }
 
-/// Those of the coordinates `moving` that are linear functions of the ones before them, the same in every trajectory but for a
-/// constant, to within the noise: the modified Gram-Schmidt process leaves nothing of them.
+/// Coordinates among `moving` that are, up to a constant per trajectory and within the noise, linear functions of those before them:
+/// modified Gram-Schmidt leaves nothing of them.
 fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let n = recording.n();
     let stride = recording.samples().div_ceil(SAMPLES).max(1);
@@ -115,13 +115,13 @@ fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec
         };
         recording.tracks.iter().flat_map(centred).collect()
     };
-    // By its size, so that no square overflows.
+    // Scaled by its largest value, so that no square overflows.
     let size = |values: &[f64]| {
         let most = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let mean = values.iter().map(|x| (x / most).powi(2)).sum::<f64>() / values.len() as f64;
         if most > 0.0 { most * mean.sqrt() } else { 0.0 }
     };
-    // What is left of a coordinate, over its size, and the coefficients of all coordinates in it.
+    // The remainder of a coordinate, over its size, and the coefficients of all coordinates in it.
     let mut kept: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
     let mut found = Vec::new();
     for &i in moving {
@@ -186,7 +186,7 @@ mod tests {
         // Rounding to three digits, whose pattern repeats.
         let rounded = |motion: fn(f64) -> f64| both(move |t| (1e3 * motion(t)).round() / 1e3, 0.0).1;
         assert!(rounded(|t| 0.3 + 0.71 * t) && !rounded(|t| 0.3 + 0.71 * t + 0.01 * t * t));
-        // Large noise hides no motion that is larger, and all that is much smaller.
+        // Large noise does not hide larger motion, but all motion that is much smaller.
         assert!(!uniform(|t| (3.0 * t).sin(), 0.5) && uniform(|t| 1e-5 * t * t, 1e-3));
     }
 

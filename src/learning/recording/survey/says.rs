@@ -18,7 +18,7 @@ fn short(x: f64) -> String {
 }
 
 impl Survey {
-    /// What was read: trajectories, coordinates, smoothing, suspicious places.
+    /// Describes what was read: trajectories, coordinates, smoothing, suspicious places.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         self.say_what_was_read(&mut findings);
@@ -129,7 +129,7 @@ impl Survey {
         self.say_what_is_missing(findings);
     }
 
-    /// Gaps and what was left out.
+    /// Describes gaps and left-out rows.
     fn say_what_is_missing(&self, findings: &mut Findings) {
         if self.duplicates > 0 {
             let rows = pluralize(self.duplicates, "row that repeats", "rows that repeat");
@@ -159,7 +159,7 @@ impl Survey {
 }
 
 impl FileFacts {
-    /// What was recognised in a file, beyond a text in UTF-8 that is separated by commas.
+    /// Describes the format of a file if it differs from UTF-8 text separated by commas.
     fn sentence(&self) -> Option<String> {
         let mut facts: Vec<String> = Vec::new();
         facts.extend((self.kind == FileKind::Xlsx).then(|| "the first sheet of a workbook".to_string()));
@@ -178,7 +178,7 @@ impl FileFacts {
     }
 }
 
-/// Number of entries beyond those that were shown.
+/// The number of entries that are not shown.
 fn more(all: usize, (one, many): (&str, &str)) -> Option<String> {
     let rest = all.checked_sub(ROWS).filter(|rest| *rest > 0)?;
     Some(format!("and {}", pluralize(rest, &format!("more {one}"), &format!("more {many}"))))

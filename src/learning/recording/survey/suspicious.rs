@@ -28,7 +28,7 @@ pub enum Kind {
     Jump,
     /// The velocity jumps, as in an impact.
     Kink,
-    /// The same value again and again while things move before and after.
+    /// The same value repeated although the motion continues before and after.
     Frozen,
 }
 
@@ -62,9 +62,9 @@ const PATTERNS: [(Kind, &[f64]); 3] = [
 
 /// All suspicions of coordinate `i`, the first of them in detail, and how many there are.
 ///
-/// Sixth differences, scaled to the noise of one sample, are noise alone where motion is smooth. Where one is beyond six
-/// standard deviations (robust, from their median) and its neighbours have the other sign (motion that is sampled too
-/// coarsely has the same), the pattern around it tells what happened. `row` is the row of a sample of a trajectory.
+/// Sixth differences, scaled to the noise of one sample, contain only noise where motion is smooth. Where one exceeds six standard
+/// deviations (robust, from their median) and its neighbours have the opposite sign (in coarsely sampled motion they have the same one),
+/// the pattern around it identifies the fault. `row` is the row of a sample of a trajectory.
 pub fn find(
     recording: &Recording,
     row: &dyn Fn(usize, usize) -> u64,
@@ -106,8 +106,7 @@ pub fn find(
     count
 }
 
-/// Contrasts of seven neighbours each, the first of them that of samples 0 to 6; 0 where a gap lies between them, over which the motion
-/// is no noise either.
+/// Contrasts of seven neighbours each, starting with samples 0 to 6; 0 across a gap, where motion would not look like noise.
 fn differences(times: &[f64], q: impl Fn(usize) -> f64, z: &mut Vec<f64>) {
     z.clear();
     let clock = Clock::of(times);
@@ -139,7 +138,7 @@ fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
             let product: f64 = part.iter().zip(pattern).map(|(x, p)| x / peak * p).sum();
             let square: f64 = pattern.iter().map(|p| p * p).sum();
             if product * product / square > best.0 {
-                // The first contrast of the pattern ends at the first sample that is off.
+                // The first contrast of the pattern ends at the first bad sample.
                 best = (product * product / square, kind, first + POINTS - 1, product / square * norm * peak);
             }
         }
@@ -152,7 +151,7 @@ fn frozen(samples: usize, q: impl Fn(usize) -> f64, sigma: f64, mut report: impl
     let step = |k: usize| (q(k) - q(k - 1)).abs();
     let stride = (samples >> 16).max(1);
     let grid = (1..samples).step_by(stride).map(step).filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
-    // A curve on a grid stands still in its turning points, but leaves them line by line.
+    // A curve on a grid rests at its turning points, but leaves them one grid line at a time.
     let jump = 6.0 * sigma + 3.0 * grid;
     let mut start = 0;
     for k in 1..=samples {
@@ -210,7 +209,7 @@ mod tests {
 
     #[test]
     fn grids_are_not_frozen() {
-        // Values on a grid of 0.05 stand still at every turning point.
+        // Values on a grid of 0.05 rest at every turning point.
         let found = survey(|_, x| (x / 0.05).round() * 0.05);
         assert!(found.iter().all(|(_, kind, _)| *kind != Kind::Frozen), "{found:?}");
     }

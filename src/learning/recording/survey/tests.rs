@@ -35,7 +35,7 @@ fn a_swing_is_described() {
     assert_eq!((&json["targets"], &json["tracks"][0]["samples"]), (&"smoothed".into(), &2000.into()));
 }
 
-/// A drift beside the oscillation belongs to the velocity, not to the period.
+/// A drift in addition to the oscillation affects the velocity, not the period.
 #[test]
 fn a_drifting_swing_has_the_root_mean_square_of_all_its_velocity() {
     let mut recording = swing(1e-4, 100.0, None);

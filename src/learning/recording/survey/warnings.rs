@@ -8,7 +8,7 @@ use crate::recording::smooth::Smoothing;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// Share of the rows at and above which those that are missing or left out are worth a warning.
+/// Share of the rows that are missing or left out at and above which a warning is due.
 const MANY: f64 = 0.01;
 
 /// One sentence each.
@@ -86,7 +86,7 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
 /// A measured derivative against the derivative of the positions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Consistency {
-    /// The measured one is so many times the computed one (least squares); 1 if all is well.
+    /// Least-squares ratio of the measured one to the computed one; 1 if they agree.
     pub factor: f64,
     /// Correlation of the two.
     pub correlation: f64,
@@ -95,13 +95,13 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// `true` if the two agree as far as they are known.
+    /// `true` if the two agree within their errors.
     pub fn holds(&self) -> bool {
         let doubt = 0.05 + 2.0 * self.uncertainty * self.uncertainty;
         (self.factor - 1.0).abs() <= doubt && self.correlation >= 0.9 - self.uncertainty
     }
 
-    /// A possible mistake, if the factor is that of a usual one.
+    /// A likely mistake, if the factor is one of the common ones.
     pub fn mistake(&self, step: f64) -> Option<&'static str> {
         let known = [
             (180.0 / PI, "degrees where radians are expected?"),
@@ -119,7 +119,7 @@ impl Consistency {
     }
 }
 
-/// Compares derivative 1 or 2 of coordinate `i` with what was measured.
+/// Compares the measured derivative 1 or 2 of coordinate `i` with the computed one.
 pub fn compare(recording: &Recording, i: usize, derivative: usize, smoothing: &Smoothing) -> Consistency {
     let n = recording.n();
     let (mut product, mut computed, mut measured) = (0.0, 0.0, 0.0);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 const CHECKPOINT: FileKind = FileKind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
 /// The only tensor: the state as serde writes it.
 const STATE: &str = "state";
-/// Counts above this are refused: no training reaches it, and adding to what passes cannot overflow.
+/// Larger counts are rejected: no training reaches them, and sums of smaller ones cannot overflow.
 const MOST: u64 = 1 << 52;
 
 /// Summary of a checkpoint, read without its state.
@@ -56,7 +56,7 @@ pub(crate) fn encode<S: Scalar>(
     pack(&CHECKPOINT, &header, vec![Tensor::bytes(STATE.to_string(), state)])
 }
 
-/// The description alone, of a file that is whole.
+/// Only the description, of an intact file.
 pub(crate) fn decode_header(bytes: &[u8]) -> Result<Header, ModelFileError> {
     unpack(&CHECKPOINT, bytes).map(|(header, _)| header)
 }
@@ -85,7 +85,7 @@ impl<S> Outcome<S> {
 }
 
 impl<S: Scalar> PhaseState<S> {
-    /// Checks that the parts fit each other and a network of so many `parameters`.
+    /// Checks that the parts fit each other and a network of `parameters` weights.
     fn check(&self, parameters: usize) -> Result<(), &'static str> {
         let OptimizerState { order, weights, moments, average, iteration, means, .. } = &self.optimizer_state;
         let counts = [

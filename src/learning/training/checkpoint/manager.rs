@@ -24,10 +24,9 @@ const COST: u32 = 100;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CheckpointInterval {
-    /// When so many epochs have ended since the last.
+    /// When this many epochs have ended since the last.
     Epochs(usize),
-    /// At the first step after so many seconds since the last, later if writing would take more than a hundredth of the
-    /// time.
+    /// At the first step after this many seconds since the last; later if writing would take more than a hundredth of the time.
     Seconds(f64),
 }
 
@@ -55,7 +54,7 @@ pub enum CheckpointError {
         /// The checkpoint's.
         saved: String,
     },
-    /// The states are not those of the checkpoint.
+    /// The states differ from those of the checkpoint.
     #[error("the checkpoint is of other data: {0}")]
     Data(String),
 }
@@ -107,7 +106,7 @@ impl CheckpointManager {
         }
     }
 
-    /// `true` if a checkpoint is due when so many epochs have been completed.
+    /// `true` if a checkpoint is due after this many completed epochs.
     pub(crate) fn is_due_after(&self, epochs: usize) -> bool {
         let last = self.state().last;
         match (self.every, last) {
@@ -116,8 +115,7 @@ impl CheckpointManager {
         }
     }
 
-    /// Writes a checkpoint; if that fails the previous one stands, training continues, and a
-    /// warning in the log tells.
+    /// Writes a checkpoint; if that fails, the previous one is kept, training continues, and the log has a warning.
     pub(crate) fn save<S: Scalar>(&self, seconds: f64, outcome: &Outcome<S>, in_progress: Option<&PhaseState<S>>) {
         let began = Instant::now();
         let mut state = self.state();
@@ -134,8 +132,8 @@ impl CheckpointManager {
         tracing::info!(epochs, cost = state.cost.as_secs_f64(), "checkpoint");
     }
 
-    /// The newest whole checkpoint of the same configuration and data, for a network of `parameters` weights and
-    /// phases over `states` states.
+    /// The newest intact checkpoint of the same configuration and data, for a network of `parameters` weights and phases over `states`
+    /// states.
     ///
     /// # Errors
     /// [`CheckpointError`].
@@ -177,12 +175,12 @@ impl CheckpointManager {
     }
 }
 
-/// Removes the checkpoints in a directory: the training has ended, or starts again.
+/// Removes the checkpoints in a directory, because the training has ended or starts again.
 ///
 /// # Errors
-/// That of the file system.
+/// An error of the file system.
 pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Result<()> {
-    // The newest last: while there is a checkpoint it is the newest.
+    // The newest comes last, so that a remaining checkpoint is always the newest.
     for name in [PREVIOUS, LATEST] {
         match files.remove(&directory.join(name)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
@@ -195,7 +193,7 @@ pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Resul
 /// The training whose checkpoint is in a directory.
 ///
 /// # Errors
-/// [`CheckpointError`] if there is none that is whole.
+/// [`CheckpointError`] if none is intact.
 pub fn saved(files: &dyn Files, directory: &Path) -> Result<Restored<Saved>, CheckpointError> {
     newest_whole(files, directory, |bytes| decode_header(bytes).map(Header::into_saved))
 }

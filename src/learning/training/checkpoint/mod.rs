@@ -1,13 +1,13 @@
 //! Checkpoints: everything a training needs to continue as if it had never stopped.
 //!
 //! A checkpoint is a safetensors file of the same make as a model file ([`container`](crate::storage::container)), metadata key
-//! `lnn-checkpoint`. Its description holds the configuration as text, checksums of the data, and the epochs and steps that are done. Its
-//! only tensor `state` is the [`Snapshot`] as serde writes it, numbers to the last bit in the precision of the training: the same state
-//! gives the same bytes.
+//! `lnn-checkpoint`. Its description contains the configuration as text, checksums of the data, and the completed epochs and steps. Its
+//! only tensor `state` is the [`Snapshot`] as serde writes it, with exact numbers in the precision of the training: the same state gives
+//! the same bytes.
 //!
-//! A phase is held to the step: the next batch of the epoch, the sums over its batches so far and the random generator are part of the
-//! state. What a learner moves beside the weights, as [multiple shooting](crate::shooting) the starts of its segments, it writes and
-//! reads itself. L-BFGS behind the phases has no state of its own: it begins again from their end.
+//! A phase is stored to the step: the next batch of the epoch, the sums over its batches so far and the random generator are part of the
+//! state. A learner that fits more than the weights, as [multiple shooting](crate::shooting) fits the starts of its segments, writes and
+//! reads that itself. L-BFGS after the phases has no state of its own: it restarts from their end.
 
 mod fingerprint;
 mod format;
@@ -54,11 +54,11 @@ impl<S: Scalar> Snapshot<S> {
 }
 
 impl<S> Snapshot<S> {
-    /// The beginning of a training from these weights, such as those of a model that learns on.
+    /// The beginning of a training from these weights, such as those of a model that is trained further.
     pub fn beginning_with(weights: Vec<S>) -> Self {
         Self { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     }
-    /// Steps taken so far; those of multiple shooting, while that is under way.
+    /// Steps taken so far; during multiple shooting, its steps.
     pub fn steps(&self) -> usize {
         self.in_progress.as_ref().map_or(self.outcome.steps, |in_progress| in_progress.optimizer_state.step)
     }
@@ -116,7 +116,7 @@ pub(crate) struct PhaseState<S> {
     pub best_loss: f64,
     /// The best epoch of the phase, counted from 0.
     pub best_epoch: u64,
-    /// State of the learner beside the weights, in its own bytes; `None` of a phase, where nothing moves beside them.
+    /// State of the learner besides the weights, in its own bytes; `None` if it has none, as in a phase.
     pub learner: Option<Vec<u8>>,
 }
 
@@ -177,7 +177,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts now, after so many seconds before it was resumed.
+    /// Starts now, after `before` seconds before it was resumed.
     pub fn after(before: f64) -> Self {
         Self { since: Instant::now(), before }
     }
