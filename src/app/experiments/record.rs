@@ -26,7 +26,7 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// Energy errors of the starts whose exact motion is regular, or of the others; without those of which it is not known.
+    /// Energy errors of the starts whose exact motion is regular, or of the chaotic ones; starts for which this is unknown are left out.
     fn energy_of(&self, regular: bool) -> impl Iterator<Item = f64> {
         let pairs = self.energy_errors.iter().zip(&self.stretching);
         pairs.filter_map(move |(error, stretching)| {
@@ -79,7 +79,7 @@ pub struct RunSpread {
 }
 
 impl RunSpread {
-    /// Of some values; `None` of none.
+    /// Statistics of some values; `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.into_iter().collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -111,9 +111,9 @@ pub struct Row {
     pub wrong_signature: Option<RunSpread>,
     /// Mean energy error over all starts.
     pub energy: Option<RunSpread>,
-    /// That over the starts whose exact motion is regular.
+    /// Energy errors over the starts whose exact motion is regular.
     pub regular_energy: Option<RunSpread>,
-    /// That over the starts whose exact motion is chaotic.
+    /// Energy errors over the starts whose exact motion is chaotic.
     pub chaotic_energy: Option<RunSpread>,
     /// Starts integrated to the end, of all.
     pub integrated: (usize, usize),
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!(gelu.reported.loss, Some(0.00738));
         assert_eq!((rows[1].runs, rows[1].failed, rows[1].loss), (1, 1, None));
         assert_eq!((rows[2].runs, rows[2].integrated), (0, (0, 0)));
-        // A record reads back from its file, also one that knows nothing of chaos.
+        // A record reads back from its file, even an older one without data on chaos.
         let text = serde_json::to_string(&results[0].1).unwrap();
         let field = ",\"stretching\":[4.0,40.0]";
         assert!(text.contains(field), "{text}");

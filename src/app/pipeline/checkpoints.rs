@@ -13,12 +13,12 @@ use std::sync::Arc;
 /// Place where a training begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Begin {
-    /// Its beginning; old checkpoints are removed.
+    /// From its beginning; old checkpoints are removed.
     #[default]
     Anew,
-    /// Its checkpoint, which must be there.
+    /// From its checkpoint, which must exist.
     Resume,
-    /// Its checkpoint if there is one that fits, its beginning if not.
+    /// From a matching checkpoint if there is one, otherwise from its beginning.
     Either,
 }
 
@@ -29,7 +29,7 @@ pub struct Checkpoints {
     directory: PathBuf,
     every: CheckpointInterval,
     begin: Begin,
-    /// Text that is kept in a checkpoint and must be the same when the training continues; the configuration if none.
+    /// Text that is kept in a checkpoint and must match when the training continues; by default the configuration.
     identity: Option<String>,
 }
 
@@ -49,13 +49,12 @@ impl Checkpoints {
         Self { files, directory, every, begin: Begin::Anew, identity: None }
     }
 
-    /// The same for a training that begins elsewhere.
+    /// Sets where the training begins.
     pub fn beginning(self, begin: Begin) -> Self {
         Self { begin, ..self }
     }
 
-    /// The same with a text that is kept in every checkpoint and must be the same when the training continues, instead of the
-    /// configuration.
+    /// Keeps this text in every checkpoint, instead of the configuration; it must match when the training continues.
     pub fn identified_by(self, text: String) -> Self {
         Self { identity: Some(text), ..self }
     }
@@ -77,7 +76,8 @@ impl Checkpoints {
     /// The writer of checkpoints of a command, and the checkpoint to continue from, if any, after old ones were removed.
     ///
     /// # Errors
-    /// [`PipelineError::Output`] if the directory cannot be written, [`PipelineError::Checkpoint`] for one that must be there and is not, or that is of another run.
+    /// [`PipelineError::Output`] if the directory cannot be written, [`PipelineError::Checkpoint`] if a required one is missing or belongs
+    /// to another run.
     pub(crate) fn open<S: Scalar>(
         &self,
         (command, config): (Command, &str),

@@ -1,4 +1,4 @@
-//! Pictures of a motion under constraints: on its surface, what holds it there, how far it strays.
+//! Pictures of a motion under constraints: the motion on its surface, the forces of constraint, and its distance from the constraints.
 
 use crate::lagrangian::{EulerLagrange, ManifoldRows, Request, Terms};
 use crate::report::{Figure, LinePlot, Series, Trace, figure, file_part, line_plot, trace_plot, with_unit};

@@ -33,7 +33,7 @@ pub struct Quantity {
 #[derive(Clone, Debug, Serialize)]
 pub struct Group {
     coordinates: Vec<String>,
-    /// `true` if the unit of its masses is known: that of the first coordinate, or by a force.
+    /// `true` if the unit of its masses is known: from the first coordinate, or from a force.
     unit_known: bool,
 }
 
@@ -44,11 +44,11 @@ pub struct Determined {
     determination: Vec<Quantity>,
     /// The unit of mass matrix, friction and energy: `SI` with known forces, else over the mean mass of a coordinate.
     unit: String,
-    /// Groups of coordinates that do not act on each other, where there are several: each has a factor of its own.
+    /// Groups of coordinates that do not act on each other, if there are several: each has its own factor.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     groups: Vec<Group>,
-    /// What the model misses of the accelerations of every coordinate beyond their expected error, over their size: of held-out
-    /// motion, of the learned one if nothing was held out. Empty where the model is not finite.
+    /// The model's residuals of the accelerations of every coordinate beyond their expected error, over their size: on held-out motion, or
+    /// on the training motion if nothing was held out. Empty if the model is not finite.
     misfit: BTreeMap<String, f64>,
     /// Share of the held-out states that lie outside of the learned ones.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,22 +67,22 @@ pub struct Determined {
     decay: Option<Decay>,
 }
 
-/// Largest misfit of a model whose loss of energy says anything of the motion.
+/// Largest misfit of a model whose loss of energy is meaningful for the motion.
 const MISFIT_OF_ENERGY: f64 = 0.5;
-/// Share of held-out states outside of the learned ones that is worth a remark.
+/// Share of held-out states outside the learned ones that is worth a remark.
 const OUTSIDE: f64 = 0.1;
-/// The same, at and above which held-out motion is another motion than the learned one and judges nothing.
+/// Such a share at and above which held-out motion differs from the learned motion and judges nothing.
 const MOSTLY: f64 = 0.5;
 /// Names of quantities and of statements about them.
 const ENERGY: &str = "rms E about its mean";
 const UNIT: &str = "the unit";
 const NOT: &str = "not";
 
-/// Half of the range over the size: up to which a quantity is said to be determined.
+/// Largest half-width of a range, over the size, at which a quantity counts as determined, in words.
 const WORDS: [(f64, &str); 3] = [(0.1, "well"), (0.5, "roughly"), (1.0, "poorly")];
 
 impl Quantity {
-    /// A quantity that is compared with a `size` and is not negative, if `positive`.
+    /// A quantity that is compared with a `size`, and cannot be negative if `positive`.
     fn new(name: String, estimate: &Estimate, size: f64, positive: bool) -> Self {
         let Estimate { value: learned, low, high } = *estimate;
         let relative = 0.5 * (high - low) / size;
@@ -141,7 +141,7 @@ impl Determined {
         })
     }
 
-    /// That of a model under constraints: changes of its mass matrix across them move nothing, and are no error.
+    /// Ranges of a model under constraints: changes of its mass matrix across them do not affect the motion, and are no error.
     pub(crate) fn under_constraints() -> Self {
         Self {
             determination: Vec::new(),
@@ -156,7 +156,8 @@ impl Determined {
         }
     }
 
-    /// Why no mass is determined; none if one is. Of one coordinate without known forces the mass is the unit, and the energy stands for it.
+    /// Why no mass is determined; none if one is. For one coordinate without known forces the mass is the unit, and the energy takes its
+    /// place.
     pub(crate) fn no_mass(&self) -> Option<String> {
         if let Some(reason) = &self.withheld {
             return Some(format!("whether the data determine a mass is unknown: {reason}"));
@@ -187,7 +188,7 @@ impl Determined {
         self.open(&friction_name(coordinate))
     }
 
-    /// Why nothing is known of what the motion determines; none if it is known.
+    /// Why it is unknown what the motion determines; none if it is known.
     pub(crate) fn unknown(&self) -> Option<String> {
         self.withheld.as_ref().map(|reason| format!("whether the motion determines it is unknown: {reason}."))
     }
@@ -234,7 +235,7 @@ impl Determined {
         ))
     }
 
-    /// Range of a constant of the known part, if it is learned and the range holds.
+    /// Range of a constant of the known part, if it is learned and the range is valid.
     pub(crate) fn constant(&self, name: &str) -> Option<&Estimate> {
         self.constant_ranges.get(name)
     }
@@ -309,7 +310,7 @@ impl Determined {
     }
 }
 
-/// Why the ranges of a model would not hold: what it misses of the motion is no noise.
+/// Why the ranges of a model would be invalid: its residuals are not noise.
 fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) -> Option<String> {
     let motion = if held_out { "held-out motion" } else { "the motion" };
     let Some((name, worst)) = misfit.iter().max_by(|a, b| a.1.total_cmp(b.1)) else {
@@ -383,7 +384,7 @@ mod tests {
         let apart = Determined { groups: vec![group("x", true), group("y", false)], ..found.clone() };
         assert_eq!(apart.open_mass(["x", "x"]), None);
         assert!(apart.open_mass(["y", "y"]).is_some() && apart.open_potential().is_some());
-        // An energy that is open, and a model of which nothing is known.
+        // An energy that is open, and a model about which nothing is known.
         let energy = Determined { determination: vec![quantity(ENERGY, 2.0)], ..found };
         assert!(energy.open_potential().is_some());
         let nothing = Determined::under_constraints();

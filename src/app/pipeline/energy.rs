@@ -24,9 +24,9 @@ pub struct Balance {
     pub work: f64,
     /// Energy taken by friction.
     pub friction: f64,
-    /// Energy that is not accounted for.
+    /// Change of energy that friction and forces do not explain.
     pub defect: f64,
-    /// Root mean square over the trajectories of the same: what in the mean may cancel.
+    /// Root mean square of the defect over the trajectories, since the mean may cancel.
     pub defect_rms: f64,
     /// `true` if any force was known.
     #[serde(skip)]
@@ -38,14 +38,14 @@ struct EnergyPath {
     times: Vec<f64>,
     energy: Vec<f64>,
     kinetic: Vec<f64>,
-    /// What the energy should be by friction and known forces.
+    /// The energy expected from friction and known forces.
     expected: Vec<f64>,
     /// `true` if friction or a force did work.
     driven: bool,
 }
 
 impl EnergyPath {
-    /// At the estimated states with full windows; none where the model gives no finite energy.
+    /// Evaluated at the estimated states with full windows; none if the model gives no finite energy.
     fn new(model: &dyn EulerLagrange<f64>, track: &RecordedTrajectory, states: &Smoothed) -> Option<Self> {
         let n = model.coordinates();
         let rows = states.interior();
@@ -68,7 +68,7 @@ impl EnergyPath {
         let scaled = |values: Vec<f64>| values.into_iter().map(|x| x / mean).collect::<Vec<f64>>();
         let driven = power.iter().any(|power| *power != 0.0);
         let (energy, kinetic, power) = (scaled(energy), scaled(kinetic), scaled(power));
-        // By the trapezoidal rule, which is enough for a picture.
+        // By the trapezoidal rule, which is accurate enough for a picture.
         let mut expected = vec![*energy.first()?];
         for k in 1..times.len() {
             expected.push(expected[k - 1] + 0.5 * (power[k] + power[k - 1]) * (times[k] - times[k - 1]));
@@ -83,8 +83,8 @@ impl EnergyPath {
     }
 }
 
-/// Energy along the held-out trajectory whose energy has the median error: that of the model, its kinetic and potential parts, and what it
-/// should be by friction and known forces, over the mean kinetic energy. None where the model gives no finite energy.
+/// Energy along the held-out trajectory with the median energy error: that of the model, its kinetic and potential parts, and the energy
+/// expected from friction and known forces, over the mean kinetic energy. None if the model gives no finite energy.
 pub fn energy_figure(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Figure> {
     let pairs = part.recording.tracks.iter().zip(&part.states);
     let paths: Vec<EnergyPath> = pairs.filter_map(|(track, states)| EnergyPath::new(model, track, states)).collect();
@@ -115,7 +115,7 @@ pub fn energy_figure(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Fig
     figure("energy_held_out.svg", "The energy along held-out motion", line_plot(&plot), caption)
 }
 
-/// The balance at the estimated states with full windows; none if no trajectory has one.
+/// The balance at the estimated states with full windows; none if no trajectory has such states.
 pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> {
     let n = model.coordinates();
     let mut sums = Balance::default();
@@ -158,7 +158,7 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> 
 }
 
 impl Balance {
-    /// Energy that is not accounted for, root mean square over the trajectories, over the mean kinetic energy.
+    /// Root mean square energy defect over the trajectories, relative to the mean kinetic energy.
     pub fn unaccounted(&self) -> f64 {
         self.defect_rms / self.kinetic.abs()
     }

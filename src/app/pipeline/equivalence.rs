@@ -1,4 +1,4 @@
-//! How nearly a learned Lagrangian is equivalent to the exact one: the best factor and gauge, and the difference that they leave.
+//! How nearly a learned Lagrangian is equivalent to the exact one: the best factor and gauge, and the remaining difference.
 
 use crate::lagrangian::EulerLagrange;
 use crate::names::percent;
@@ -8,9 +8,8 @@ use serde::Serialize;
 /// Best `learned = f(exact) + dF/dt + constant`, and the relative differences that remain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Equivalence {
-    /// Factor by which the learned Lagrangian, gauge taken out, becomes the exact one, of geodesics at rest, of the first group of coordinates;
-    /// none where it is
-    /// undetermined, for all states are on a mass shell.
+    /// Factor that turns the learned Lagrangian, after removing the gauge, into the exact one; for geodesics at rest, for groups that of
+    /// the first one. None if it is undetermined because all states are on a mass shell.
     pub factor: Option<f64>,
     /// Coefficients of `f`, from the first power: one, or of geodesics several.
     pub factors: Vec<f64>,

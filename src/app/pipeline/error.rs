@@ -75,7 +75,7 @@ pub enum PipelineError {
     /// Multiple shooting failed.
     #[error(transparent)]
     Shooting(#[from] ShootingError),
-    /// A checkpoint that must be there and is not, or that is of another run.
+    /// A required checkpoint is missing, or belongs to another run.
     #[error("{}: {source}", directory.display())]
     Checkpoint {
         /// Directory of the checkpoints.
@@ -99,9 +99,9 @@ pub enum PipelineError {
     Memory {
         /// The work.
         work: String,
-        /// Memory that it takes, in words; none if it cannot be counted.
+        /// Required memory, in words; none if it cannot be computed.
         needed: Option<String>,
-        /// Memory that there is, in words.
+        /// Available memory, in words.
         available: String,
     },
     /// A file that could not be written or removed.
@@ -120,7 +120,7 @@ pub enum PipelineError {
         /// The other process.
         owner: String,
     },
-    /// A directory that holds a run already.
+    /// A directory that already contains a run.
     #[error("{}: there is {name} of another run, which is replaced on demand alone (overwrite)", path.display())]
     Taken {
         /// The directory.
@@ -134,10 +134,10 @@ pub enum PipelineError {
     /// The flag of the watch was raised while a finished model was judged.
     #[error("interrupted while the model was judged: the model is written, tables and report are not")]
     Interrupted,
-    /// The same of a model that was just learned.
+    /// An error of the model that was just learned.
     #[error("interrupted while the model was judged: the model is kept, tables and report are not written")]
     Unjudged(Box<Unjudged>),
-    /// Tables of an experiment none of whose runs is finished.
+    /// The tables of an experiment without finished runs.
     #[error("none of {} is finished: there are no records to make tables of", crate::names::pluralize(*total, "run", "runs"))]
     NothingFinished {
         /// Runs requested.

@@ -64,7 +64,7 @@ pub struct Evaluation {
     /// Unit of times.
     #[serde(skip)]
     pub(crate) time_unit: String,
-    /// Name of what the exact motion conserves beside its energy.
+    /// Name of the quantity that the exact motion conserves besides its energy.
     #[serde(skip)]
     pub(crate) conserved: Option<&'static str>,
     /// Pictures.
@@ -78,9 +78,9 @@ pub struct Motion {
     /// Errors against exact motion.
     #[serde(flatten)]
     pub summary: TrajectorySummary,
-    /// Relative error of what the exact motion conserves beside its energy, if it does.
+    /// Relative error of the quantity that the exact motion conserves besides its energy, if there is one.
     pub conserved_error: Option<Statistics>,
-    /// The first sample at which the learned motion had left the states the model was trained on, in words.
+    /// The first sample at which the learned motion was outside the training states, in words.
     pub left_training_range: Option<String>,
 }
 
@@ -92,7 +92,7 @@ pub struct EvaluationOptions {
     pub states: (Vec<f64>, Vec<f64>),
     /// Random starts of the trajectory test.
     pub starts: usize,
-    /// Where they lie and how long they move.
+    /// The bounds of the starts and the duration of the motions.
     pub span: Span,
     /// Relative tolerance of the learned motion; the absolute one is a hundredth of it.
     pub rtol: f64,
@@ -126,7 +126,7 @@ impl EvaluationOptions {
 /// Pieces of work of an evaluation: accelerations, motions, pictures, mass matrices.
 const PIECES: usize = 4;
 
-/// Compares a model with the system it learned. What was compared before the flag ended it is kept: see [`Evaluation::interrupted`].
+/// Compares a model with the system it learned. Comparisons made before the flag ended it are kept: see [`Evaluation::interrupted`].
 ///
 /// # Errors
 /// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`] before anything was compared.
@@ -276,8 +276,9 @@ fn leaving(trajectory: &Trajectory<f64>, trained: &Domain<f64>, columns: &[Strin
     })
 }
 
-/// `L` and `det M`, this after the `factors` of the coordinates, at rest over the first two coordinates, or over coordinate and velocity if there is only one; with more
-/// than one, `det M` also at velocities close to the upper end of the validation bounds, where wrong signs appear first.
+/// `L` and `det M`, the latter with the `factors` of the coordinates, at rest over the first two coordinates, or over coordinate and
+/// velocity if there is only one; with more than one, `det M` also at velocities close to the upper end of the validation bounds, where
+/// wrong signs appear first.
 fn grids(
     system: &SystemInstance<f64>,
     exact: &dyn EulerLagrange<f64>,
@@ -287,7 +288,7 @@ fn grids(
     let n = system.coordinates;
     let bounds = system.system.validation(n);
     let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
-    // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
+    // At rest a total time derivative in the learned L vanishes: only a factor and a constant remain.
     let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
     // A mass shell lets nothing rest in time.
     system.impose_constraint(&middle, &mut rest)?;
@@ -295,7 +296,7 @@ fn grids(
     let (rest, fast) = ([middle.clone(), rest].concat(), [middle, fast].concat());
     let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
     let labels = system.system.labels(n);
-    // A spacetime is shown over space, where there are two dimensions of it.
+    // A spacetime is shown over its spatial coordinates, if it has two.
     let shown = if system.system.time_like == Some(0) && n > 2 { [1, n - 1] } else { [0, 1] };
     let axes =
         shown.map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
@@ -414,13 +415,13 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    /// An evaluation that a flag ends behind so many of its pieces.
+    /// An evaluation that a flag ends after this many of its pieces.
     fn ended_behind(pieces: usize) -> Result<Evaluation, PipelineError> {
         let system = configure::<f64>("harmonic-oscillator", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         config.network.hidden = vec![4];
         let architecture = config.architecture(&system, vec![1.0]).unwrap();
-        // The term alpha |v|^2 alone: its motion is that of a free particle.
+        // Only the term alpha |v|^2: its motion is that of a free particle.
         let weights = vec![0.0; Layout::new(&architecture).parameters];
         let network = NetworkLagrangian::new(architecture, weights).unwrap();
         let options = EvaluationOptions::new(&system, Domain::new(vec![None; 2]), 0).unwrap();
@@ -501,7 +502,7 @@ mod tests {
                 ("det_mass_matrix_fast.svg", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
             ],
         );
-        // The velocity is an axis: there is no fast map.
+        // The velocity is an axis, so there is no map at high velocity.
         let one = captions("harmonic-oscillator");
         begins(&one, &[("lagrangian.svg", "L: exact"), ("det_mass_matrix.svg", "det M: exact")]);
         assert!(one[1].1.contains("right sign at every point") && !one[0].1.contains("sign"));

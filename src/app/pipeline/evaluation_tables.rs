@@ -13,7 +13,7 @@ use crate::report::{Figure, Report, with_unit};
 use serde::Serialize;
 use std::fmt::Write as _;
 
-/// Stands where there is no finite number.
+/// Shown where there is no finite number.
 const NONE: &str = "-";
 
 /// Contents of `evaluation.json`.
@@ -70,7 +70,7 @@ impl Evaluation {
             let t = &motion.summary;
             let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
             let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
-            // Of coordinates of one unit the worst.
+            // Among coordinates with the same unit, the worst.
             for (_, members) in &self.units {
                 let worst = |errors: &[Statistics], part: fn(&Statistics) -> f64| {
                     members.iter().filter_map(|&i| errors.get(i)).map(part).fold(f64::NAN, f64::max)

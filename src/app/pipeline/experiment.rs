@@ -16,7 +16,7 @@ use crate::training::{StopReason, TrainingError};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// A set of trainings with one table: what it is called, and what it adds to its runs and to their report.
+/// A set of trainings with one table: its name, and its additions to the runs and to the report.
 pub trait Experiment: Sync {
     /// Name in lists and messages.
     fn name(&self) -> &str;
@@ -44,7 +44,7 @@ pub trait Experiment: Sync {
         (STARTS, 1.0)
     }
 
-    /// Names of the tables that it writes beside those of all experiments.
+    /// Names of the tables that it writes in addition to those of all experiments.
     fn tables(&self) -> &[&str] {
         &[]
     }
@@ -54,10 +54,10 @@ pub trait Experiment: Sync {
         &[]
     }
 
-    /// Looks at the model that a run has learned, on so many threads, and writes what it finds into the directory of the run.
+    /// Examines the model that a run has learned, on `threads` threads, and writes the results into the directory of the run.
     ///
     /// # Errors
-    /// Whatever ends the work on all runs.
+    /// Any error that ends the work on all runs.
     fn look_at(
         &self,
         _run: &Run,
@@ -74,7 +74,7 @@ pub trait Experiment: Sync {
         vec!["Instability: of the training loss without the penalty.".to_string()]
     }
 
-    /// What its report has beside the headline, the loss curves and the table of all experiments; its own tables are written here.
+    /// Its additions to the headline, the loss curves and the table of all experiments; its own tables are written here.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -89,12 +89,12 @@ pub trait Experiment: Sync {
     }
 }
 
-/// Runs an experiment, `runs` of it, on so many threads, and writes table, pictures and report; runs whose records are in the
-/// directory and are of the same configuration are not run again.
+/// Runs the `runs` of an experiment on a number of threads, and writes table, pictures and report; runs with records of the same
+/// configuration in the directory are not repeated.
 ///
 /// # Errors
-/// Files that cannot be written, [`PipelineError::InterruptedRuns`], [`PipelineError::HeldRuns`] if another process works on some of
-/// the runs; runs that are finished stay finished.
+/// Files that cannot be written, [`PipelineError::InterruptedRuns`], [`PipelineError::HeldRuns`] if another process works on some of the
+/// runs; finished runs are kept.
 pub fn run_experiment(
     experiment: &dyn Experiment,
     runs: Vec<Run>,
@@ -107,8 +107,8 @@ pub fn run_experiment(
     conclude(experiment, results, store, watch, Some(started))
 }
 
-/// Writes table, pictures and report from the records that are in a directory, and from nothing else; nothing is run. The same records
-/// give the same bytes, whichever machines they were made on.
+/// Writes table, pictures and report from the records in a directory alone, without running anything. The same records give the same bytes,
+/// whatever machines made them.
 ///
 /// # Errors
 /// [`PipelineError::NothingFinished`]; files that cannot be written.
@@ -126,10 +126,10 @@ pub fn merge_experiment(
     conclude(experiment, results, store, watch, None)
 }
 
-/// Runs `runs` of an experiment, so many side by side; no tables are written. A run that another process works on is left to it.
+/// Runs `runs` of an experiment, several at a time, without writing tables. A run that another process works on is skipped.
 ///
 /// # Errors
-/// As of [`run_experiment`].
+/// Those of [`run_experiment`].
 pub fn finish_runs(
     experiment: &dyn Experiment,
     runs: Vec<Run>,
@@ -176,7 +176,7 @@ pub fn finish_runs(
     }
 }
 
-/// The record of a run: the one that is there if it was made from the same configuration, or a new one; `None` if it was interrupted.
+/// The record of a run: the existing one if it was made from the same configuration, or a new one; `None` if it was interrupted.
 fn one(
     run: &Run,
     of: &dyn Experiment,
@@ -204,7 +204,7 @@ fn make(
     watch: &Watch,
 ) -> Result<Option<Record>, PipelineError> {
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
-    // That of another configuration must not be found beside the new one.
+    // A record of another configuration must not remain next to the new run.
     output.remove(RECORD)?;
     experiment.files().iter().try_for_each(|name| output.remove(name))?;
     let system = run.config.system()?;
@@ -242,7 +242,7 @@ fn make(
         Err(error) => return Err(error),
     };
     output.write("config.toml", toml.as_bytes())?;
-    // What has a record is finished.
+    // A run with a record is finished.
     output.write(RECORD, serde_json::to_string(&record).map_err(PipelineError::format)?.as_bytes())?;
     options.checkpoints.map_or(Ok(()), |checkpoints| checkpoints.remove())?;
     Ok(Some(record))

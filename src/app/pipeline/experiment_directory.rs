@@ -50,7 +50,7 @@ impl ExperimentDirectory {
     /// Locks the directory itself for tables, pictures and report.
     ///
     /// # Errors
-    /// As of [`open_run`](Self::open_run).
+    /// Those of [`open_run`](Self::open_run).
     pub(crate) fn open_tables(&self) -> Result<LockedDirectory, PipelineError> {
         LockedDirectory::open(&self.path)
     }
@@ -64,10 +64,10 @@ pub struct LockedDirectory {
 }
 
 impl LockedDirectory {
-    /// The directory of a training or a fit that begins.
+    /// The directory of a new training or fit.
     ///
     /// # Errors
-    /// [`PipelineError::Taken`] if it holds a run that is not to be replaced, [`PipelineError::Held`] if another process works in it,
+    /// [`PipelineError::Taken`] if it contains a run that must not be replaced, [`PipelineError::Held`] if another process works in it,
     /// [`PipelineError::Output`] if it cannot be written.
     pub fn claim(path: &Path, overwrite: bool) -> Result<Self, PipelineError> {
         let locked = Self::open(path)?;
@@ -78,7 +78,7 @@ impl LockedDirectory {
         }
     }
 
-    /// Creates the directory if need be, locks it, and removes what writers killed in the middle left.
+    /// Creates the directory if needed, locks it, and removes remains of killed writers.
     fn open(path: &Path) -> Result<Self, PipelineError> {
         let directory = Directory::create(path)?;
         let held = |owner: Option<LockOwner>| {

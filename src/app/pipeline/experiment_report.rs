@@ -40,11 +40,11 @@ pub struct Additions {
     pub introduction: Vec<String>,
     /// Pictures of all runs behind the loss curves.
     pub figures: Vec<Figure>,
-    /// What stands above the table of the report.
+    /// A part above the table of the report.
     pub above: Option<Part>,
-    /// What stands below it and its remarks.
+    /// A part below the table and its remarks.
     pub below: Option<Part>,
-    /// What stands below the remarks on a terminal.
+    /// Tables below the remarks on a terminal.
     pub tables: Findings,
 }
 
@@ -53,7 +53,7 @@ const CONVENTIONS: &str = "Losses are the paper's: half the mean absolute error 
                            they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
                            states. Integrated: starts of the trajectory test whose learned motion reached its end.";
 
-/// A report with one part more, if there is one.
+/// A report with an additional part, if there is one.
 fn with(report: Report, part: Option<Part>) -> Report {
     match part {
         Some(part) => part(report),
@@ -61,8 +61,8 @@ fn with(report: Report, part: Option<Part>) -> Report {
     }
 }
 
-/// Writes table, pictures and report. They depend on the records alone. Times, but for those that the experiment is about, stand only
-/// in the text for a terminal, where `started` is the beginning of this process's work.
+/// Writes table, pictures and report. They depend on the records alone. Times, except those that the experiment measures, appear only in
+/// the text for a terminal; `started` is when this process began its work.
 pub(crate) fn conclude(
     experiment: &dyn Experiment,
     results: Results,

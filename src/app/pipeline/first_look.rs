@@ -12,13 +12,13 @@ use crate::recording::{ColumnGuess, LoadedRecording, RecordedTrajectory, Recordi
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
-/// Samples in which laws are looked for, at most: seconds of searching.
+/// Largest number of samples in which laws are sought: seconds of searching.
 const SAMPLES: usize = 2000;
 /// Samples that a trajectory keeps at least.
 const LEAST: usize = 200;
-/// Coordinates up to which a formula is looked for: the number of terms grows with their fourth power.
+/// Largest number of coordinates for which a formula is sought: the number of terms grows with their fourth power.
 const COORDINATES: usize = 4;
-/// Time in which a formula is looked for, at most.
+/// Longest time for which a formula is sought.
 const LIMIT: Duration = Duration::from_secs(2);
 
 /// What to do next with recorded motion.
@@ -42,18 +42,18 @@ pub enum NextStep {
 /// The survey of a recording, the laws that were looked for, and the advice that follows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FirstLook {
-    /// What the columns were taken as; empty where all were named.
+    /// The guessed roles of the columns; empty if all were named.
     pub guessed: Vec<ColumnGuess>,
     /// The survey.
     #[serde(flatten)]
     pub survey: Survey,
     /// Why no fit can learn from the data, if none can.
     pub obstacle: Option<String>,
-    /// Samples in which constraints and a formula were looked for.
+    /// Samples in which constraints and a formula were sought.
     pub searched: usize,
-    /// Constraints that the motion obeys; none if they were not looked for.
+    /// Constraints that the motion obeys; none if they were not sought.
     pub constraints: Option<FoundConstraints>,
-    /// The formula that explains the motion, if there is one among small ones.
+    /// The formula that explains the motion, if one of the small ones does.
     #[serde(serialize_with = "text_of")]
     pub formula: Option<FoundFormula>,
     /// `true` if the search for a formula ended at its limit of time.
@@ -68,8 +68,8 @@ fn text_of<S: Serializer>(formula: &Option<FoundFormula>, to: S) -> Result<S::Ok
 }
 
 impl FirstLook {
-    /// Looks at a recording; `guessed` is what its columns were taken as. Constraints and formulas are looked for in parts of the trajectories,
-    /// of at most 2000 samples together, and formulas for at most 2 s.
+    /// Surveys a recording; `guessed` are the guessed roles of its columns. Constraints and formulas are sought in parts of the
+    /// trajectories, of at most 2000 samples together, and formulas for at most 2 s.
     ///
     /// # Errors
     /// [`PipelineError::Smooth`] for trajectories too short for any window, [`PipelineError::Interrupted`].
@@ -103,7 +103,7 @@ impl FirstLook {
         Ok(Self { guessed, survey, obstacle, searched, constraints, formula, unfinished, next })
     }
 
-    /// The verdict, what the columns are taken as, the survey, the laws, and the warnings.
+    /// The verdict, the roles of the columns, the survey, the laws, and the warnings.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.line(match &self.obstacle {
@@ -128,7 +128,7 @@ impl FirstLook {
         findings
     }
 
-    /// The laws that were found, each in a sentence: what to use instead of a network that knows nothing.
+    /// The laws that were found, each in a sentence: use them instead of a network without prior knowledge.
     pub fn laws(&self) -> Vec<String> {
         let mut laws = Vec::new();
         if let Some(found) = &self.constraints {
@@ -155,7 +155,7 @@ impl FirstLook {
         laws
     }
 
-    /// `true` if a formula is to be looked for with friction: it has terms of friction, or none was found in time.
+    /// `true` if the formula should be sought with friction: it has terms of friction, or none was found in time.
     pub fn has_friction(&self) -> bool {
         self.unfinished || self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
     }

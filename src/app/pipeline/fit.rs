@@ -44,17 +44,17 @@ pub struct FitReport {
     pub history: Vec<Epoch>,
     /// Predictions of motion that was held out.
     pub hold_out: HoldOut,
-    /// Fits of the other [members](FitConfig::members), from the second on; those that an interruption ended are left out.
+    /// Fits of the other [members](FitConfig::members), from the second on; members that were interrupted are left out.
     pub others: Vec<FitReport>,
     json: String,
     findings: Findings,
 }
 
 impl FitReport {
-    /// The motion that was learned: that of the network under the constraints that were found or given, if there are any.
+    /// The learned motion: that of the network, under the constraints that were found or given, if there are any.
     ///
     /// # Errors
-    /// [`PipelineError::Model`]; none of a model that was just learned.
+    /// [`PipelineError::Model`]; never for a model that was just learned.
     pub fn motion(&self) -> Result<Box<dyn EulerLagrange<f64> + '_>, PipelineError> {
         let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
         self.header.constrain(Box::new(&self.network as &dyn EulerLagrange<f64>)).map_err(wrong)
@@ -75,7 +75,7 @@ impl FitReport {
     }
 }
 
-/// Name of the force conjugate to a coordinate where the data gave it none.
+/// Name of the force conjugate to a coordinate if the data gave it none.
 pub fn usual_force(coordinate: &str) -> String {
     format!("{coordinate}_force")
 }
@@ -112,7 +112,7 @@ fn fit_in<S: Scalar>(
     let start = Start::<S>::new(prepared, config)?;
     let toml = toml::to_string(config).map_err(PipelineError::format)?;
     let learned = start.learn((prepared, config, &toml), options, watch)?;
-    // Before the new model takes the place of the old one and of what was said of it.
+    // Read before the new model replaces the old one and its results.
     let kept = options.checkpoints.as_ref().map_or_else(Vec::new, |kept| kept_members(kept.directory(), config));
     learned.write(output, &toml)?;
     let LearnedFit { mut trained, shot, model } = learned;
@@ -160,17 +160,17 @@ fn fit_in<S: Scalar>(
     Ok(FitReport { stop, unfinished, header, network, history, hold_out, others, json, findings })
 }
 
-/// What a fit starts to learn from.
+/// The starting point of a fit.
 struct Start<S: Scalar> {
     data: Datasets<S>,
     architecture: Architecture,
-    /// Those of the model that it starts from.
+    /// Weights of the model that it starts from.
     weights: Option<Vec<S>>,
-    /// Of the states that are learned from.
+    /// Ranges of the training states.
     ranges: [Vec<[f64; 2]>; 2],
 }
 
-/// What a fit learned, before it is judged.
+/// Result of a fit before it is judged.
 struct LearnedFit<S> {
     trained: Trained<S>,
     shot: Option<Fitted<S>>,
@@ -178,7 +178,7 @@ struct LearnedFit<S> {
 }
 
 impl<S: Scalar> LearnedFit<S> {
-    /// The model first, then what is small; pictures come last: on a full disk nothing that comes after can lose these.
+    /// The model first, then small files; pictures come last, so that a full disk loses none of the others.
     fn write(&self, output: &dyn Output, toml: &str) -> Result<(), PipelineError> {
         write_model(output, &self.model)?;
         Command::Fit.sign(output)?;
@@ -286,7 +286,7 @@ impl<S: Scalar> Start<S> {
     }
 }
 
-/// What is said of a learned model.
+/// Statements about a learned model.
 struct JudgedFit {
     hold_out: HoldOut,
     physics: Physics,
@@ -330,7 +330,7 @@ impl JudgedFit {
     }
 }
 
-/// The networks of a fit of several beside the one that is trained, and their reports; `unfinished` becomes what an interruption left out.
+/// Trains the other networks of a fit with several members, and returns their reports; `unfinished` becomes what an interruption left out.
 fn others(
     prepared: &PreparedFit<'_>,
     config: &FitConfig,
@@ -347,7 +347,7 @@ fn others(
     Ok((members, others))
 }
 
-/// A formula of the recorded motion if the configuration asks for one, and what an interruption left out.
+/// A formula of the recorded motion if the configuration requests one, and what an interruption left out.
 fn formula(
     prepared: &PreparedFit<'_>,
     config: &FitConfig,
@@ -408,7 +408,7 @@ pub(crate) fn judge(
     Ok(hold_out)
 }
 
-/// Name and checksum of everything that is learned from.
+/// Name and checksum of everything that the fit learns from.
 fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(String, u32)> {
     let parts = [&measured.training, &measured.validation];
     let tracks = parts.into_iter().flat_map(|part| &part.recording.tracks);
@@ -417,7 +417,7 @@ fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(S
     data.checksums().into_iter().chain([recorded]).collect()
 }
 
-/// Units of the coordinates in which their numbers are: those of the file in SI, else `rad` of an angle and `SI`.
+/// Units in which the numbers of the coordinates are: those of the file in SI, otherwise `rad` for an angle and `SI`.
 fn units(reading: &LoadedRecording) -> Vec<String> {
     let periodic = reading.recording.periodic.iter();
     // A recording from memory names no columns.

@@ -58,12 +58,12 @@ impl Fit {
         Self::of(Source::Files(vec![file.into()]))
     }
 
-    /// A fit of several files, each of which holds at least a trajectory.
+    /// A fit of several files, each with at least one trajectory.
     pub fn files(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
         Self::of(Source::Files(files.into_iter().map(Into::into).collect()))
     }
 
-    /// A fit of motion in memory, which says itself what its coordinates are.
+    /// A fit of motion in memory, which defines its own coordinates.
     pub fn recording(recording: Recording) -> Self {
         Self::of(Source::Memory(Box::new(LoadedRecording::from(recording))))
     }
@@ -108,7 +108,7 @@ impl Fit {
         self
     }
 
-    /// Learns a friction beside the Lagrangian.
+    /// Learns friction in addition to the Lagrangian.
     pub fn friction(self, friction: bool) -> Self {
         Self { friction, ..self }
     }
@@ -145,7 +145,7 @@ impl Fit {
         Self { out: Some(directory.into()), ..self }
     }
 
-    /// Replaces a run that is in the directory already, which is refused else.
+    /// Replaces a run that is already in the directory, which is otherwise refused.
     pub fn overwrite(self, overwrite: bool) -> Self {
         Self { overwrite, ..self }
     }
@@ -160,7 +160,7 @@ impl Fit {
         Self { change: Box::new(change), ..self }
     }
 
-    /// Reads, learns, and judges by held-out motion.
+    /// Reads, learns, and judges the model by held-out motion.
     ///
     /// # Errors
     /// [`PipelineError`]: [`PipelineError::Data`] for files that do not fit their description, [`PipelineError::Training`] if nothing was learned.
@@ -171,7 +171,7 @@ impl Fit {
             Source::Files(files) => (read_recording(&files, &columns)?, files),
             Source::Memory(loaded) => (*loaded, Vec::new()),
         };
-        // Columns of files are called what their headers call them.
+        // Columns of files have the names of their headers.
         let columns = if files.is_empty() { columns } else { loaded.columns.clone() };
         let prepared = PreparedFit::new(&loaded, &options)?;
         let mut config = prepared.suggest(&FitConfig::default().training.system, precision)?;
@@ -195,7 +195,7 @@ impl Fit {
     }
 }
 
-/// Refuses values of what the recording decides: they would have no effect.
+/// Rejects settings that the recording decides, because they would have no effect.
 fn require_decided(training: &Config, decided: Data) -> Result<(), PipelineError> {
     let refused = |field: &str| {
         let (expected, found) = ("what the recording decides".into(), "another value".to_string());

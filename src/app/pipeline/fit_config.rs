@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// Share of the samples that is held out by default.
 pub const HELD_OUT: f64 = 0.2;
 
-/// Width of the network beside a known part, and its weight decay: small, since what network and constants share is not
+/// Width of the network beside a known part, and its weight decay: small, since effects that network and constants share are not
 /// identifiable and should go to the constants.
 const RESIDUAL_WIDTH: usize = 8;
 const RESIDUAL_DECAY: f64 = 0.01;
@@ -129,14 +129,14 @@ table! {
     }
 }
 
-/// Constraints of a fit: what holds the coordinates of its motion together.
+/// Constraints of a fit, which hold between the coordinates of its motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
 pub enum FitConstraints {
     /// None: every coordinate moves by itself.
     #[default]
     None,
-    /// Those that are found in the motion that is learned from, if there are any.
+    /// Constraints found in the training motion, if there are any.
     Find,
     /// Formulas by name, over coordinates and their velocities `NAME_dot`, that vanish.
     Formulas(BTreeMap<String, String>),
@@ -243,8 +243,8 @@ impl From<&Columns> for FitColumns {
 }
 
 impl FitConfig {
-    /// Takes what suits a network beside a known part: a small one, which begins with next to nothing, and the multiple shooting of a
-    /// grey box.
+    /// Takes the settings for a network beside a known part: a small one with almost no initial output, and the multiple shooting of a grey
+    /// box.
     pub fn take_known(&mut self, known: Option<Known>) {
         let network = &mut self.training.network;
         (network.hidden, network.alpha) = (vec![RESIDUAL_WIDTH], 0.0);
@@ -253,17 +253,17 @@ impl FitConfig {
         self.shooting = self.shooting.take().map(|_| Shooting::grey_box());
     }
 
-    /// The same of files that may have other names.
+    /// The configuration without the names of files, which may change.
     pub fn without_files(&self) -> Self {
         let mut other = self.clone();
         other.recording.files.clear();
         other
     }
 
-    /// Every value out of range, for `n` coordinates. What the data alone decide is not looked at.
+    /// Every value out of range, for `n` coordinates. Settings that only the data decide are not checked.
     pub fn faults(&self, n: usize) -> Vec<ConfigError> {
         let mut faults = Faults::default();
-        // The training's own come with what its keys decide together.
+        // The training's own faults come together with the conditions on several keys.
         Self { training: Config::default(), ..self.clone() }.ranges("", &mut faults);
         let (time, rate) = (&self.recording.time, self.recording.rate);
         if let (Some(_), Some(rate)) = (time, rate) {
@@ -280,11 +280,11 @@ impl FitConfig {
     }
 }
 
-/// Choices of a fit that come before its configuration: what is learned from and what is held out.
+/// Choices of a fit that come before its configuration: the targets and the held-out data.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FitOptions {
-    /// Targets to learn from; none for those that the data advise.
+    /// Targets to learn from; none to take those that suit the data.
     pub targets: Option<Targets>,
     /// Share of the samples that is held out to judge the model; 0: none.
     pub held_out: f64,
@@ -315,7 +315,7 @@ impl From<&FitConfig> for FitOptions {
 }
 
 impl FitOptions {
-    /// The same for the division of a recording.
+    /// The same options for the division of a recording.
     pub(crate) fn preparation(&self) -> PrepareOptions {
         let smoothing = SmoothOptions { window: self.window, noise: self.noise.clone(), ..SmoothOptions::default() };
         let Self { held_out, seed, between, .. } = *self;

@@ -1,4 +1,4 @@
-//! Constraints of a fit: found in the motion that is learned from, or given.
+//! Constraints of a fit: found in the training motion, or given.
 
 use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, OBEDIENCE, find_constraints};
 use crate::data::{Dataset, RecordingSplit};
@@ -8,7 +8,7 @@ use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitConstraints, FitOptions};
 use crate::recording::smooth::Smoothed;
 
-/// Constraints that hold recorded motion.
+/// Constraints on recorded motion.
 #[derive(Debug)]
 pub(crate) struct FitHeld {
     pub constraints: FormulaConstraints,

@@ -22,7 +22,7 @@ use crate::training::Trained;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// One coordinate of `summary.json`: what the data are like and what smoothing makes of them, in SI units.
+/// One coordinate of `summary.json`: properties of the data and of their smoothing, in SI units.
 #[derive(Serialize)]
 struct Coordinate {
     name: String,
@@ -55,7 +55,7 @@ struct Summary<'a> {
     test_loss: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shooting: Option<ShootingSummary>,
-    /// Constraints that hold the motion.
+    /// Constraints on the motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     constraints: Option<ConstraintsSummary<'a>>,
     /// Constants of the known part of a grey box.
@@ -98,13 +98,13 @@ struct ShootingSummary {
     integration_error: f64,
 }
 
-/// Header of the table of what smoothing makes of the coordinates.
+/// Header of the table of smoothing errors.
 const SMOOTHING: [&str; 6] =
     ["coordinate", "noise [SI]", "window [s]", "window [samples]", "error of a [SI]", "error of a over its rms [%]"];
 
 /// A learned model with its data.
 pub(crate) struct Found<'a, S> {
-    /// Recorded motion, as it is, smoothed and divided.
+    /// Recorded motion: raw, smoothed and divided.
     pub prepared: &'a PreparedFit<'a>,
     /// The supervised training.
     pub config: &'a Config,
@@ -120,7 +120,7 @@ pub(crate) struct Found<'a, S> {
     pub hold_out: &'a HoldOut,
     /// Ranges in which the data determine the model.
     pub determined: &'a Determined,
-    /// A formula of the Lagrangian, if one was looked for.
+    /// A formula of the Lagrangian, if one was sought.
     pub formula: Option<&'a FoundFormula>,
     /// The networks of a fit of several.
     pub members: Option<&'a Members>,
@@ -131,7 +131,7 @@ pub(crate) struct Found<'a, S> {
 }
 
 impl<'a, S: Scalar> Found<'a, S> {
-    /// Writes `summary.json`, `report.html` and pictures, and returns the first as it is and in words.
+    /// Writes `summary.json`, `report.html` and pictures, and returns the first as JSON and in words.
     ///
     /// # Errors
     /// [`PipelineError::Output`].
@@ -236,7 +236,7 @@ impl<'a, S: Scalar> Found<'a, S> {
 }
 
 impl Summary<'_> {
-    /// Data, losses and times of the run in words, with the table of what smoothing makes of the coordinates.
+    /// Data, losses and times of the run in words, with the table of smoothing errors.
     fn opening(&self, recording: &Recording) -> Findings {
         let [training, validation, test] = self.samples;
         let way = match self.targets {

@@ -6,7 +6,7 @@ use crate::names::{number, percentage};
 use crate::network::NetworkLagrangian;
 use serde::Serialize;
 
-/// Mean squared error of a force over its variance up to which it is well learned, and above which it is not learned.
+/// Largest mean squared error of a force, over its variance, at which it is well learned, and at which it is learned at all.
 const WELL: f64 = 0.05;
 const FAILED: f64 = 0.3;
 
@@ -33,13 +33,13 @@ impl ForceError {
         vec![self.name.clone(), number(self.rms), number(self.spread), percentage(self.nmse)]
     }
 
-    /// `true` for a force that the model does not give.
+    /// `true` for a force that the model does not reproduce.
     pub(crate) fn is_lost(&self) -> bool {
         self.nmse.is_nan() || self.nmse > FAILED
     }
 }
 
-/// Compares the forces of held-out states with those that the model takes for their accelerations.
+/// Compares the forces of held-out states with the model's forces for their accelerations.
 ///
 /// # Errors
 /// [`MechanicsError`] of a model that is not finite.
@@ -59,7 +59,7 @@ pub(crate) fn force_errors(
     Ok(names.iter().zip(force_spreads(held_out)).enumerate().map(one).collect())
 }
 
-/// How well the model gives the forces, as a sentence with a verdict.
+/// How well the model reproduces the forces, as a sentence with a verdict.
 pub(crate) fn judged(errors: &[ForceError]) -> String {
     let lost: Vec<&str> = errors.iter().filter(|e| e.is_lost()).map(|e| e.name.as_str()).collect();
     let worst = errors.iter().map(|e| e.nmse).fold(0.0, |worst: f64, x| if x.is_nan() { x } else { worst.max(x) });

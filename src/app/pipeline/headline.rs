@@ -1,5 +1,5 @@
-//! Headlines: what was learned and how good it is, in one sentence and a short table. They stand above the tables of a
-//! terminal and at the beginning of a report.
+//! Headlines: what was learned and how good it is, in one sentence and a short table. They appear above the tables on a terminal and at the
+//! beginning of a report.
 
 use crate::analysis::{PredictionError, ValidTimes};
 use crate::experiments::{Row, RunSpread};
@@ -15,7 +15,7 @@ use crate::pipeline::hold_out::{HoldOut, factor, is_better};
 const MOST_WRONG: f64 = 0.01;
 /// Lyapunov times at and above which predictions of chaotic motion are good: errors grew e^3 = 20 times.
 const MANY_TIMES: f64 = 3.0;
-/// Share of the time that was tested below which predictions of motion that is not chaotic are bad.
+/// Share of the tested time below which predictions of non-chaotic motion are bad.
 const FEW: f64 = 0.01;
 
 /// Energy that may be lost or gained without a force or friction, over the mean kinetic energy.
@@ -39,7 +39,7 @@ impl Headline {
     }
 }
 
-/// A unit behind a number, also where there is none.
+/// A unit after a number, with a word for a missing unit.
 fn spoken(unit: &str) -> &str {
     if unit == "1" { "units" } else { unit }
 }
@@ -59,7 +59,7 @@ fn valid_time(valid: &ValidTimes, unit: &str) -> String {
     }
 }
 
-/// Name of a time of valid prediction, with its threshold and the count that it is a median of.
+/// Name of a time of valid prediction, with its threshold and the number of values in the median.
 fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
     format!(
         "Prediction valid (error below {} of the spread of the motion), median of {}",
@@ -68,7 +68,7 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
     )
 }
 
-/// A model of a system that is known: `title` names it.
+/// A model of a known system, named `title`.
 pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mass = found.mass_matrix.error.median;
     let equivalence = found.physics.equivalence.as_ref();
@@ -132,11 +132,11 @@ fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     }
 }
 
-/// A model of recorded motion called `name`, beside a formula of the same motion if one was looked for.
+/// A model of recorded motion called `name`, next to a formula of the same motion if one was sought.
 ///
-/// A model is good if all hold: its predictions reach at least one period of the fastest motion, every coordinate is predicted better than at
-/// constant velocity, at most half of the held-out states lie outside of the learned ones, the energy is accounted for to 10 %, and the data
-/// determine a mass. If not, the sentence says which of them fails.
+/// A model is good if all hold: its predictions reach at least one period of the fastest motion, every coordinate is predicted better than
+/// at constant velocity, at most half of the held-out states lie outside the learned ones, the energy is accounted for to 10 %, and the
+/// data determine a mass. Otherwise the sentence says which condition fails.
 pub(crate) fn of_hold_out(
     name: &str,
     found: &HoldOut,
@@ -227,7 +227,7 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
         [format!("Median error {} s ahead", number(model.seconds)), of(model.median)],
         ["The same at constant velocity".to_string(), of(straight.median)],
     ]);
-    // Of one coordinate it is the same.
+    // For a single coordinate it would be the same.
     let several = found.by_coordinate.len() > 1;
     let apart = found.by_coordinate.iter().filter(|_| several).filter_map(|c| {
         let errors = [c.model.last()?, c.constant_velocity.last()?].map(|x| number(*x));
@@ -273,7 +273,7 @@ fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) 
     format!("{verdict}; {errors}")
 }
 
-/// An experiment: its best row beside the paper's best, and in how many rows it is below the paper.
+/// An experiment: its best row next to the paper's best, and the number of rows below the paper.
 pub(crate) fn of_experiment(rows: &[Row]) -> Headline {
     let lowest = |of: fn(&Row) -> Option<f64>| {
         let known = rows.iter().filter_map(|row| Some((row, of(row).filter(|loss| loss.is_finite())?)));

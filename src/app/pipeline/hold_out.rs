@@ -36,8 +36,8 @@ const TIMES: usize = 4;
 pub struct HoldOutOptions<'a> {
     /// Motion that the model has not seen.
     pub part: &'a Split,
-    /// Time over which it is predicted, in s; none for 200 samples or one period of the fastest motion if that is longer, at most a quarter of the
-    /// shortest trajectory, pieces much shorter than the others left aside.
+    /// Time over which it is predicted, in s. By default 200 samples, or one period of the fastest motion if that is longer, but at most a
+    /// quarter of the shortest trajectory, not counting pieces much shorter than the others.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -63,7 +63,7 @@ pub struct UsefulTime {
 pub struct CoordinatePredictions {
     /// Name of the coordinate.
     pub name: String,
-    /// Its unit: `rad` of an angle, else `SI`.
+    /// Its unit: `rad` for an angle, otherwise `SI`.
     pub unit: &'static str,
     /// Errors of the model's motion.
     pub model: Vec<f64>,
@@ -71,7 +71,7 @@ pub struct CoordinatePredictions {
     pub constant_velocity: Vec<f64>,
 }
 
-/// Predictions of motion that was held out, beside continuing at constant velocity.
+/// Predictions of held-out motion, compared with motion at constant velocity.
 #[derive(Clone, Debug, Serialize)]
 pub struct HoldOut {
     /// Unit of the errors of all coordinates together: `rad` of angles, `SI` of others; of both kinds each error is taken over the spread
@@ -79,13 +79,13 @@ pub struct HoldOut {
     pub error_unit: &'static str,
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
-    /// Time for which the model's motion predicts the measured one, median over the windows; at least to their end where the
-    /// error stays small. None without windows.
+    /// Median time, over the windows, for which the model's motion predicts the measured one; a lower bound where the error stays small to
+    /// the end of a window. None without windows.
     pub(crate) valid_time: Option<ValidTimes>,
     /// Time for which its motion is useful. None without windows.
     pub useful_time: Option<UsefulTime>,
-    /// Period of the fastest coordinate in s, `2 pi` times the spread of its velocity over that of its acceleration; none of motion that takes
-    /// longer than the trajectories, or is noise.
+    /// Period of the fastest coordinate in s, `2 pi` times the spread of its velocity over that of its acceleration; none if the motion
+    /// takes longer than the trajectories, or is noise.
     pub fastest_period: Option<f64>,
     /// Errors of every coordinate at the same times ahead.
     pub by_coordinate: Vec<CoordinatePredictions>,
@@ -373,18 +373,18 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<us
     wrong as f64 / f64::max(1.0, count as f64)
 }
 
-/// How many times a prediction is better than constant velocity; none if it is no better.
+/// Factor by which a prediction is better than constant velocity; none if it is no better.
 pub(crate) fn factor(model: &PredictionError, straight: &PredictionError) -> Option<f64> {
     is_better(model.median, straight.median).then(|| straight.median / model.median)
 }
 
-/// `true` if the error of a prediction is smaller than that of constant velocity, by a twentieth.
+/// `true` if the error of a prediction is at least a twentieth smaller than that of constant velocity.
 pub(crate) fn is_better(model: f64, straight: f64) -> bool {
     straight / model >= 1.05
 }
 
 impl UsefulTime {
-    /// From the time of valid prediction and the errors of model and constant velocity at the same times.
+    /// Useful time from the time of valid prediction and the errors of model and constant velocity at the same times.
     fn new(valid: &ValidTimes, [model, straight]: [&[PredictionError]; 2]) -> Self {
         let mut pairs = model.iter().zip(straight).rev();
         let last = pairs.next().filter(|(model, straight)| factor(model, straight).is_some());
@@ -441,7 +441,7 @@ impl HoldOut {
             .collect()
     }
 
-    /// That of a model that no motion was held out to judge: its numbers are not there.
+    /// The result for a model without held-out motion, which has no numbers.
     pub(crate) fn nothing() -> Self {
         Self {
             error_unit: "SI",
@@ -461,7 +461,7 @@ impl HoldOut {
         }
     }
 
-    /// `true` if the model predicts better than constant velocity at any of the times ahead; none without predictions.
+    /// `true` if the model predicts better than constant velocity at some time ahead; none without predictions.
     pub(crate) fn is_better(&self) -> Option<bool> {
         let mut pairs = self.model.iter().zip(&self.constant_velocity);
         (!self.model.is_empty()).then(|| pairs.any(|(model, straight)| factor(model, straight).is_some()))

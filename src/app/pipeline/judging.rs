@@ -1,4 +1,4 @@
-//! Progress and cancellation of the work on a finished model: it reports how far it is, and the flag of its [`Watch`] ends it.
+//! Progress and cancellation of the work on a finished model: it reports its progress, and the flag of its [`Watch`] ends it.
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Terms};
 use crate::network::NetworkLagrangian;
@@ -35,14 +35,14 @@ pub(crate) struct Judging<'a> {
 }
 
 impl<'a> Judging<'a> {
-    /// Judging of so many pieces of work. A flag that was raised before does not count: it ended the training.
+    /// Judging of `pieces` pieces of work. A flag that was raised earlier does not count: it ended the training.
     pub fn new(watch: &'a Watch, pieces: usize) -> Self {
         let counts = !watch.is_interrupted();
         watch.say(Event::Judged { done: 0, total: pieces });
         Self { watch, counts, pieces, done: AtomicU64::new(0), evaluations: AtomicU64::new(0) }
     }
 
-    /// So many pieces more are done.
+    /// Reports that `pieces` more pieces are done.
     pub fn advance(&self, pieces: usize) {
         let done = self.done.fetch_add(pieces as u64, Ordering::Relaxed) as usize + pieces;
         self.watch.say(Event::Judged { done, total: self.pieces });
@@ -53,7 +53,7 @@ impl<'a> Judging<'a> {
         self.counts && self.watch.is_interrupted()
     }
 
-    /// Goes on unless the flag was raised.
+    /// Continues unless the flag was raised.
     ///
     /// # Errors
     /// [`PipelineError::Interrupted`].
@@ -61,7 +61,7 @@ impl<'a> Judging<'a> {
         if self.is_interrupted() { Err(PipelineError::Interrupted) } else { Ok(()) }
     }
 
-    /// The same model; once the flag was raised it fails everywhere, which ends whatever integrates it.
+    /// The model; once the flag is raised, it fails everywhere, which ends any integration.
     pub fn watched<'b>(&'b self, model: &'b dyn EulerLagrange<f64>) -> Watched<'b> {
         Watched { model, judging: self }
     }

@@ -13,25 +13,25 @@ use std::f64::consts::{PI, TAU};
 const CURVE: usize = 161;
 /// Step of the differences of momenta over the range of a coordinate.
 const STEP: f64 = 1e-4;
-/// Largest number of components of a matrix that get a picture.
+/// Largest number of components of a matrix that are drawn.
 pub(super) const MAPS: usize = 10;
-/// Components off the diagonal that have a picture exceed this part of those on it, root mean squares.
+/// Off-diagonal components are drawn if their root mean square exceeds this part of that on the diagonal.
 const SHOWN: f64 = 0.02;
 /// Share of a turn at and above which an angle is shown over all of it.
 const WHOLE_TURN: f64 = 0.9;
-/// Recorded positions that are marked in a map, at most.
+/// Largest number of recorded positions that are marked in a map.
 const MARKS: usize = 400;
-/// Share of the range of a coordinate within which a recorded position tells of a place.
+/// Share of the range of a coordinate within which a recorded position counts as near.
 const NEAR: f64 = 0.1;
 
-/// A learned model, with the exact one beside it if that is known.
+/// A learned model, next to the exact one if that is known.
 #[derive(Clone, Copy)]
 pub(super) struct Pair<'a> {
     pub learned: &'a dyn EulerLagrange<f64>,
     pub exact: Option<&'a dyn EulerLagrange<f64>>,
-    /// Factor by which the learned Lagrangian is taken.
+    /// Factor that multiplies the learned Lagrangian.
     pub factor: f64,
-    /// That of every coordinate, where groups of them have one each.
+    /// Factor of every coordinate, where groups of coordinates have their own.
     pub factors: &'a [f64],
 }
 
@@ -85,7 +85,7 @@ impl Picturing<'_> {
         self.ranges.iter().map(|[low, high]| 0.5 * (low + high)).collect()
     }
 
-    /// Axes of a map with so many points along each.
+    /// Axes of a map with `points` points along each.
     pub fn axes(&self, points: usize) -> [Axis; 2] {
         self.shown.map(|component| {
             let [from, to] = self.ranges[component];
@@ -93,7 +93,7 @@ impl Picturing<'_> {
         })
     }
 
-    /// Coordinates but those of the axes, and where they are.
+    /// Coordinates other than those of the axes, with their fixed values.
     fn fixed(&self, free: &[usize]) -> String {
         let middle = self.middle();
         let others = (0..self.names.len()).filter(|i| !free.contains(i));
@@ -121,7 +121,7 @@ impl Picturing<'_> {
         quantity_figure(&QuantityMap { quantity, about, file, labels, learned, exact, fixed, remark, marks, open })
     }
 
-    /// Places of a map that no recorded position is near, and what they are in words; nothing without recorded motion.
+    /// Points of a map that are far from every recorded position, and their description in words; empty without recorded motion.
     fn unseen(&self, grid: &Grid) -> (Vec<bool>, String) {
         if self.marks.is_empty() {
             return (Vec::new(), String::new());
@@ -193,7 +193,7 @@ impl Picturing<'_> {
         figures
     }
 
-    /// The mass matrix at rest, those of its `components` that matter; `symbol` is `M`, or `g` of a metric. The second part is the number of
+    /// The relevant `components` of the mass matrix at rest; `symbol` is `M`, or `g` for a metric. The second part is the number of
     /// components without a picture.
     pub fn mass_matrix(
         &self,
@@ -238,7 +238,7 @@ impl Picturing<'_> {
         (drawn.collect(), more)
     }
 
-    /// The gyroscopic field, that of a magnet or of a turning frame; none for a model whose momenta vanish at rest.
+    /// The gyroscopic field, such as that of a magnet or a rotating frame; none for a model whose momenta vanish at rest.
     pub fn gyroscopic(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
         let n = self.names.len();
         let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).take(MAPS);
@@ -271,7 +271,8 @@ impl Picturing<'_> {
         difference(i, j).iter().zip(difference(j, i)).map(|(a, b)| a - b).collect()
     }
 
-    /// Friction of every coordinate over its velocity, the others at rest, in the middle of the coordinates; none for a model without.
+    /// Friction of every coordinate over its velocity, with the others at rest, in the middle of the coordinates; none for a model without
+    /// friction.
     pub fn friction(&self, pair: Pair<'_>, velocities: &[[f64; 2]]) -> Vec<Figure> {
         let (n, middle) = (self.names.len(), self.middle());
         let of = |model: &dyn EulerLagrange<f64>, i: usize, v: &[f64]| -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! Losses of weights that something else than the supervised training left.
+//! Losses of weights that do not come from the supervised training.
 
 use crate::configuration::Penalty;
 use crate::data::Dataset;
@@ -16,7 +16,7 @@ pub(crate) struct LossStates<S> {
 }
 
 impl<S: Scalar> LossStates<S> {
-    /// Puts the losses of the weights as they are into `trained`, in place of those that its training left.
+    /// Puts the losses of the present weights into `trained`, replacing those of its training.
     ///
     /// # Errors
     /// [`TrainingError::Threads`] if threads cannot be started.
@@ -29,7 +29,7 @@ impl<S: Scalar> LossStates<S> {
     ) -> Result<(), PipelineError> {
         let mut objective = Objective::new(architecture, penalty, threads).map_err(TrainingError::from)?;
         let loss = objective.loss(&trained.weights, &self.validation).loss.to_f64();
-        // A model file says a number; of weights that give no state an acceleration there is none.
+        // A model file needs a number, even if the weights give no state an acceleration.
         trained.validation_loss = if loss.is_finite() { loss } else { f64::MAX };
         trained.test = objective.loss(&trained.weights, &self.test);
         Ok(())

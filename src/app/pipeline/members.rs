@@ -1,5 +1,4 @@
-//! Networks that were trained on the same recording from different seeds: what they say differently is what the recording leaves open, or
-//! the training.
+//! Networks trained on the same recording from different seeds: their differences show what the recording, or the training, leaves open.
 
 use crate::analysis::{PredictionError, prediction_error};
 use crate::configuration::{Config, MOST_SEED};
@@ -33,8 +32,8 @@ pub struct Member {
     pub seed: u64,
     /// Errors of its motion, by time ahead.
     pub errors: Vec<PredictionError>,
-    /// The factor by which its Lagrangian becomes that of the first member, up to a total derivative, and what that leaves; none of the
-    /// first, and where Lagrangians are not compared.
+    /// The factor by which its Lagrangian becomes that of the first member, up to a total derivative, and the remaining difference; none
+    /// for the first, and if Lagrangians are not compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub comparison: Option<Equivalence>,
 }
@@ -44,13 +43,13 @@ pub struct Member {
 pub struct Members {
     /// The networks, that of the fit first.
     pub each: Vec<Member>,
-    /// Errors of the mean of their predictions, by time ahead; empty where they did not predict the same windows.
+    /// Errors of the mean of their predictions, by time ahead; empty if they did not predict the same windows.
     pub mean: Vec<PredictionError>,
     /// Standard deviation of the entries of the mass matrix between members, root mean square over entries and states, each entry over the
-    /// roots of the two masses of its row and column; none where Lagrangians are not compared.
+    /// roots of the two masses of its row and column; none if Lagrangians are not compared.
     pub mass_matrix_spread: Option<f64>,
     /// Standard deviation of the energy at rest between members, less its mean over the states, root mean square over the states, over the
-    /// spread of the mean energy at rest; none where Lagrangians are not compared, and of a Lagrangian without a potential.
+    /// spread of the mean energy at rest; none if Lagrangians are not compared, or have no potential.
     pub potential_spread: Option<f64>,
     /// Why Lagrangians are not compared; empty if they are.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -58,12 +57,12 @@ pub struct Members {
 }
 
 impl Members {
-    /// Trains the other members of a fit, whose model is the first, and writes their models beside it; returns their fits and what all
-    /// say, nothing for a fit of one. Members that the flag of the watch interrupts are left out;
-    /// those that are `kept` of an earlier run are not trained again.
+    /// Trains the other members of a fit, whose model is the first, and writes their models next to it. Returns their fits and the
+    /// comparison of all, which a fit with one member does not have. Members that the flag of the watch interrupts are left out; members
+    /// `kept` from an earlier run are not trained again.
     ///
     /// # Errors
-    /// As of a fit.
+    /// Those of a fit.
     pub(crate) fn train(
         prepared: &PreparedFit<'_>,
         config: &FitConfig,
@@ -143,7 +142,7 @@ impl Members {
             q.extend_from_slice(&states.q[rows.start * n..rows.end * n]);
             v.extend_from_slice(&states.v[rows.start * n..rows.end * n]);
         }
-        // Of more states than are needed, evenly spaced ones.
+        // If there are more states than needed, evenly spaced ones.
         let stride = (q.len() / n / states).max(1);
         let [q, v] = [q, v].map(|all| all.chunks_exact(n).step_by(stride).flatten().copied().collect::<Vec<f64>>());
         let first: &dyn EulerLagrange<f64> = networks[0];
@@ -185,7 +184,7 @@ impl Members {
         ["model", "seed"].map(String::from).into_iter().chain(times).chain(ends).collect()
     }
 
-    /// What stands below the table.
+    /// Remarks below the table.
     fn remarks(&self) -> Vec<String> {
         if !self.not_compared.is_empty() {
             return vec![format!("the Lagrangians of the members were not compared: {}", self.not_compared)];
@@ -199,7 +198,7 @@ impl Members {
         vec![meaning.to_string(), format!("spread between the members there: {known}")]
     }
 
-    /// The members beside each other.
+    /// The members side by side.
     pub(crate) fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.heading("Members, trained from different seeds");
@@ -236,7 +235,7 @@ fn file(member: usize) -> String {
     if member == 0 { MODEL.to_string() } else { format!("member-{member}.safetensors") }
 }
 
-/// The seed of a member: that of the fit and those that follow, from the largest on 0.
+/// The seed of a member: the seed of the fit and the following ones, with 0 after the largest.
 fn seed(config: &FitConfig, member: usize) -> u64 {
     (config.training.seed + member as u64) & MOST_SEED
 }
@@ -267,7 +266,7 @@ fn in_one_gauge(
     let rest = vec![0.0; v.len()];
     let of = |(network, factor): (&&NetworkLagrangian<f64>, &f64)| {
         let mut terms = Terms::default();
-        // What is not finite at a state makes the spread not finite.
+        // Terms that are not finite at a state make the spread not finite.
         let _ = network.terms(q, v, Request::MASS_MATRIX, &mut terms);
         let masses: Vec<f64> = terms.mass_matrix.iter().map(|m| m * factor).collect();
         let _ = network.terms(q, &rest, Request::ENERGY, &mut terms);

@@ -35,12 +35,11 @@ fn size(bytes: u64) -> String {
     format!("{value:.1} {}", units[unit])
 }
 
-/// Bytes of `motions` sampled motions of `n` coordinates, `samples` each: `2 n + 2` numbers per sample, each held as it
-/// is made, as it is kept, as what is worked out of it, in vectors that may have grown to twice their length, and as
-/// `text` bytes of text.
+/// Bytes of `motions` sampled motions of `n` coordinates, `samples` each: `2 n + 2` numbers per sample, held three times (computed, stored
+/// and evaluated) in vectors that may have grown to twice their length, and as `text` bytes of text.
 pub(crate) fn motions(motions: u64, samples: f64, n: usize, text: u64) -> Option<u64> {
     let numbers = (n as u64).checked_add(1)?.checked_mul(2)?;
-    // A quotient beyond 64 bits saturates, and what is made of it overflows.
+    // A quotient beyond 64 bits saturates, and later sums with it overflow.
     let samples = (samples.abs().ceil() as u64).checked_add(1)?;
     numbers.checked_mul(48 + text)?.checked_mul(samples)?.checked_mul(motions)
 }

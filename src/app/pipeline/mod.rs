@@ -1,5 +1,4 @@
-//! Pipelines: a training, a fit of recorded motion, an evaluation, each from its configuration to model, tables, pictures and
-//! report.
+//! Pipelines: a training, a fit of recorded motion or an evaluation, each from its configuration to model, tables, pictures and report.
 //!
 //! The command line and the Python package call the same functions:
 //!
@@ -9,9 +8,9 @@
 //! | [`Fit`] | recorded motion | a model, judged by motion that was held out ([`HoldOut`]) |
 //! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
 //!
-//! Files go into an [`Output`], of which a [`Directory`] and [`InMemory`] are two; what happens meanwhile comes as an [`Event`] to
-//! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked, and files that stand where it
-//! writes are replaced; [`Fit::out`] and experiments lock theirs, and replace a run that is there on demand alone.
+//! Files go into an [`Output`], such as a [`Directory`] or [`InMemory`]; progress is reported as an [`Event`] to the [`Watch`], whose flag
+//! ends the work. Nothing is printed, a [`Directory`] is not locked, and existing files of the same names are replaced; [`Fit::out`] and
+//! experiments lock theirs, and replace an existing run only on request.
 //!
 //! # A fit of recorded motion, judged
 //!

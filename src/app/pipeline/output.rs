@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Sink for the files of a pipeline. The model is written first, then what is small, pictures last: on a full disk nothing that
-/// comes after can lose them.
+/// Sink for the files of a pipeline. The model is written first, then small files, and pictures last, so that a full disk loses none of the
+/// others.
 pub trait Output: Sync {
     /// Writes a file whole or not at all; one of this name is replaced. Names have no directories.
     ///

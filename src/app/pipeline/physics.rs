@@ -1,6 +1,7 @@
-//! Physics of a model: its functions, metric, curvature, symmetries, charges, signature, beside those of the system it learned.
+//! Physics of a model: its functions, metric, curvature, symmetries, charges and signature, compared with those of the system that it
+//! learned.
 //!
-//! All of it is bounded by work, not by time: what depends on the clock would not be the same in every run.
+//! The work is bounded by size, not by time, so that every run gives the same results.
 
 use crate::analysis::{
     MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, matrices_at_rest,
@@ -23,19 +24,19 @@ use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough,
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Points of the curvature, and of its map along each axis, at most.
+/// Largest number of points for the curvature, and of points along each axis of its map.
 const POINTS: (usize, usize) = (100, 21);
-/// Points of a map of the metric along each axis, at most.
+/// Largest number of points along each axis of a map of the metric.
 const METRIC_POINTS: usize = 41;
 /// Points of a map along each axis that are worth a picture.
 const WORTH: usize = 8;
-/// Weights times `n` times points of the maps of a metric, at most: a second or so.
+/// Largest product of weights, `n` and points of the maps of a metric: a second or so.
 const METRIC_WORK: usize = 150_000_000;
-/// Weights times `n^3` times points of the curvature, at most: a second or so.
+/// Largest product of weights, `n^3` and points of the curvature: a second or so.
 const CURVATURE_WORK: usize = 100_000_000;
-/// Weights times `n^2` times boxes of a certificate, at most: a second or so.
+/// Largest product of weights, `n^2` and boxes of a certificate: a second or so.
 const BOXES_WORK: usize = 80_000_000;
-/// Boxes of a certificate, at most.
+/// Largest number of boxes of a certificate.
 const BOXES: usize = 2000;
 /// Seed of the states that are examined.
 const SEED: u64 = 0;
@@ -43,11 +44,11 @@ const SEED: u64 = 0;
 /// Curvature scalar of the learned metric at rest, times the factor up to which a Lagrangian is determined.
 #[derive(Clone, Debug, Serialize)]
 pub struct CurvatureScalar {
-    /// Factor by which the learned metric comes nearest to the exact one; 1 without one.
+    /// Factor that brings the learned metric closest to the exact one; 1 without an exact one.
     pub factor: f64,
-    /// Of the model, after the factor.
+    /// Curvature of the model, with the factor.
     pub learned: Spread,
-    /// Of the system, if it is known.
+    /// Curvature of the system, if it is known.
     pub exact: Option<Spread>,
 }
 
@@ -56,7 +57,7 @@ pub struct CurvatureScalar {
 pub struct FoundSymmetries {
     /// Their number; none if there is no gap between singular values.
     pub count: Option<usize>,
-    /// First singular value that is not zero over the last that is.
+    /// Ratio of the first singular value that is not zero to the last that is.
     pub gap: Option<f64>,
     /// Name of the algebra, if it has one.
     pub name: Option<String>,
@@ -93,7 +94,7 @@ pub struct ChargeDrift {
     pub by_integrator: f64,
 }
 
-/// Shares of the region where the mass matrix is proven to have its signature, and not to have it.
+/// Shares of the region where the mass matrix is proven to have, or not to have, its signature.
 #[derive(Clone, Debug, Serialize)]
 pub struct ProvenSignature {
     /// Positive eigenvalues that are to be proven.
@@ -106,7 +107,7 @@ pub struct ProvenSignature {
     pub certified: f64,
     /// Share in which the opposite is proven.
     pub refuted: f64,
-    /// Share in which neither is proven by so many boxes.
+    /// Share in which neither is proven by this many boxes.
     pub open: f64,
     /// Boxes that were evaluated.
     pub boxes: usize,
@@ -117,7 +118,7 @@ pub struct ProvenSignature {
 pub struct Physics {
     /// Bounds of the states that were examined, by column.
     pub region: BTreeMap<String, [f64; 2]>,
-    /// Best factor and gauge term beside the exact Lagrangian, if the system is known, and the differences that remain.
+    /// Best factor and gauge term relative to the exact Lagrangian, if the system is known, and the remaining differences.
     pub equivalence: Option<Equivalence>,
     /// Components of the metric, of geodesics alone.
     pub metric: Vec<MetricComponent>,
@@ -125,9 +126,9 @@ pub struct Physics {
     pub curvature_scalar: Option<CurvatureScalar>,
     /// Point symmetries of the model.
     pub symmetries: Option<FoundSymmetries>,
-    /// Those of the system, if it is known.
+    /// Symmetries of the system, if it is known.
     pub exact_symmetries: Option<FoundSymmetries>,
-    /// Drifts of the charges of the system along the first learned motion, as far as it is drawn; the energy first.
+    /// Drifts of the system's charges along the first learned motion, up to the end of its picture; the energy first.
     pub charges: Vec<ChargeDrift>,
     /// Time until which they were followed.
     pub charges_until: f64,
@@ -143,7 +144,7 @@ pub struct Physics {
     pub figures: Vec<Figure>,
 }
 
-/// A model with what is known of it.
+/// A model with the data about it.
 pub(crate) struct Subject<'a> {
     pub network: &'a NetworkLagrangian<f64>,
     /// States that it was trained on; periodic coordinates are unbounded.
@@ -153,7 +154,7 @@ pub(crate) struct Subject<'a> {
     /// Names of coordinates and velocities, with units as labels of axes.
     pub columns: Vec<String>,
     pub labels: Vec<String>,
-    /// The recorded motion it was learned from, if it was, and what that determines.
+    /// The recorded motion that it was learned from, if any, and what that determines.
     pub recorded: Option<&'a Recording>,
     pub determined: Option<&'a Determined>,
     /// Learned motion along which charges are followed.
@@ -162,7 +163,7 @@ pub(crate) struct Subject<'a> {
 }
 
 impl Physics {
-    /// Physics of a model; `check` is called between the parts and ends them by its error.
+    /// Physics of a model; `check` is called between the parts, and its error ends the work.
     ///
     /// # Errors
     /// That of `check`; a system that cannot be built.
@@ -175,7 +176,7 @@ impl Physics {
         Ok(found)
     }
 
-    /// That of a model under constraints, off which its meaning off the constraints.
+    /// The physics of a model under constraints, without the parts that would need states off the constraints.
     pub(crate) fn under_constraints(subject: &Subject<'_>) -> Self {
         let problem = "maps of the learned functions, curvature, symmetries, certificate of the signature: the Lagrangian has no \
                        meaning off the constraints";
@@ -202,10 +203,10 @@ impl Physics {
         }
     }
 
-    /// Finds part after part; those that were found before an error are whole.
+    /// Computes part after part; the parts before an error are complete.
     ///
     /// # Errors
-    /// As [`Physics::new`].
+    /// Those of [`Physics::new`].
     pub(crate) fn find(
         &mut self,
         subject: &Subject<'_>,
@@ -300,8 +301,8 @@ impl Physics {
         }
     }
 
-    /// Where pictures are drawn: over the recorded motion, or over the region; maps over the first two coordinates, those of space if there
-    /// are two.
+    /// The region of the pictures: the recorded motion, or the region of the states; maps are over the first two coordinates, or the first
+    /// two of space if there are two.
     fn picturing<'a>(&self, subject: &Subject<'a>, region: &Region, unit: String) -> Picturing<'a> {
         let n = self.coordinates.len();
         let shown = if n > 2 && subject.time_like() == Some(0) { [1, n - 1] } else { [0, (n - 1).min(1)] };
@@ -420,7 +421,7 @@ impl Physics {
     }
 }
 
-/// The factors by which a learned Lagrangian is taken beside the exact one, those of its coordinates, in words.
+/// The factors that multiply a learned Lagrangian for comparison with the exact one, per coordinate, in words.
 fn taken(names: &[String], factors: &[f64]) -> String {
     if factors.iter().all(|factor| *factor == factors[0]) {
         return format!("The learned Lagrangian is taken times {}, its best factor.", number(factors[0]));
@@ -439,8 +440,8 @@ impl Subject<'_> {
         self.recorded.is_some_and(|recording| recording.tracks.iter().any(|track| !track.force.is_empty()))
     }
 
-    /// The middle of the states that the model was trained on, of a known system of those on which errors are stated as well;
-    /// angles go round.
+    /// The middle of the states that the model was trained on; for a known system, of those on which errors are stated as well; angles make
+    /// a full turn.
     fn region(&self) -> Region {
         let n = self.network.coordinates();
         let stated = self.system.map(|system| {

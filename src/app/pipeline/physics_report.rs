@@ -4,16 +4,16 @@ use crate::names::{number, rounded};
 use crate::pipeline::physics::{FoundSymmetries, Physics};
 use crate::report::Report;
 
-/// Stands where there is no number.
+/// Shown where there is no number.
 const NONE: &str = "-";
 
-/// A number with four digits, or none.
+/// A number with four digits, or [`NONE`].
 fn shown(x: Option<f64>) -> String {
     x.map_or(NONE.to_string(), |x| rounded(x, 4))
 }
 
 impl Physics {
-    /// Tables, and what is missing; the pictures stand above all tables of a page.
+    /// Tables and remarks on missing parts; the pictures are above all tables of a page.
     pub(crate) fn report(&self, report: Report) -> Report {
         let about = "Symmetries, charges and signature, of geodesics metric and curvature, over the middle of the states that the \
                      model was trained on.";

@@ -13,7 +13,7 @@ const PILOT: usize = 40;
 /// Windows between two looks at the bar; a multiple of the motions that are integrated together.
 const PART: usize = 32;
 
-/// Windows with what a model makes of them.
+/// Windows with the predictions of a model.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct HeldOutPredictions {
     /// The windows that were predicted.
@@ -27,7 +27,7 @@ pub(crate) struct HeldOutPredictions {
 }
 
 impl HeldOutPredictions {
-    /// Predicts the windows, or few of them if those show that there is nothing to predict.
+    /// Predicts the windows, or a few of them if those show that prediction is hopeless.
     ///
     /// # Errors
     /// [`PipelineError::Interrupted`].
@@ -61,7 +61,7 @@ impl HeldOutPredictions {
         }
     }
 
-    /// Predictions that were given up or left out, in words; nothing if all went well.
+    /// Predictions that were given up or left out, in words; empty if all succeeded.
     pub fn remarks(&self) -> String {
         let mut text = String::new();
         let predicted = self.windows.len();

@@ -23,7 +23,7 @@ pub struct PreparedFit<'a> {
     /// Its smoothed states, divided.
     pub measured: RecordingSplit,
     pub(crate) targets: Targets,
-    /// Constraints that hold the motion.
+    /// Constraints on the motion.
     pub(crate) held: Option<FitHeld>,
     /// Remarks on them.
     pub(crate) remarks: Vec<String>,
@@ -36,9 +36,9 @@ impl<'a> PreparedFit<'a> {
     /// `into`.
     ///
     /// # Errors
-    /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
-    /// ones are requested and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has;
-    /// [`PipelineError::Constraints`] for constraints with a mistake, that contradict each other, or that the motion does not obey.
+    /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured ones are
+    /// requested and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has; [`PipelineError::Constraints`]
+    /// for constraints that are invalid, contradict each other, or are not obeyed by the motion.
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
         let measured = RecordingSplit::of_takes(&reading.recording, &reading.takes, &options.preparation())?;
@@ -57,7 +57,7 @@ impl<'a> PreparedFit<'a> {
         Ok(Self { reading, options: options.clone(), measured, targets, held, remarks, started })
     }
 
-    /// The constraints that hold the motion.
+    /// The constraints on the motion.
     pub(crate) fn constraints(&self) -> Option<&FormulaConstraints> {
         self.held.as_ref().map(|held| &held.constraints)
     }
@@ -65,7 +65,7 @@ impl<'a> PreparedFit<'a> {
     /// Training, validation and test states; projected onto the constraints if there are any.
     ///
     /// # Errors
-    /// As of [`RecordingSplit::datasets`]; [`PipelineError::Constraints`] for a state from which no way leads to the constraints.
+    /// Those of [`RecordingSplit::datasets`]; [`PipelineError::Constraints`] for a state that cannot be projected onto the constraints.
     pub(crate) fn datasets<S: Scalar>(&self) -> Result<Datasets<S>, PipelineError> {
         let Some(held) = &self.held else { return Ok(self.measured.datasets(self.targets)?) };
         let Datasets { training, validation, test } = self.measured.datasets::<f64>(self.targets)?;
@@ -79,10 +79,10 @@ impl<'a> PreparedFit<'a> {
         self.targets
     }
 
-    /// Refuses a horizon within which there is no sample, and one beyond which there is none.
+    /// Rejects a horizon that contains no sample, or after which there is none.
     ///
     /// # Errors
-    /// The range that the held-out motion has.
+    /// The range that the held-out motion allows.
     pub fn check_horizon(&self, horizon: Option<f64>) -> Result<(), ConfigError> {
         let (Some(found), Some((least, most))) = (horizon, horizons(&self.measured.test)) else { return Ok(()) };
         // The last sample may be early or late by a rounding error of the times.
@@ -94,7 +94,7 @@ impl<'a> PreparedFit<'a> {
         Err(ConfigError { field: "horizon".to_string(), expected: expected.into(), found: found.to_string() })
     }
 
-    /// Survey of the recorded motion, with warnings of what will hinder a fit.
+    /// Survey of the recorded motion, with warnings of problems for a fit.
     ///
     /// # Errors
     /// [`PipelineError::Smooth`] for motion without derivatives.

@@ -19,7 +19,7 @@ pub(crate) struct Caption {
     pub caption: String,
 }
 
-/// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
+/// Writes [`CAPTIONS`], which name and describe the pictures, then the report and the pictures.
 ///
 /// # Errors
 /// [`PipelineError::Output`].
@@ -35,7 +35,7 @@ pub(crate) fn write_report_and_figures<'a>(
     figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.to_svg().as_bytes()))
 }
 
-/// Writes the interactive page of a model, and adds a link to it; of a model that has none the report says why.
+/// Writes the interactive page of a model, and adds a link to it; if there is none, the report says why.
 ///
 /// # Errors
 /// [`PipelineError::Output`].

@@ -17,8 +17,8 @@ const FROM_SUMMARY: [(&str, &str); 6] = [
     ("valid_lyapunov_times", "/valid_time/lyapunov_times"),
 ];
 
-/// One line per run, finished or not: name, row, seed, the keys of the configuration in which the runs differ, outcome, numbers. Nothing
-/// in it depends on the clock.
+/// One line per run, finished or not: name, row, seed, the keys of the configuration in which the runs differ, outcome, numbers. It does
+/// not depend on the clock.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The model to start from, as far as the shape of a training is concerned.
 pub struct StartModel {
-    /// Where it is, as the user gave it.
+    /// The path as the user gave it.
     pub from: String,
     /// Header of its file.
     pub header: Header,
@@ -20,7 +20,7 @@ impl StartModel {
     /// Reads a model, by file or by the directory of its run.
     ///
     /// # Errors
-    /// [`PipelineError::NoModel`] and [`PipelineError::Model`] for anything but a whole model file.
+    /// [`PipelineError::NoModel`] and [`PipelineError::Model`] for anything but an intact model file.
     pub fn read(from: &str) -> Result<Self, PipelineError> {
         let path = model_file(Path::new(from))?;
         let loaded = ModelFile::<f64>::load(&path);
@@ -73,10 +73,10 @@ impl StartModel {
     }
 }
 
-/// Weights and scales of a model that a training starts from; the architecture must have been found to fit.
+/// Weights and scales of a model that a training starts from; its architecture must have been checked.
 ///
 /// # Errors
-/// A model that cannot be read, or that is of another shape by now.
+/// A model that cannot be read, or has since changed its shape.
 pub(crate) fn weights<S: Scalar>(
     from: &str,
     asked: impl FnOnce(Vec<f64>) -> Architecture,
@@ -93,7 +93,7 @@ pub(crate) fn weights<S: Scalar>(
     Err(PipelineError::OtherShape { place: path.display().to_string(), differences, configuration: false })
 }
 
-/// Differences between the shape asked for and that of a model.
+/// Differences between the requested shape and that of a model.
 fn differences(asked: &Architecture, model: &Architecture) -> Vec<String> {
     let fields = |shape: &Architecture| serde_json::to_value(shape).unwrap_or_default();
     let (asked, model) = (fields(asked), fields(model));

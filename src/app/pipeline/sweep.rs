@@ -38,12 +38,12 @@ pub struct Swept {
     pub findings: Findings,
 }
 
-/// Trains every configuration, each with so many seeds from its own on, as many at a time as there are threads, into directories of their own
-/// below `path`; finished runs are not run again. Table and report of all of them are written there.
+/// Trains every configuration with several seeds, starting with its own, as many at a time as there are threads, each into its own
+/// directory below `path`; finished runs are not repeated. A table and a report of all runs are written there.
 ///
 /// # Errors
 /// [`PipelineError::Taken`] for a finished run of another configuration unless `overwrite` is set; files that cannot be written, an
-/// interruption. Runs that are finished stay finished.
+/// interruption. Finished runs are kept.
 pub fn sweep(
     configurations: Vec<(Choice, Config)>,
     (seeds, threads): (usize, usize),

@@ -3,10 +3,10 @@
 use serde::de::DeserializeOwned;
 use toml::Value;
 
-/// A value from a table. All are read from tables and not from texts, so that the code of every type is compiled for one format.
+/// A value from a table. Everything is read from tables, not from texts, so that the code of every type is compiled for one format.
 ///
 /// # Errors
-/// The path of the key that is refused, such as `phase[0].rate`, and what is wrong there.
+/// The path of the rejected key, such as `phase[0].rate`, and what is wrong there.
 pub fn from_table<T: DeserializeOwned>(table: Value) -> Result<T, (String, String)> {
     // A date would be read as text.
     if let Some(path) = date(&table) {

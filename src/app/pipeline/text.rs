@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-/// The system of a description as text, TOML, as the file of a system holds it.
+/// The system of a description in TOML, the text of a system file.
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there.
@@ -59,7 +59,7 @@ pub fn line_of(lines: &Lines, mut path: &str) -> Option<usize> {
     }
 }
 
-/// The lines of all keys of a text that is TOML.
+/// The lines of all keys of a TOML text.
 pub fn lines(text: &str) -> Lines {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut found = Lines::new();

@@ -1,4 +1,4 @@
-//! Steps of time of recorded motion: gaps, uneven clocks, and the rows that a fit leaves out because of them.
+//! Time steps of recorded motion: gaps, uneven clocks, and the rows that a fit leaves out because of them.
 
 use crate::data::Split;
 use crate::names::{percent, pluralize};
@@ -29,7 +29,7 @@ struct LeftOut {
 }
 
 impl TimeSteps {
-    /// Of a recording whose part `training` is learned from by these targets.
+    /// Steps of a recording whose part `training` is used with these targets.
     pub fn new(reading: &LoadedRecording, training: &Split, targets: Targets) -> Self {
         let jitter = reading.recording.tracks.iter().map(|track| Clock::of(&track.times).jitter());
         let [at_ends, near_gaps] = training.left_out(targets);
@@ -38,7 +38,7 @@ impl TimeSteps {
         Self { bridged: reading.bridged, cuts: reading.cuts.len(), jitter: jitter.fold(0.0, f64::max), left_out }
     }
 
-    /// In words; nothing where steps are even and there is no gap.
+    /// In words; empty if steps are even and there is no gap.
     pub fn lines(&self) -> Vec<String> {
         let mut parts = Vec::new();
         let Bridged { gaps, rows, longest } = self.bridged;
@@ -65,5 +65,5 @@ impl TimeSteps {
     }
 }
 
-/// Jitter that is rounding of the times.
+/// Jitter up to this size is rounding of the times.
 const ROUNDING: f64 = 1e-6;

@@ -100,7 +100,7 @@ pub struct TrainReport {
     pub network: NetworkLagrangian<f64>,
     /// Epochs that were run.
     pub history: Vec<Epoch>,
-    /// The model beside the system it learned.
+    /// The model, compared with the system that it learned.
     pub evaluation: Evaluation,
     /// Losses, times and sizes.
     pub figures: TrainFigures,
@@ -208,7 +208,7 @@ fn train_in<S: Scalar>(
     let started = Instant::now();
     let toml = toml::to_string(config).map_err(PipelineError::format)?;
     let LearnedRun { trained, model, fresh } = LearnedRun::<S>::new((config, &toml), system, options, watch)?;
-    // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
+    // The model first, then small files, pictures last, so that a full disk loses none of the others.
     write_model(output, &model)?;
     Command::Train.sign(output)?;
     output.write("config.toml", toml.as_bytes())?;
@@ -244,7 +244,7 @@ fn train_in<S: Scalar>(
     Ok(report)
 }
 
-/// What a training learned, before it is judged.
+/// Result of a training before it is judged.
 struct LearnedRun<S> {
     trained: Trained<S>,
     model: ModelFile<S>,
@@ -253,7 +253,7 @@ struct LearnedRun<S> {
 }
 
 impl<S: Scalar> LearnedRun<S> {
-    /// Draws the states and trains the network that a configuration asks for.
+    /// Draws the states and trains the network of a configuration.
     ///
     /// # Errors
     /// Configurations out of range, a model of another shape, too little memory, checkpoints that cannot be read or written, a training that
@@ -318,8 +318,8 @@ fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
 
-/// Ranges of the coordinates and velocities of the training states: the bounds of the configuration, which do not tell the velocity that a
-/// mass shell fixes, nor anything of states that were brought to constraints.
+/// Ranges of the coordinates and velocities of the training states. The bounds of the configuration lack the velocity that a mass shell
+/// fixes, and do not apply to states that were projected onto constraints.
 fn ranges<S: Scalar>(config: &Config, system: &SystemInstance<f64>, data: &Datasets<S>) -> [Vec<[f64; 2]>; 2] {
     let join = |[low, high]: [f64; 2], [l, h]: [f64; 2]| [low.min(l), high.max(h)];
     let all: Vec<_> = data.training.iter().map(Dataset::ranges).collect();

@@ -66,7 +66,7 @@ impl Watch {
         Self { events: Some(Arc::new(events)), interrupt: Arc::default() }
     }
 
-    /// The same with the events that pass alone.
+    /// This watch with the events that pass only.
     fn filtered(&self, passes: fn(Event<'_>) -> bool) -> Self {
         let events = self.events.clone().map(|events| -> EventSink {
             Arc::new(move |event| {
@@ -78,12 +78,12 @@ impl Watch {
         Self { events, interrupt: Arc::clone(&self.interrupt) }
     }
 
-    /// The same with no events but remarks.
+    /// This watch with remarks as its only events.
     pub(crate) fn remarks_alone(&self) -> Self {
         self.filtered(|event| matches!(event, Event::Note(_)))
     }
 
-    /// The same without remarks.
+    /// This watch without remarks.
     pub(crate) fn without_remarks(&self) -> Self {
         self.filtered(|event| !matches!(event, Event::Note(_)))
     }
@@ -100,7 +100,7 @@ impl Watch {
         }
     }
 
-    /// The same for a search.
+    /// A cancellation for a search.
     pub fn cancellation(&self) -> Cancellation {
         let cancellation = Cancellation::by(&self.interrupt);
         match self.events.clone() {
@@ -109,7 +109,7 @@ impl Watch {
         }
     }
 
-    /// The same for a training, such as [`Trainer::train_watched`](crate::presets::Trainer::train_watched).
+    /// Hooks for a training, such as [`Trainer::train_watched`](crate::presets::Trainer::train_watched).
     pub fn hooks(&self) -> Hooks {
         let watcher = self.events.clone().map(|events| {
             let watcher: crate::training::Watcher = Arc::new(move |progress: Progress<'_>| match progress {

@@ -9,8 +9,8 @@ const MOST: usize = 7;
 /// Samples that are shown.
 const SAMPLES: usize = 2000;
 
-/// Distance of the motion from every constraint: `|phi|` over the length of its gradient, of a row that is linear in the velocities
-/// `|A v - b|` over its length. Nothing where none was found.
+/// Distance of the motion from every constraint: `|phi|` over the length of its gradient; for a row that is linear in the velocities, `|A v
+/// - b|` over its length. Empty if no constraint was found.
 pub fn found_constraint_figures(found: &FoundConstraints, samples: &MotionSamples) -> Vec<Figure> {
     let Ok(constraints) = FormulaConstraints::new(samples.names(), found.formulas()) else { return Vec::new() };
     let Ok(manifold) = constraints.manifold::<f64>() else { return Vec::new() };

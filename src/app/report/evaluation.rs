@@ -188,7 +188,7 @@ pub(crate) fn units<S>(system: &SystemInstance<S>) -> Vec<(String, Vec<usize>)> 
     by_unit(&system.system.units(system.coordinates)[..system.coordinates])
 }
 
-/// Coordinates of a start, and velocities if there is a time-like coordinate: rates of clocks.
+/// Coordinates of a start, and velocities if there is a time-like coordinate: the rates of clocks.
 fn over_time_of<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: &str, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (coordinates, columns) = (system.system.coordinates(n), system.system.columns(n));
@@ -283,7 +283,7 @@ fn times<S: Scalar>(trajectory: &Trajectory<S>) -> impl Iterator<Item = f64> {
     trajectory.t.iter().map(|t| t.to_f64())
 }
 
-/// Component `k` of the states `(q, v)` over time; nothing if the trajectory has not so many.
+/// Component `k` of the states `(q, v)` over time; empty if the trajectory does not have it.
 fn component<S: Scalar>(trajectory: &Trajectory<S>, k: usize) -> Vec<f64> {
     let n = trajectory.coordinates;
     let (values, offset) = if k < n { (&trajectory.q, k) } else { (&trajectory.v, k - n) };

@@ -1,11 +1,11 @@
-//! The table of an experiment, with the figures of others beside ours, and its loss curves.
+//! The table of an experiment, with published numbers next to ours, and its loss curves.
 
 use super::{DataTable, Figure, LinePlot, Series, figure, line_plot};
 use crate::experiments::{Record, Row, Run, RunSpread};
 use crate::names::rounded;
 use serde_json::json;
 
-/// A quantity of a row, and the paper's figure beside it if it states one.
+/// A quantity of a row, and the paper's number next to it if there is one.
 type Quantity = (&'static str, fn(&Row) -> Option<RunSpread>, Option<fn(&Row) -> Option<f64>>);
 
 /// Quantities of the table of an experiment, in the order of its columns.
@@ -61,15 +61,15 @@ const VIEW_HEADER: [&str; 16] = [
     "physical instability [SI]",
 ];
 
-/// Stands where there is no figure.
+/// Shown where there is no number.
 const NONE: &str = "-";
 
-/// A number with three digits, so many times as large.
+/// A number times a factor, with three digits.
 fn one(x: Option<f64>, factor: f64) -> String {
     x.map_or_else(|| NONE.to_string(), |x| rounded(factor * x, 3))
 }
 
-/// A spread as `mean [low, high]`, or the value alone where there is no spread.
+/// A spread as `mean [low, high]`, or only the value without a spread.
 fn spread(value: Option<RunSpread>, factor: f64) -> String {
     let Some(RunSpread { mean, low, high, .. }) = value else { return NONE.to_string() };
     let [mean, least, most] = [mean, low, high].map(|x| one(Some(x), factor));
@@ -99,8 +99,8 @@ fn view(row: &Row) -> Vec<String> {
     ]
 }
 
-/// Rows for people, with their header: the mean over the runs with the lowest and the highest, fractions in per cent, three digits; no
-/// column without a figure, neither of ours nor of the paper's beside it, and none of the paper's without any.
+/// Rows for people, with their header: the mean over the runs with the lowest and the highest, fractions in per cent, three digits. Columns
+/// without a number are left out, both ours and the paper's.
 pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
     let all: Vec<Vec<String>> = rows.iter().map(view).collect();
     let known = |k: usize| all.iter().any(|row| row[k] != NONE);
@@ -110,7 +110,7 @@ pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
     (shown.iter().map(|&k| VIEW_HEADER[k]).collect(), all.iter().map(pick).collect())
 }
 
-/// Loss curves of an experiment from its finished runs; what has nothing to show is left out.
+/// Loss curves of an experiment from its finished runs; empty curves are left out.
 pub fn loss_figures(results: &[(Run, Option<Record>)]) -> Vec<Figure> {
     let of = |(part, word): (usize, &str)| {
         let plot = LinePlot {
@@ -140,7 +140,7 @@ pub fn groups(results: &[(Run, Option<Record>)], of: fn(&Run) -> &str) -> Vec<(&
     groups
 }
 
-/// One line per group: geometric mean over the runs that still went on, epoch by epoch.
+/// One line per group: geometric mean over the runs that have not ended, epoch by epoch.
 fn loss_curves(results: &[(Run, Option<Record>)], part: usize) -> Vec<Series> {
     let curve = |members: &[(&Run, &Record)]| -> Vec<(f64, f64)> {
         let epochs = members.iter().map(|(_, record)| record.losses.len()).max().unwrap_or(0);
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!((at("loss here [1]"), at("loss paper [1]")), ("0.0123 [0.0113, 0.0133]", "0.0197"));
         assert_eq!((at("regular motions here [%]"), at("regular motions paper [%]")), ("0.0460", "0.580"));
         assert_eq!((at("chaotic motions here [%]"), at("chaotic motions paper [%]")), ("0.290", "19.0"));
-        // Columns of nothing are left out, for people only.
+        // Empty columns are left out, for people only.
         assert!(!header.iter().any(|name| name.contains("instability") || *name == "energy error paper [%]"));
         let file = experiment_table(&[row]).objects().remove(0);
         let number = |name: &str| file[name].as_f64();

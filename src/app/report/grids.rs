@@ -8,9 +8,9 @@ use std::f64::consts::{PI, TAU};
 /// How a learned quantity is brought to the exact one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fit {
-    /// By a factor that is known, and what it is in words.
+    /// By a known factor, described in words.
     Factor(f64, String),
-    /// By the best factor and summand (`L`).
+    /// By the best factor and constant (`L`).
     Affine,
 }
 
@@ -33,17 +33,16 @@ pub struct GridComparison {
     pub learned: Grid,
     /// Components that are fixed on the grid, in words (`v = 0 m/s`); may be empty.
     pub fixed: String,
-    /// Up to what the two are compared.
+    /// The fit applied before the comparison.
     pub fit: Fit,
     /// `true` to count and mark points where the learned value has the wrong sign.
     pub signs: bool,
 }
 
-/// Exact, learned and difference side by side, the first two with one range of colours; none if a grid has no finite value or the grids
-/// differ in size.
+/// Exact, learned and difference side by side, the first two with the same range of colours; none if a grid has no finite value or the
+/// grids differ in size.
 ///
-/// The range is that of the exact values; if learned values of the wrong sign are marked, it reaches their change of sign
-/// too.
+/// The range is that of the exact values; if learned values of the wrong sign are marked, it includes their change of sign.
 pub fn grid_figures(comparison: &GridComparison) -> Option<Figure> {
     let GridComparison { quantity, exact, .. } = comparison;
     let (learned, how) = match &comparison.fit {
@@ -102,7 +101,7 @@ pub struct QuantityMap {
     pub labels: [String; 2],
     /// Of the model.
     pub learned: Grid,
-    /// Of the system, if it is known.
+    /// Values of the system, if it is known.
     pub exact: Option<Grid>,
     /// Coordinates that are fixed, in words; may be empty.
     pub fixed: String,
@@ -175,8 +174,8 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// The turn about 0 or `pi`, whichever the angles are closer to on average: they cross its ends as rarely as may be.
-    /// `None` if all of them lie within it, where there is nothing to fold.
+    /// The turn about 0 or `pi`, whichever the angles are closer to on average, so that they cross its ends as rarely as possible. `None`
+    /// if all of them lie within it and need no folding.
     pub fn of(angles: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let mean: f64 = angles.clone().filter(|x| x.is_finite()).map(f64::cos).sum();
         let turn = Self { middle: if mean < 0.0 { PI } else { 0.0 } };
@@ -355,7 +354,7 @@ mod tests {
         assert_eq!((up.low(), up.high()), (0.0, TAU));
         assert_eq!(Turn::of([3.0, 4.0, 2.5].into_iter()), None);
         assert_eq!(Turn::of([0.1, -3.0, f64::NAN].into_iter()), None);
-        // Jumps leave gaps, and what is no number stays so.
+        // Jumps leave gaps, and `NaN` stays `NaN`.
         let jump =
             Turn::of([0.0, 20.0].into_iter()).unwrap().fold(&[(0.0, 1.0), (20.0, 2.0), (f64::NAN, 3.0), (0.5, 4.0)]);
         assert_eq!(jump.iter().filter(|p| p.0.is_finite()).count(), 3);

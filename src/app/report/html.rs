@@ -64,7 +64,7 @@ impl Report {
         self
     }
 
-    /// Adds a link to a file that stands beside the report.
+    /// Adds a link to a file next to the report.
     #[must_use]
     pub fn link(mut self, file: &str, text: &str) -> Self {
         let _ = writeln!(self.body, "<p><a href=\"{}\">{}</a></p>", escape(file), escape(text));
@@ -116,7 +116,7 @@ impl Report {
         })
     }
 
-    /// What was added, to stand in another page.
+    /// The content that was added, for insertion into another page.
     pub fn fragment(&self) -> &str {
         &self.body
     }
@@ -128,7 +128,7 @@ impl Report {
         if figures.peek().is_none() { self } else { self.heading(heading).figures(figures) }
     }
 
-    /// Adds pictures, beside each other where there is room; those of several panels have a row of their own.
+    /// Adds pictures, side by side where there is room; pictures with several panels get a row of their own.
     #[must_use]
     pub fn figures<'a>(mut self, figures: impl IntoIterator<Item = &'a Figure>) -> Self {
         self.body.push_str("<div class=\"figures\">\n");
@@ -154,7 +154,7 @@ impl Report {
     /// Adds a picture from the bytes of an SVG file, with its heading and its caption, which can do nothing but be seen.
     #[must_use]
     pub fn image(self, svg: &[u8], texts: [&str; 2]) -> Self {
-        // Panels that cannot wrap are scrolled where there is no room for them.
+        // Panels that cannot wrap scroll if there is no room for them.
         let panels = svg.windows(8).filter(|bytes| bytes == b"\n<svg x=").count();
         self.figure(("image/svg+xml", svg), if panels > 1 { " class=\"panels\"" } else { "" }, texts)
     }
@@ -170,7 +170,7 @@ impl Report {
         self
     }
 
-    /// Adds what matters most: a sentence and a short table of what and how much.
+    /// Adds the most important result: a sentence and a short table of numbers.
     #[must_use]
     pub fn summary(mut self, sentence: &str, rows: &[[String; 2]]) -> Self {
         let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", escape(sentence));
@@ -267,7 +267,7 @@ mod tests {
         assert!(html.contains("data:image/svg+xml;base64,AQID\""));
         assert!(html.contains("<td class=\"number\">1.5e-3</td>"));
         assert!(html.contains("prefers-color-scheme:dark"));
-        // A picture stands under what it shows.
+        // A picture comes below its heading.
         let place = |part: &str| html.rfind(part).unwrap();
         assert!(place("<h3>") < place("class=\"panels\"") && place("class=\"panels\"") < place("<figcaption>"));
     }

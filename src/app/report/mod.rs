@@ -47,7 +47,7 @@ impl Figure {
     }
 }
 
-/// A figure of what was drawn, under a heading; none where there was nothing to show, or zeros alone.
+/// A figure with a heading; none if there was nothing to show, or only zeros.
 pub fn figure(
     file: &str,
     heading: impl Into<String>,
@@ -63,7 +63,7 @@ pub fn with_unit(quantity: &str, unit: &str) -> String {
     if ["", "1"].contains(&unit) { quantity.to_string() } else { format!("{quantity} [{unit}]") }
 }
 
-/// Units, each with the places that have it, in their order.
+/// Units, each with the indices that have it, in order.
 pub fn by_unit(units: &[String]) -> Vec<(String, Vec<usize>)> {
     let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
     for (i, unit) in units.iter().enumerate() {
@@ -75,7 +75,7 @@ pub fn by_unit(units: &[String]) -> Vec<(String, Vec<usize>)> {
     groups
 }
 
-/// The place of the median of errors; one that is no number is the largest. None without errors.
+/// The index of the median of errors, with `NaN` as the largest. None without errors.
 pub(crate) fn median_of(errors: &[f64]) -> Option<usize> {
     let mut order: Vec<usize> = (0..errors.len()).collect();
     order.sort_by(|&a, &b| errors[a].total_cmp(&errors[b]));

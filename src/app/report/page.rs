@@ -1,5 +1,4 @@
-//! A model as a page to play with: one HTML file that holds its recorded functions and its weights, and the JavaScript that
-//! evaluates them.
+//! A model as an interactive page: one HTML file with its recorded functions, its weights, and the JavaScript that evaluates them.
 
 use super::html::{base64, escape};
 use crate::analysis::{mass_matrix_error, mass_matrix_error_within};
@@ -22,7 +21,7 @@ const PLAY: &str = include_str!("page/play.js");
 
 /// Largest page, in bytes.
 const MOST_BYTES: usize = 500_000;
-/// Seconds in which a system without seconds crosses what the model knows of it.
+/// Seconds in which a system without a unit of time crosses the region that the model knows.
 const SECONDS: f64 = 20.0;
 /// States from which a start on the constraints is looked for, and at which mass matrices are compared.
 const STARTS: usize = 24;
@@ -40,7 +39,7 @@ pub enum PageError {
     /// Constraints that do not fit the system.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// More weights than a page holds.
+    /// More weights than fit into a page.
     #[error("the page would have {found} bytes, {MOST_BYTES} at most are written: a smaller network has a page")]
     Large {
         /// A binary file.
@@ -48,7 +47,7 @@ pub enum PageError {
     },
 }
 
-/// The page of a model, beside the system that it learned if that is known.
+/// The page of a model, with the system that it learned if that is known.
 ///
 /// # Errors
 /// [`PageError`].
@@ -105,7 +104,7 @@ pub fn page(
         "exact": exact,
     });
     let known = if data["exact"].is_null() { "." } else { ", <b class=\"exact\">exact</b>." };
-    // Nothing inside of the data may end the element that holds it.
+    // Nothing inside the data may end the element that contains it.
     let data = data.to_string().replace('<', "\\u003c");
     let text = PAGE.replace("{TITLE}", &escape(&format!("{title}: learned")));
     let text = text.replace("{STYLE}", STYLE).replace("{EXACT}", known).replace("{ENGINE}", ENGINE);
@@ -176,8 +175,8 @@ fn inside(sides: &[(f64, f64)], share: f64, k: usize) -> Vec<f64> {
     sides.iter().enumerate().map(|(i, (low, high))| low + share(i) * (high - low)).collect()
 }
 
-/// Factors of the coordinates by which the mass matrix of a network, and of its motion under constraints, is nearest to the exact one over
-/// what the model knows; none where the two cannot be compared.
+/// Factors of the coordinates that bring the mass matrix of a network, and of its motion under constraints, closest to the exact one over
+/// the known region; none if the two cannot be compared.
 fn factors(
     header: &Header,
     (network, motion): (&NetworkLagrangian<f64>, &dyn EulerLagrange<f64>),
@@ -199,7 +198,8 @@ fn factors(
     Ok(Some(found.factors).filter(|factors| factors.iter().all(|factor| factor.is_finite())))
 }
 
-/// A moving start within what the model knows, of a system among those of its trajectory test, on its mass shell and its constraints.
+/// A moving start within the region that the model knows; for a system, among those of its trajectory test, on its mass shell and its
+/// constraints.
 fn start(
     header: &Header,
     system: Option<&SystemInstance<f64>>,
@@ -211,7 +211,7 @@ fn start(
     };
     let (q, mut v) = (inside(&positions, 0.3, 0), inside(&velocities, 0.75, 0));
     if let Some(system) = system {
-        // Off the shell there is a motion as well.
+        // There is a motion off the shell as well.
         let _ = system.impose_constraint(&q, &mut v);
     }
     let Some(manifold) = motion.manifold() else { return (q, v) };
@@ -225,7 +225,7 @@ fn start(
     tries.find(|(q, _)| known(q)).unwrap_or(first)
 }
 
-/// The least time in which a motion from a start crosses what the model knows of a coordinate, 0 if it crosses nothing.
+/// The shortest time in which a motion from a start crosses the known range of a coordinate, 0 if it crosses none.
 fn crossing(header: &Header, (_, v): &(Vec<f64>, Vec<f64>), time_like: Option<usize>) -> f64 {
     let widths = header.position.iter().map(|[low, high]| high - low).zip(v).enumerate();
     let times = widths.filter(|(i, _)| Some(*i) != time_like).map(|(_, (width, v))| width / v.abs());

@@ -7,7 +7,7 @@ use super::{Series, Trace, with_unit};
 pub struct Polar {
     radius: usize,
     angle: usize,
-    /// The angle from the axis of spherical coordinates, of which the plane of the equator is seen.
+    /// The angle from the axis of spherical coordinates, which are drawn in the plane of the equator.
     axis: Option<usize>,
     /// `true` for an angle from the vertical downwards, as the interactive page takes it.
     hangs: bool,
@@ -15,8 +15,8 @@ pub struct Polar {
 }
 
 impl Polar {
-    /// Those that are called `r` and `phi`, or `r` and `theta`, this from the vertical downwards, with the unit of every coordinate; all three
-    /// are spherical coordinates.
+    /// Coordinates called `r` and `phi`, or `r` and `theta`, the latter from the vertical downwards, with the unit of every coordinate; if
+    /// all three exist, they are spherical.
     pub fn of(names: &[String], units: &[String]) -> Option<Self> {
         let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let (radius, phi, theta) = (place("r")?, place("phi"), place("theta"));

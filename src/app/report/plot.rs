@@ -1,5 +1,4 @@
-//! Plots in SVG, from numbers that may be anything: what is not finite leaves a gap, and every range is finite and not
-//! empty before it is drawn.
+//! Plots in SVG, for any numbers: values that are not finite leave gaps, and every range is made finite and not empty before it is drawn.
 
 mod axes;
 mod heat_map;
@@ -20,7 +19,7 @@ use axes::TITLE_HEIGHT;
 use std::fmt::Write as _;
 use svg::{Panel, short};
 
-/// Numbers larger than this are left out: axes need room for arithmetic.
+/// Larger numbers are left out: axes need room for arithmetic.
 const LARGEST: f64 = 1e150;
 
 /// Why there is no picture.
@@ -49,7 +48,7 @@ impl Series {
         Self { name: name.into(), points: x.iter().copied().zip(y.iter().copied()).collect(), over: false }
     }
 
-    /// The same line drawn thin over the others.
+    /// This line, drawn thin over the others.
     #[must_use]
     pub fn over(self) -> Self {
         Self { over: true, ..self }
@@ -78,7 +77,7 @@ pub struct LinePlot {
     pub turn: Option<Turn>,
     /// A value to be marked.
     pub level: Option<Level>,
-    /// `true` if to draw the lines grey: what they show is not determined.
+    /// `true` to draw the lines grey because they are not determined.
     pub open: bool,
     /// Lines.
     pub series: Vec<Series>,
@@ -91,8 +90,8 @@ pub struct Trace {
     pub x_label: String,
     /// Label of the vertical axis, with unit.
     pub y_label: String,
-    /// Paths with a name each. One alone is coloured by time. The first of several is wide, the others are thin over it, and shown as far as
-    /// they keep within its extent of it.
+    /// Paths with a name each. One alone is coloured by time. The first of several is wide, the others are thin over it, and shown as far
+    /// as they stay within its extent of it.
     pub paths: Vec<Series>,
     /// `true` if both axes have one scale (a plane of space).
     pub equal: bool,
@@ -103,7 +102,7 @@ pub struct Trace {
 /// A grid as colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// What the colours mean.
+    /// The meaning of the colours.
     pub title: String,
     /// Label of the horizontal axis, with unit.
     pub x_label: String,
@@ -111,7 +110,7 @@ pub struct HeatMap {
     pub y_label: String,
     /// Values.
     pub grid: Grid,
-    /// Colours between these values; `None`: between the extremes of the grid.
+    /// Range of the colours; `None` for the extremes of the grid.
     pub range: Option<(f64, f64)>,
     /// `true` if colours diverge from 0 (differences).
     pub diverging: bool,

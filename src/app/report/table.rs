@@ -12,7 +12,7 @@ pub struct DataTable {
 }
 
 impl DataTable {
-    /// Comma-separated values: numbers as they are, text in double quotes, nothing where there is no value.
+    /// Comma-separated values: plain numbers, text in double quotes, nothing where there is no value.
     pub fn to_csv(&self) -> String {
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
         let cell = |value: &Value| match value {

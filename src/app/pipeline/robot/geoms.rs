@@ -13,7 +13,7 @@ fn length(x: Vector<f64>) -> f64 {
     x[0].hypot(x[1]).hypot(x[2])
 }
 
-/// A vector of length 1; `None` of one without a direction.
+/// A vector of length 1; `None` for a zero vector.
 fn unit(x: Vector<f64>) -> Option<Vector<f64>> {
     let length = length(x);
     (length > f64::MIN_POSITIVE && length.is_finite()).then(|| x.map(|x| x / length))

@@ -17,7 +17,7 @@ const MAX_ELEMENTS: usize = 4096;
 const READ: [&str; 8] = ["body", "joint", "geom", "inertial", "site", "camera", "light", "freejoint"];
 /// Elements of the root that are read or say nothing of motion.
 const READ_OF_ROOT: [&str; 8] = ["compiler", "option", "default", "worldbody", "asset", "visual", "statistic", "size"];
-/// Elements that hold bodies in ways that are not read: without them the robot would be another one.
+/// Elements with bodies that are not supported: leaving them out would give another robot.
 const REFUSED: [&str; 7] = ["include", "frame", "replicate", "composite", "flexcomp", "attach", "plugin"];
 /// Springs and rests of joints, which are not read.
 const OF_SPRINGS: [&str; 2] = ["stiffness", "springdamper"];
@@ -28,14 +28,14 @@ pub(super) struct Settings<'a, 'i> {
     angle: f64,
     /// `None` if it is refused.
     euler: Option<bool>,
-    /// `true` if geoms count even beside an inertial, `false` if they never count.
+    /// `true` if geoms count even when there is an inertial element, `false` if they never count.
     from_geoms: Option<bool>,
     /// A class with the class around it and its own elements.
     classes: BTreeMap<&'a str, (Option<&'a str>, Node<'a, 'i>)>,
     main: Option<&'a str>,
 }
 
-/// An element with the attributes that it does not have from its class.
+/// An element, with missing attributes taken from its class.
 #[derive(Clone, Copy)]
 pub(super) struct Styled<'s, 'a, 'i> {
     pub node: Node<'a, 'i>,
@@ -88,7 +88,7 @@ impl<'a, 'i> Settings<'a, 'i> {
         Ok(settings)
     }
 
-    /// An element of a class, or of the one that its body sets.
+    /// An element with its own class, or the one that its body sets.
     fn styled(&self, node: Node<'a, 'i>, of_body: Option<&'a str>) -> Outcome<Styled<'_, 'a, 'i>> {
         let class = node.attribute("class").or(of_body).or(self.main);
         match class.filter(|class| !self.classes.contains_key(class)) {
@@ -99,7 +99,7 @@ impl<'a, 'i> Settings<'a, 'i> {
 }
 
 impl<'a, 'i> Styled<'_, 'a, 'i> {
-    /// The element that has an attribute: this one, or that of its class or the classes around it.
+    /// The element that has an attribute: this one, its class, or a class around that.
     fn holder(&self, key: &str) -> Node<'a, 'i> {
         let mut class = self.class;
         let mut holder = self.node;
@@ -132,7 +132,7 @@ impl<'a, 'i> Styled<'_, 'a, 'i> {
         Ok(self.numbers(key, &[3])?.map_or(usual, |found| [found[0], found[1], found[2]]))
     }
 
-    /// Where it is in the frame around it.
+    /// Its place in the surrounding frame.
     pub fn place(&self) -> Outcome<Place> {
         let at = self.triple("pos", [0.0; 3])?;
         let degenerate = || fault(self.node, "expected a turn of vectors that are not zero");
@@ -216,7 +216,7 @@ fn push_bodies<'a, 'i>(
     waiting[first..].reverse();
 }
 
-/// What is not read, by its elements.
+/// The elements that are not read.
 fn left_out(root: Node<'_, '_>, world: Node<'_, '_>) -> Option<String> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     let of_root = root.children().filter(|node| !READ_OF_ROOT.contains(&node.tag_name().name()));
@@ -241,7 +241,8 @@ struct Reader<'s, 'a, 'i> {
 }
 
 impl<'a, 'i> Reader<'_, 'a, 'i> {
-    /// Reads a body in a frame of the link that carries it: what carries the bodies within, and the place of its frame there.
+    /// Reads a body in a frame of the link that carries it; returns the carrier of the bodies inside, and the place of the body's frame on
+    /// it.
     fn read_body(
         &mut self,
         node: Node<'a, 'i>,
@@ -293,7 +294,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         let unit = if slides { 1.0 } else { self.settings.angle };
         let turn =
             geoms::about(axis, 0.0).ok_or_else(|| fault(joint.node, "`axis`: expected a vector that is not zero"))?;
-        // Where the joint stands in the pose that the file describes.
+        // The position of the joint in the pose that the file describes.
         let reference = joint.number("ref", 0.0)? * unit;
         let length = axis[0].hypot(axis[1]).hypot(axis[2]);
         let moved = match slides {

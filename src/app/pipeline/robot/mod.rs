@@ -21,22 +21,22 @@ use xml::Fault;
 
 /// Most links that move.
 const MAX_LINKS: usize = 64;
-/// Bounds of joints that have none, in rad and m.
+/// Bounds of joints without bounds, in rad and m.
 const USUAL: (f64, f64) = (std::f64::consts::PI, 1.0);
-/// Bound of speeds that have none, in rad/s or m/s.
+/// Bound of speeds without a bound, in rad/s or m/s.
 const USUAL_SPEED: f64 = 3.0;
 
-/// A robot: its links that move, each after the one that carries it.
+/// A robot: its moving links, each after the one that carries it.
 #[derive(Debug)]
 struct Robot {
     name: String,
     gravity: [f64; 3],
     links: Vec<Link>,
-    /// What is read otherwise than it stands, or not at all.
+    /// Elements that are read differently from their meaning, or not at all.
     notes: Vec<String>,
 }
 
-/// A link that moves, with what is fixed to it.
+/// A moving link, with everything fixed to it.
 #[derive(Debug)]
 struct Link {
     name: String,
@@ -53,7 +53,7 @@ struct Link {
     speed: Option<f64>,
     /// The whole, about the frame of the joint.
     body: Body,
-    /// What it is made of: names of links in the file, with their places and bodies; its own one first.
+    /// Its parts: names of links in the file, with their places and bodies; the link itself first.
     parts: Vec<Part>,
     /// Inertia of the drive, viscous and dry friction.
     losses: [f64; 3],
@@ -74,7 +74,7 @@ pub fn is_robot(path: &Path) -> bool {
     path.extension().is_some_and(|end| ["urdf", "xml"].iter().any(|known| end.eq_ignore_ascii_case(known)))
 }
 
-/// The system of a robot's file, and what of the file was not read.
+/// The system of a robot's file, and remarks on parts of the file that were not read.
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there.
@@ -102,7 +102,7 @@ fn read(text: &str) -> Result<(Robot, usize), Fault> {
 }
 
 impl Robot {
-    /// Its system: the description without constants says which there are, and then has those of the file.
+    /// Its system: first a description without constants, which lists them, then one with the values of the file.
     fn system(&mut self) -> Result<System, String> {
         let table = self.table();
         let description: Description =

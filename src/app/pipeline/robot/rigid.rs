@@ -5,7 +5,7 @@ use crate::linalg::{Workspace, inverse, is_positive_definite};
 
 const SAME: Matrix<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Where a frame is, seen from another one: `x' = R x + p`.
+/// The place of a frame, seen from another one: `x' = R x + p`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     pub turn: Matrix<f64>,
@@ -15,7 +15,7 @@ pub(super) struct Place {
 impl Place {
     pub const HERE: Self = Self { turn: SAME, at: [0.0; 3] };
 
-    /// A place that is seen from this one.
+    /// The place of a frame that is given relative to this one.
     pub fn then(&self, next: &Self) -> Self {
         let at = applied(&self.turn, next.at);
         Self { turn: product(&self.turn, &next.turn), at: std::array::from_fn(|i| self.at[i] + at[i]) }
@@ -26,7 +26,7 @@ impl Place {
         let r = &self.turn;
         let level = r[0][0].hypot(r[1][0]);
         let pitch = (-r[2][0]).atan2(level);
-        // Where the x axis points up or down, roll and yaw are one turn.
+        // Where the x axis points up or down, roll and yaw are the same rotation.
         match level > f64::EPSILON {
             true => [r[2][1].atan2(r[2][2]), pitch, r[1][0].atan2(r[0][0])],
             false => [0.0, pitch, (-r[0][1]).atan2(r[1][1])],
@@ -38,7 +38,7 @@ impl Place {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Body(pub [f64; 10]);
 
-/// What a body adds to its inertia if its mass lies at `h/m` from the origin: `m (c^2 - c c^T)`, for `c c^T m`.
+/// Contribution to the inertia of a body from the distance of its centre of mass: `m (c^2 - c c^T)`.
 fn shifted(mass: f64, c: Vector<f64>) -> Matrix<f64> {
     let square: f64 = c.iter().map(|c| c * c).sum();
     std::array::from_fn(|i| std::array::from_fn(|j| mass * (f64::from(u8::from(i == j)) * square - c[i] * c[j])))
@@ -49,7 +49,7 @@ fn sum(a: &Matrix<f64>, b: &Matrix<f64>, factor: f64) -> Matrix<f64> {
 }
 
 impl Body {
-    /// Of a mass, a centre of mass and the inertia about it.
+    /// A body of a mass, a centre of mass and the inertia about it.
     pub fn about(mass: f64, centre: Vector<f64>, inertia: &Matrix<f64>) -> Self {
         let i = sum(inertia, &shifted(mass, centre), 1.0);
         let [x, y, z] = centre.map(|c| mass * c);
@@ -67,7 +67,7 @@ impl Body {
         (m, centre, sum(&about_origin, &shifted(m, centre), -1.0))
     }
 
-    /// Seen from the frame in which its own one has a place.
+    /// The body, seen from the frame in which its own frame has a place.
     pub fn seen(&self, place: &Place) -> Self {
         let (mass, centre, inertia) = self.central();
         let at = place.then(&Place { turn: SAME, at: centre }).at;
@@ -104,7 +104,7 @@ impl Body {
         Self([p[15], p[3], p[7], p[11], yy + zz, -p[1], -p[2], xx + zz, -p[6], xx + yy])
     }
 
-    /// The lower factor `C` of `P = C C^T`; `None` if no body with an extent has these constants.
+    /// The lower factor `C` of `P = C C^T`; `None` if no physical body with an extent has these constants.
     fn factor(&self) -> Option<Square> {
         let mut pivots = [0.0; 16];
         is_positive_definite(4, &self.moments(), &mut pivots).then(|| {
@@ -118,8 +118,8 @@ impl Body {
         self.factor().is_some()
     }
 
-    /// Bodies that together are `whole`, each from its own part by the one linear map of space that makes the whole of their sum: it moves all
-    /// mass alike, so that parts that exist go on to exist. `None` if there is none.
+    /// Bodies that together are `whole`, each from its own part by the linear map of space that turns the sum of the parts into the whole.
+    /// It transforms all mass equally, so that physical parts stay physical. `None` if there is no such map.
     pub fn stretched(parts: &[Self], whole: &Self) -> Option<Vec<Self>> {
         let sum = parts.iter().fold(Self::default(), |sum, part| sum.plus(part, 1.0));
         let (mut inverted, to) = ([0.0; 16], whole.factor()?);

@@ -231,7 +231,7 @@ fn other_constants_are_written_and_read_again() {
     for (symbol, x) in &scaled {
         close(&[value(&again, symbol)], &[*x], 1e-12);
     }
-    // The camera stays as it is, the arm takes the rest.
+    // The camera stays unchanged, the arm takes the rest.
     let written = rewrite_robot(PICKER, &given).unwrap();
     assert!(
         written.contains("<mass value=\"0.2\"/>") && written.contains("rpy=\"0 1.5707963267948966 0\""),
@@ -247,7 +247,7 @@ fn other_constants_are_written_and_read_again() {
         close(&[value(&again, symbol)], &[*x], 1e-12);
     }
     assert!(!written.contains("<mass value=\"0.2\"/>"));
-    // None of a body at all.
+    // No body has these constants.
     let (line, problem) = rewrite_robot(PICKER, &[("m1", -1.0)]).unwrap_err();
     assert!(line == 6 && problem.contains("turret"), "{line} {problem}");
     // A link without an inertial.

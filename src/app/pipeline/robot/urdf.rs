@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Acceleration of gravity in m/s^2: z points upwards.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-/// Most links and joints, those that are fixed with them.
+/// Largest number of links and joints, including fixed ones.
 const MAX_ELEMENTS: usize = 4096;
 /// Elements that say nothing of motion.
 const OF_LOOKS: [&str; 3] = ["visual", "collision", "material"];
@@ -20,13 +20,13 @@ const READ: [&[&str]; 3] =
 
 type Outcome<T> = Result<T, Fault>;
 
-/// The elements of a file by name, as they stand.
+/// The elements of a file by name, unprocessed.
 struct Elements<'a, 'i> {
     links: BTreeMap<&'a str, Node<'a, 'i>>,
     joints: Vec<Element<'a, 'i>>,
 }
 
-/// A joint as it stands.
+/// A joint as written in the file.
 struct Element<'a, 'i> {
     node: Node<'a, 'i>,
     name: &'a str,
@@ -45,7 +45,7 @@ enum Kind {
     Continuous,
     Revolute,
     Prismatic,
-    /// Of more than one coordinate, or unknown; held.
+    /// A joint with several coordinates, or of unknown type; held fixed.
     Other,
 }
 
@@ -59,7 +59,7 @@ pub(super) fn read(root: Node<'_, '_>) -> Outcome<Robot> {
         links: Vec::new(),
         notes: elements.left_out(root),
     };
-    // Joints whose parents are read, by their order in the file, so that coordinates have it as far as a tree allows.
+    // Joints whose parents have been read, in the order of the file, so that coordinates keep that order as far as a tree allows.
     let mut waiting = Waiting::new();
     let mut numbers: BTreeMap<&str, Option<usize>> = BTreeMap::new();
     elements.push_children(&mut waiting, (base, None, Place::HERE));
@@ -163,7 +163,7 @@ impl<'a, 'i> Elements<'a, 'i> {
         waiting.extend(own.map(|(at, joint)| (at, (joint, carrier, place))));
     }
 
-    /// What is not read, by its elements.
+    /// The elements that are not read.
     fn left_out(&self, root: Node<'_, '_>) -> Vec<String> {
         let mut notes = Vec::new();
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
@@ -195,7 +195,7 @@ impl<'a, 'i> Elements<'a, 'i> {
         for joint in self.joints.iter().filter(|joint| joint.moves()) {
             let Some(own) = numbers.get(joint.name).copied().flatten() else { continue };
             let (mut ratio, mut offset, mut at) = (1.0, 0.0, joint);
-            // Of a joint that follows a joint that follows: no chain is longer than there are joints.
+            // A mimic joint may follow another one; no chain is longer than the number of joints.
             for _ in 0..=self.joints.len() {
                 let Some(mimic) = child(at.node, "mimic")? else { break };
                 offset += ratio * number(mimic, "offset")?.unwrap_or(0.0);
@@ -272,7 +272,7 @@ impl Element<'_, '_> {
     }
 }
 
-/// The place that `<origin>` of an element gives.
+/// The place given by the `<origin>` of an element.
 pub(super) fn origin(node: Node<'_, '_>) -> Outcome<Place> {
     let Some(origin) = child(node, "origin")? else { return Ok(Place::HERE) };
     Ok(Place { turn: turned(triple(origin, "rpy", [0.0; 3])?), at: triple(origin, "xyz", [0.0; 3])? })

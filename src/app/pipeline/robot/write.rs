@@ -8,18 +8,19 @@ use crate::lagrangian::{applied, inertia_symbols, loss_symbols};
 use roxmltree::Node;
 use std::ops::Range;
 
-/// Largest difference, over the size of a link's constants, between what is written and what is read again.
+/// Largest difference, over the size of a link's constants, between the written constants and those read back.
 const ROUNDING: f64 = 1e-9;
 
-/// The same up to which a number counts as the one that is written already.
+/// Largest relative difference at which a number counts as the one already written.
 const REPRINTED: f64 = 1e-14;
 
-/// Parts of a text with what takes their places.
+/// Ranges of a text with their replacements.
 struct Edits(Vec<(Range<usize>, String)>);
 
-/// The text of a URDF with values of constants by symbol; those that are left out, or as they are, change nothing.
+/// The text of a URDF with new values of constants by symbol; missing and unchanged constants change nothing.
 ///
-/// What is fixed to a link keeps its body, and the link takes the rest. Where the rest is none of a body, all parts are stretched alike.
+/// Parts fixed to a link keep their bodies, and the link takes the rest. If the rest is not a physical body, all parts are transformed by
+/// the same map.
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there: with the file, or with the constants of a link.
@@ -74,7 +75,7 @@ pub fn rewrite_robot(text: &str, values: &[(&str, f64)]) -> Result<String, Fault
     Ok(written)
 }
 
-/// The bodies of the parts of a link, each in its own frame; `None` for a body that there is none of.
+/// The bodies of the parts of a link, each in its own frame; `None` for a part without a body.
 fn shares(link: &Link, whole: &Body) -> Vec<Option<Body>> {
     let seen: Vec<Body> = link.parts.iter().map(|part| part.body.seen(&part.place)).collect();
     let rest = seen[1..].iter().fold(*whole, |rest, part| rest.plus(part, -1.0));
@@ -98,7 +99,7 @@ fn shares(link: &Link, whole: &Body) -> Vec<Option<Body>> {
 impl Edits {
     /// The text with them.
     fn applied_to(mut self, text: &str) -> String {
-        // Of several at one place, the order in which they came.
+        // Edits at the same place keep their order.
         self.0.sort_by_key(|(range, _)| range.start);
         let (mut out, mut at) = (String::with_capacity(text.len()), 0);
         for (range, new) in self.0 {
@@ -109,11 +110,11 @@ impl Edits {
         out + &text[at..]
     }
 
-    /// Gives an element these attributes, in place where they are.
+    /// Sets attributes of an element, in place where they exist.
     fn set(&mut self, node: Node<'_, '_>, attributes: &[(&str, String)]) {
         for (key, new) in attributes {
             match node.attribute_node(*key) {
-                // Numbers that stay are left as they are written.
+                // Unchanged numbers keep their text.
                 Some(attribute) if is_same(attribute.value(), new) => {}
                 Some(attribute) => self.0.push((attribute.range_value(), new.clone())),
                 None => {
@@ -124,7 +125,7 @@ impl Edits {
         }
     }
 
-    /// Puts elements into another one, before what is in it.
+    /// Puts elements into another one, before its content.
     fn insert(&mut self, node: Node<'_, '_>, elements: &str) {
         let (text, range) = (node.document().input_text(), node.range());
         let line = text[..range.start].rfind('\n').map_or(0, |at| at + 1);
@@ -148,7 +149,7 @@ impl Edits {
         }
     }
 
-    /// Gives a link this body about the origin of its frame. Where its inertial is turned, it stays so.
+    /// Gives a link this body about the origin of its frame. A rotated inertial keeps its rotation.
     fn set_body(&mut self, link: Node<'_, '_>, body: &Body) -> Result<(), Fault> {
         let (mass, centre, inertia) = body.central();
         let node = child(link, "inertial")?;
@@ -181,7 +182,7 @@ impl Edits {
         Ok(())
     }
 
-    /// Gives a joint these constants of viscous and dry friction, as far as they are not those that it has.
+    /// Gives a joint these constants of viscous and dry friction, where they differ from its own.
     fn set_dynamics(&mut self, joint: Node<'_, '_>, [viscous, dry]: [f64; 2], before: [f64; 2]) -> Result<(), Fault> {
         let both = [("damping", viscous, before[0]), ("friction", dry, before[1])];
         let changed = both.iter().filter(|(_, new, old)| new != old);
@@ -208,7 +209,7 @@ fn element(tag: &str, attributes: &[(&str, String)]) -> String {
     format!("<{tag}{own}/>")
 }
 
-/// A number that reads back to the same one, without a point where it needs none.
+/// A number that reads back exactly, without a decimal point if it needs none.
 fn number(x: f64) -> String {
     let text = format!("{:?}", x + 0.0);
     text.strip_suffix(".0").map(String::from).unwrap_or(text)

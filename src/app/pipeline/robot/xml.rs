@@ -42,7 +42,7 @@ pub(super) fn required<'a>(node: Node<'a, '_>, key: &str) -> Result<&'a str, Fau
     node.attribute(key).ok_or_else(|| fault(node, format!("missing attribute `{key}`")))
 }
 
-/// Finite numbers of an attribute, apart by spaces, if it is there; some number of them that is allowed.
+/// Finite numbers of an attribute, separated by spaces, if it exists; their count must be one of `allowed`.
 pub(super) fn numbers(node: Node<'_, '_>, key: &str, allowed: &[usize]) -> Result<Option<Vec<f64>>, Fault> {
     let Some(text) = node.attribute(key) else { return Ok(None) };
     let read = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
@@ -74,7 +74,7 @@ pub(super) fn triple(node: Node<'_, '_>, key: &str, usual: [f64; 3]) -> Result<[
     Ok(numbers(node, key, &[3])?.map_or(usual, |found| [found[0], found[1], found[2]]))
 }
 
-/// `item` after `item`, cut where there are too many to be read.
+/// Items separated by commas, shortened if there are too many to read.
 pub(super) fn list(items: &[String]) -> String {
     const SHOWN: usize = 8;
     match items.len() {

@@ -26,7 +26,7 @@ pub(super) enum AxisScale {
     Angle,
 }
 
-/// One axis: from `low` to `high`, which differ.
+/// One axis: from `low` to `high`, which must differ.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axis {
     pub low: f64,
@@ -35,7 +35,7 @@ pub(super) struct Axis {
     pub label: String,
 }
 
-/// A tick and its text; none for a small one.
+/// A tick and its text; none for a minor one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub at: f64,
@@ -47,7 +47,7 @@ impl Axis {
         Self { low, high, kind, label: label.to_string() }
     }
 
-    /// Where a value lies, 0 at the lower and 1 at the upper end.
+    /// The position of a value, 0 at the lower and 1 at the upper end.
     pub fn place(&self, x: f64) -> f64 {
         match self.kind {
             AxisScale::Logarithmic => (x.ln() - self.low.ln()) / (self.high.ln() - self.low.ln()),
@@ -74,7 +74,7 @@ impl Axis {
         let largest = self.low.abs().max(self.high.abs());
         let power = if largest > 0.0 { largest.log10().floor() as i32 } else { 0 };
         let power = if (-2..5).contains(&power) { 0 } else { power };
-        // One value is one tick.
+        // A single value gets one tick.
         let room = f64::max(self.high - self.low, f64::MIN_POSITIVE / f64::EPSILON);
         let (step, digits) = step(room / most.max(1) as f64);
         let decimals = power.saturating_sub(digits).clamp(0, 15) as usize;
@@ -138,7 +138,7 @@ fn parts_of_pi(quarters: i64) -> String {
     format!("{sign}{over}\u{3c0}{under}")
 }
 
-/// `digit` times a power of ten, plain near 1.
+/// `digit` times a power of ten, written out near 1.
 fn power_of_ten(digit: i32, exponent: i32) -> String {
     if (-2..4).contains(&exponent) {
         let decimals = (-exponent).max(0) as usize;
@@ -156,7 +156,7 @@ fn power_of_ten(digit: i32, exponent: i32) -> String {
     format!("{factor}10{}", raised.collect::<String>())
 }
 
-/// Where the data lie in a panel.
+/// The area of the data in a panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Area {
     pub left: f64,
@@ -166,7 +166,7 @@ pub(super) struct Area {
 }
 
 impl Area {
-    /// A point from the upper left corner of the area.
+    /// A point, relative to the upper left corner of the area.
     pub fn point(&self, (x, y): (&Axis, &Axis), (u, w): (f64, f64)) -> (f64, f64) {
         (x.place(u) * self.width, (1.0 - y.place(w)) * self.height)
     }
@@ -190,7 +190,7 @@ pub(super) fn frame(panel: &mut Panel, area: Area, axes: (&Axis, &Axis), title: 
     panel.segments(&grid, GRID, 0.7);
 }
 
-/// Draws title, axes and ticks around an area; gives the lines of the grid.
+/// Draws title, axes and ticks around an area; returns the lines of the grid.
 pub(super) fn ruled(panel: &mut Panel, area: Area, (x, y): (&Axis, &Axis), title: &str) -> Vec<[(f64, f64); 2]> {
     let Area { left, top, width, height } = area;
     let (right, bottom) = (left + width, top + height);
@@ -199,7 +199,7 @@ pub(super) fn ruled(panel: &mut Panel, area: Area, (x, y): (&Axis, &Axis), title
         panel.title(left, title);
     }
 
-    // As many ticks as their texts have room for.
+    // As many ticks as there is room for their texts.
     let fits = |most: &usize| {
         let widest =
             x.ticks(*most).0.iter().filter_map(|t| t.text.as_ref()).map(|t| text_width(t, TICK)).fold(0.0, f64::max);

@@ -11,9 +11,9 @@ const SIZE: (f64, f64) = (332.0, 286.0);
 const BAR: (f64, f64) = (11.0, 10.0);
 /// Size of its texts.
 const TEXT: f64 = 12.0;
-/// Colours of a map, and of one with places that are greyed out, which take as many more; another one stands for gaps.
+/// Number of colours of a map, and of one with greyed-out points, which need as many more; another colour marks gaps.
 const SHADES: (usize, usize) = (255, 127);
-/// How much of a colour is left where it is greyed out.
+/// How much of a colour remains where it is greyed out.
 const LEFT: f64 = 0.18;
 
 /// Draws grids side by side, each with its colour bar; gaps are grey.
@@ -100,14 +100,14 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
     Ok(panel)
 }
 
-/// Ticks of a colour bar; their texts tell the power of ten.
+/// Ticks of a colour bar; their texts include the power of ten.
 fn bar_ticks(from: f64, to: f64) -> Vec<(f64, String)> {
     let (ticks, power) = Axis::new(from, to, AxisScale::Linear, "").ticks(5);
     let text = |tick: Tick| (tick.at, tick.text.filter(|_| power == 0).unwrap_or_else(|| number(tick.at)));
     ticks.into_iter().map(text).collect()
 }
 
-/// A colour that is mixed with the grey of what is unknown.
+/// A colour mixed with grey for undetermined values.
 fn greyed(colour: [u8; 3]) -> [u8; 3] {
     std::array::from_fn(|i| (LEFT * f64::from(colour[i]) + (1.0 - LEFT) * f64::from(GAP[i])).round() as u8)
 }

@@ -12,11 +12,11 @@ const RIGHT: f64 = 14.0;
 const DECADES: f64 = 1e-18;
 /// Width of a line.
 const WIDTH: f64 = 1.3;
-/// Width of each of several lines that oscillate so fast that they would fill the picture.
+/// Width of lines that oscillate so fast that several would fill the picture.
 const DENSE: f64 = 0.7;
-/// Points at and above which a line may be one of these.
+/// Number of points at and above which a line may be one of these.
 const MANY: usize = 500;
-/// The colour of lines that show what is not determined.
+/// The colour of lines for undetermined quantities.
 const OPEN: &str = "#9aa1ad";
 
 /// Draws lines.
@@ -35,7 +35,7 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
             }
         }
     }
-    // A line that runs away does not shrink the one that it is drawn over.
+    // A diverging line does not shrink the one that it is drawn over.
     let overlaid = series.iter().any(|s| s.over);
     let y = if overlaid { window(&series, |p| p.1) } else { range(values(&series, |p| p.1)) };
     let (y, x) = (y.ok_or_else(empty)?, all_x.ok_or_else(empty)?);
@@ -113,7 +113,7 @@ fn look(plot: &LinePlot, index: usize) -> (&'static str, f64, f64) {
     (if plot.open { OPEN } else { LINES[index % LINES.len()] }, if dense { DENSE } else { width }, 4.0)
 }
 
-/// Row, place, series and name of every entry of a legend, if there are several series.
+/// Row, position, series and name of every entry of a legend, if there are several series.
 fn legend(series: &[Series], room: f64) -> Vec<(usize, f64, usize, String)> {
     let (mut row, mut place, mut entries) = (0, 0.0, Vec::new());
     let named = series.iter().enumerate().filter(|(_, s)| series.len() > 1 && !s.name.is_empty());
@@ -134,8 +134,8 @@ const PIECE: usize = 400;
 /// Points of a pixel that are worth keeping each.
 const FEW: usize = 8;
 
-/// A path that runs from left to right without most of the points in a pixel that has many: what stays is where it enters and
-/// leaves, its lowest and its highest. Any other path as it is.
+/// A path that runs from left to right, without most points of crowded pixels: each pixel keeps the first, last, lowest and highest. Any
+/// other path is unchanged.
 fn columns(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.windows(2).any(|pair| pair[1].0 < pair[0].0) {
         return points.to_vec();
@@ -157,8 +157,8 @@ fn columns(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
-/// The points of a path without those that lie within `tolerance` of the simplified path (Douglas and Peucker 1973); its ends
-/// stay. What swings within a pixel keeps its extremes there.
+/// The points of a path without those that lie within `tolerance` of the simplified path (Douglas and Peucker 1973); its ends stay.
+/// Oscillations within a pixel keep their extremes.
 pub(super) fn simplify(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     let mut start = 0;
@@ -221,7 +221,7 @@ mod tests {
         );
         assert_eq!(simplify(&wave[..1], 0.1), &wave[..1]);
         assert!(simplify(&[], 0.1).is_empty());
-        // A path that goes there and back is no segment.
+        // A path there and back is not a segment.
         assert_eq!(simplify(&[(0.0, 0.0), (9.0, 0.0), (0.0, 0.0)], 0.1).len(), 3);
     }
 }

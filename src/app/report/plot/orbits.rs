@@ -1,4 +1,4 @@
-//! Paths in a plane, what is exact wide, what was learned thin over it: orbits around a centre, one panel for each; traces.
+//! Paths in a plane, exact ones wide with learned ones thin over them: orbits around a centre, one panel for each; traces.
 
 use super::axes::{Area, Axis, AxisScale, BELOW, ROW, TITLE_HEIGHT, TOP, frame, room_left};
 use super::svg::{LINES, MARK, OVER, Panel, UNDER, VIRIDIS, at, entry_width, hex};
@@ -20,7 +20,7 @@ pub struct OrbitPlot {
     pub y_label: String,
     /// Radius of a disc around the origin, such as a horizon.
     pub hole: Option<f64>,
-    /// Panels: title and orbits of each. The panel shows those that are not `over` whole, all if there are no others.
+    /// Panels: title and orbits of each. The panel shows the orbits that are not `over` completely, or all if there are no others.
     pub panels: Vec<(String, Vec<Series>)>,
 }
 
@@ -90,7 +90,7 @@ const TRACE_RIGHT: f64 = 14.0;
 const PIECES: usize = 64;
 /// Width of a path.
 const WIDTH: f64 = 1.0;
-/// The brightest colour that is seen on white.
+/// The brightest colour that is visible on white.
 const BRIGHTEST: f64 = 0.92;
 
 /// Draws paths over each other, or one from dark (start) to bright (end); a dot marks the start.

@@ -1,6 +1,6 @@
 //! PNG images (W3C, Portable Network Graphics, second edition, 2003): small ones of at most 256 colours, and pictures of any colours.
 //!
-//! A grid of a heat map has a few thousand points: a byte each, not compressed, is smaller than what compresses it.
+//! A grid of a heat map has a few thousand points; one uncompressed byte each is smaller than a compressor.
 
 use crate::relativity::Image;
 use flate2::Compression;
@@ -15,7 +15,7 @@ pub(super) fn indexed(rows: &[Vec<u8>], palette: &[[u8; 3]]) -> Vec<u8> {
     let (width, height) = (rows.first().map_or(0, Vec::len), rows.len());
     let mut image = begin(width, height, INDEXED);
     chunk(&mut image, b"PLTE", palette.as_flattened());
-    // Every row begins with its filter: none.
+    // Every row begins with its filter type: none.
     let raw: Vec<u8> = rows.iter().flat_map(|row| std::iter::once(0).chain(row.iter().copied())).collect();
     chunk(&mut image, b"IDAT", &stored(&raw));
     chunk(&mut image, b"IEND", &[]);
@@ -29,7 +29,7 @@ pub fn png(picture: &Image) -> Vec<u8> {
     let raw: Vec<u8> = rows.flat_map(|row| std::iter::once(0).chain(row.as_flattened().iter().copied())).collect();
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     let compressed = encoder.write_all(&raw).and_then(|()| encoder.finish());
-    // Nothing fails that is written to memory; stored, it is a picture as well.
+    // Writing to memory does not fail; if it did, stored data would still be a valid picture.
     chunk(&mut image, b"IDAT", &compressed.unwrap_or_else(|_| stored(&raw)));
     chunk(&mut image, b"IEND", &[]);
     image
@@ -121,7 +121,7 @@ mod tests {
         let mut raw = Vec::new();
         flate2::read::ZlibDecoder::new(&file[data + 4..data + 4 + length]).read_to_end(&mut raw).unwrap();
         assert_eq!(raw, [0, 0, 0, 7, 1, 2, 7, 2, 4, 7, 0, 3, 6, 7, 4, 8, 7, 5, 10, 7]);
-        // One colour takes next to nothing.
+        // A single colour takes almost no space.
         let plain = Image { width: 400, height: 400, pixels: vec![[1, 2, 3]; 160_000] };
         assert!(png(&plain).len() < 2000);
     }

@@ -31,7 +31,7 @@ pub(super) fn fitting(text: &str, size: f64, width: f64) -> f64 {
     (size * width / text_width(text, size).max(1.0)).min(size)
 }
 
-/// Size of titles, and width of their bold letters over that of plain ones.
+/// Size of titles, and width of their bold letters relative to plain ones.
 const TITLE: f64 = 14.0;
 const BOLD: f64 = 1.16;
 /// Size of the texts of a legend, length of its lines.
@@ -184,7 +184,7 @@ impl Panel {
         );
     }
 
-    /// Another drawing at a place; what lies outside of its size is cut off.
+    /// Another drawing at a position; parts outside its size are cut off.
     pub fn inset(&mut self, (x, y): (f64, f64), inner: &Self) {
         let (x, y, width, height) = (short(x), short(y), short(inner.width), short(inner.height));
         let _ = write!(
@@ -251,7 +251,7 @@ pub(super) fn at(scale: Scale, t: f64) -> [u8; 3] {
     })
 }
 
-/// The same as SVG writes it.
+/// The colour in SVG notation.
 pub(super) fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
