@@ -70,7 +70,7 @@ fn signature(text: &str) -> Result<Signature, String> {
     found.ok_or_else(|| "expected P,N, the numbers of positive and of negative eigenvalues".to_string())
 }
 
-/// The certificate and the columns that it is about.
+/// The certificate and the columns of its region.
 #[derive(Serialize)]
 struct Named {
     system: String,
@@ -79,11 +79,11 @@ struct Named {
     certificate: Certificate,
 }
 
-/// Searches and prints what was proven.
+/// Searches and prints the proofs.
 ///
 /// # Errors
-/// A usage error for an unknown system, a wrong parameter or a region that does not fit, a data error for a bad model, the code of a signal that
-/// ended the search, after what was proven by then is printed.
+/// A usage error for an unknown system, a wrong parameter or a region that does not fit; a data error for a bad model; the code of a signal
+/// that ended the search, after the proofs so far are printed.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let stop = interrupt::flag().map_err(CliError::signals)?;
     let refused = |error: CertificateError| CliError::usage(error);

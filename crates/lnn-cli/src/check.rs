@@ -1,4 +1,4 @@
-//! `lnn check`: what recorded motion is, whether a simple law explains it, and which command to run next.
+//! `lnn check`: examines recorded motion, says whether a simple law explains it, and which command to run next.
 
 use crate::recording_args::RecordingArgs;
 use crate::{CliError, interrupt, output};

@@ -1,4 +1,4 @@
-//! `lnn compare`: what two Lagrangians have in common beyond factor and gauge.
+//! `lnn compare`: what two Lagrangians have in common, up to factor and gauge.
 
 use crate::format::TableOrJson;
 use crate::probe::{Bound, Probe, bound};
@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (basis, _) = first.basis(args.basis)?;
     let unknowns = unknowns(first.model.coordinates(), basis.len());
     let points = first.points(args.points, first.enough(basis.len()), unknowns)?;
-    // On the mass shell of a system, rather than where a model says nothing.
+    // States on the mass shell of a system, because a model may know nothing off it.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
     let [first, second] = [&args.first, &args.second].map(Clone::clone);

@@ -15,10 +15,10 @@ pub fn read_text(path: &Path) -> Result<(String, String), CliError> {
     read_text_within(path, MAX_BYTES)
 }
 
-/// The same of a file of at most so many bytes.
+/// As [`read_text`], for a file of at most `limit` bytes.
 ///
 /// # Errors
-/// As of [`read_text`].
+/// Those of [`read_text`].
 pub fn read_text_within(path: &Path, limit: u64) -> Result<(String, String), CliError> {
     let name = input::name(path);
     let bytes = input::read(path, limit).map_err(|e| CliError::data(format_args!("{name}: {e}")))?;

@@ -2,7 +2,7 @@
 
 use toml::{Table, Value};
 
-/// The first few values that differ, such as `seed: 0 in the checkpoint, 5 asked for`; empty if the texts say the same.
+/// The first few values that differ, such as `seed: 0 in the checkpoint, 5 asked for`; empty if the texts agree.
 pub fn differences(saved: &str, asked: &str) -> String {
     let parse =
         |text: &str| text.parse::<Table>().map(Value::Table).unwrap_or_else(|_| Value::String(text.to_string()));

@@ -37,7 +37,7 @@ impl CliError {
     /// Several mistakes in arguments or configuration, one line each.
     ///
     /// # Errors
-    /// Always, if there are any.
+    /// Always, if there are messages.
     pub fn all_usage(messages: impl IntoIterator<Item = String>) -> Result<(), Self> {
         let lines: Vec<String> = messages.into_iter().map(|message| one_line(&message)).collect();
         if lines.is_empty() { Ok(()) } else { Err(Self { kind: Kind::Usage, message: lines.join("\nerror: ") }) }

@@ -95,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut options = EvaluationOptions::new(&system, learned.domain(), seed)?;
     (options.starts, options.span, options.rtol) = (args.starts, span(args, &system)?, args.rtol);
     options.threads = threads(args.threads);
-    // A system that is described in the model's file is the one whose constraints it was learned under.
+    // If the model's file describes a system, the model was learned under the constraints of that system.
     options.constraints = learned.header.description.is_none().then(|| learned.header.constraints.clone());
     let stop = interrupt::flag().map_err(CliError::signals)?;
     let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {

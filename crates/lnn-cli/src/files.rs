@@ -1,5 +1,5 @@
-//! Which path leads to which file, and the one rule by which commands write files: none that is read is overwritten, none that holds
-//! something without `--overwrite`.
+//! Which path leads to which file, and the rule by which commands write files: never over an input, and over a file with content only with
+//! `--overwrite`.
 
 use crate::input::is_standard;
 use crate::{CliError, output};
@@ -7,7 +7,7 @@ use lnn::storage::{check_target, write_atomically, write_new};
 use std::path::Path;
 use std::{fs, io};
 
-/// `true` if two paths lead to the same file: by links, by other spellings, by hard links.
+/// `true` if two paths lead to the same file: through links, other spellings or hard links.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     let (Ok(a), Ok(b)) = (fs::canonicalize(a), fs::canonicalize(b)) else { return false };
     a == b || same_node(&a, &b)
@@ -25,12 +25,12 @@ fn same_node(_: &Path, _: &Path) -> bool {
     false
 }
 
-/// `true` if there is a regular file with something in it, be it by a link.
+/// `true` if there is a regular file with content, possibly through a link.
 pub fn holds_something(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() > 0)
 }
 
-/// Refuses to write to a file that the command reads, and to one that holds something unless it may be replaced.
+/// Refuses to write to an input of the command, and to a file with content unless it may be replaced.
 ///
 /// # Errors
 /// A data error naming the file.
@@ -53,7 +53,7 @@ pub struct OutputFile<'a> {
 }
 
 impl<'a> OutputFile<'a> {
-    /// The file, by the rule of [`require_free`].
+    /// The file, checked by [`require_free`].
     ///
     /// # Errors
     /// A data error naming the file.
@@ -76,7 +76,7 @@ impl<'a> OutputFile<'a> {
         Self::claim(path, inputs, overwrite)
     }
 
-    /// Writes it whole or not at all; what another program put there meanwhile stays.
+    /// Writes it whole or not at all; a file that another program created meanwhile is kept.
     ///
     /// # Errors
     /// A data error naming the file.
@@ -94,10 +94,10 @@ impl<'a> OutputFile<'a> {
         })
     }
 
-    /// Prints what the command has to say beside: on standard error if the file itself goes to standard output.
+    /// Prints the command's remarks: on standard error if the file itself goes to standard output.
     ///
     /// # Errors
-    /// As of [`output::print`].
+    /// Those of [`output::print`].
     pub fn print(this: Option<Self>, text: &str) -> Result<(), CliError> {
         if this.is_some_and(|out| is_standard(out.path)) {
             text.lines().filter(|line| !line.trim().is_empty()).for_each(output::note);

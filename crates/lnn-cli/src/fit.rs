@@ -14,8 +14,8 @@ use std::time::Instant;
 /// Learns and writes everything into the output directory.
 ///
 /// # Errors
-/// A usage error for arguments, a data error for files and data that cannot be learned from, an interruption; after the
-/// last the best model so far is written, if there is one.
+/// A usage error for arguments, a data error for files and data that cannot be learned from, an interruption, after which the best model so
+/// far is written, if there is one.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let started = Instant::now();
     if args.run.print_config == Some(PrintFormat::Markdown) {
@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }))
 }
 
-/// Notes what would explain the motion better than a network.
+/// Notes laws that would explain the motion better than a network.
 fn advise(reading: &LoadedRecording) -> Result<(), CliError> {
     let look = first_look(reading, Vec::new())?;
     look.laws().iter().for_each(|law| output::note(law));

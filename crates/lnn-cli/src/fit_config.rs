@@ -31,7 +31,7 @@ pub struct Args {
     pub run: RunArgs,
 }
 
-/// An argument that a configuration or a checkpoint may give instead.
+/// An argument that a configuration or a checkpoint may replace.
 fn unless_known(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.required(false).required_unless_present_any(["config", "resume"]),
@@ -40,10 +40,10 @@ fn unless_known(argument: clap::Arg) -> clap::Arg {
 }
 
 impl Args {
-    /// The same with the columns that a guess finds, if neither these arguments, nor a configuration, nor a run to continue name them.
+    /// These arguments with the columns of a guess, if neither the arguments, nor a configuration, nor a run to continue name them.
     ///
     /// # Errors
-    /// As of [`RecordingArgs::complete`].
+    /// Those of [`RecordingArgs::complete`].
     pub fn complete(&self) -> Result<Self, CliError> {
         let named = self.run.config.is_some() || self.run.resume.is_some() || !self.recording.coords.is_empty();
         let recording = if named { self.recording.clone() } else { self.recording.complete()? };
@@ -97,8 +97,8 @@ impl Saved {
         Self { directory: std::env::current_dir().unwrap_or_default(), fit, text: String::new() }
     }
 
-    /// Its files, as seen from here; in the directory in which it was started they are what was given there. What comes from
-    /// standard input has to come again.
+    /// Its files, relative to the present directory; in the directory in which it was started they are unchanged. Standard input has to be
+    /// supplied again.
     fn files(&self) -> Vec<String> {
         let here = std::env::current_dir().is_ok_and(|here| here == self.directory);
         let found = |file: &String| {
@@ -113,11 +113,11 @@ impl Saved {
 }
 
 impl<'a> Plan<'a> {
-    /// Reads the file that the arguments name, if they do, and looks for all mistakes; beside a fit that continues the
-    /// arguments may say nothing else than it does, but for the files.
+    /// Reads the file that the arguments name, if any, and looks for all mistakes. If a fit continues, the arguments must agree with it,
+    /// except for the files.
     ///
     /// # Errors
-    /// A data error for a file that cannot be read, usage errors naming everything that is wrong.
+    /// A data error for a file that cannot be read, usage errors naming all mistakes.
     pub fn new(args: &'a Args, saved: Option<Saved>) -> Result<Self, CliError> {
         let mut options = columns(&args.recording)?;
         for entry in &args.flags.entries {
@@ -214,7 +214,7 @@ impl<'a> Plan<'a> {
         FitOptions::from(&self.config)
     }
 
-    /// Refuses a time-like coordinate that is none of these.
+    /// Rejects a time-like coordinate that is not among these.
     ///
     /// # Errors
     /// A usage error that names them.
@@ -227,7 +227,7 @@ impl<'a> Plan<'a> {
         self.layers.check(vec![Mistake::new("training.network.time_like", problem)])
     }
 
-    /// The configuration for the data: what suits them, under what files and arguments say.
+    /// The configuration for the data: settings that suit them, overridden by files and arguments.
     ///
     /// # Errors
     /// A model to start from that cannot be read, a schedule that cannot be scaled, a file of a known part that is wrong.
@@ -252,7 +252,7 @@ impl<'a> Plan<'a> {
         Ok(FitConfig { formula, members, ..prepared.config(training, horizon, recording, shooting) })
     }
 
-    /// Refuses keys that would have no effect: those that the recording decides, and those of multiple shooting where there is none.
+    /// Rejects keys that would have no effect: keys that the recording decides, and keys of multiple shooting if there is none.
     fn refuse_overruled(
         &self,
         training: &Config,
@@ -288,7 +288,7 @@ impl<'a> Plan<'a> {
         self.layers.check(mistakes)
     }
 
-    /// The layers over this training and what they mean for it.
+    /// The layers over this training and their consequences for it.
     fn over(&self, training: Config) -> Result<(FitConfig, Vec<Mistake>), CliError> {
         let mut config = FitConfig { training, shooting: Some(Shooting::default()), ..FitConfig::default() };
         if self.layers.has("training.network.known") {
@@ -315,7 +315,7 @@ fn layers_time(layers: &Layers) -> Option<&str> {
     layers.text("training.network.time_like").or_else(|| layers.text("training.penalty.time"))
 }
 
-/// Files and columns as the arguments give them.
+/// Files and columns from the arguments.
 fn columns(args: &RecordingArgs) -> Result<Vec<Entry>, CliError> {
     let files = args.data.iter().map(|file| file.display().to_string()).collect();
     let columns = FitColumns { files, ..FitColumns::from(&args.meaning()) };

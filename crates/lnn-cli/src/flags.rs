@@ -15,7 +15,7 @@ use toml::{Table, Value};
 pub trait Flagged {
     /// Its keys.
     const KEYS: &'static [Key];
-    /// Options that it has not, though its keys would have them.
+    /// Options that it lacks although there are keys for them.
     const WITHOUT: &'static [&'static str];
 }
 
@@ -38,7 +38,7 @@ pub struct Flags<T> {
     of: PhantomData<fn() -> T>,
 }
 
-/// Name of the option for a key without one of its own.
+/// Name of the option for keys without an option of their own.
 const SET: &str = "set";
 
 /// An option of a key.
@@ -86,7 +86,7 @@ impl Flag {
                 .parse::<i64>()
                 .ok()
                 .map(Value::from)
-                // A whole number beyond those of TOML stays as it is written.
+                // An integer beyond the range of TOML stays text.
                 .or_else(|| text.parse::<f64>().ok().filter(|_| !is_whole(text)).map(Value::from))
                 .unwrap_or_else(|| text.into()),
         };

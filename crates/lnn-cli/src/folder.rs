@@ -19,12 +19,12 @@ pub struct Folder {
 pub enum Attempt {
     /// The directory, locked.
     Open(Folder),
-    /// Another run holds it; ` (process ..)`, as far as that is known.
+    /// Another run holds it; ` (process ..)`, if known.
     Held(String),
 }
 
 impl Folder {
-    /// Creates the directory if need be, takes its lock, and removes what writers killed in the middle left.
+    /// Creates the directory if needed, takes its lock, and removes remains of killed writers.
     ///
     /// # Errors
     /// A data error if it cannot be created or written, or if another run holds it.
@@ -37,7 +37,7 @@ impl Folder {
         }
     }
 
-    /// As [`open`](Self::open), but a directory that another run holds is no error.
+    /// As [`open`](Self::open), but a directory that another run holds is not an error.
     ///
     /// # Errors
     /// A data error if it cannot be created or written.
@@ -71,8 +71,8 @@ impl Folder {
 }
 
 impl Output for Folder {
-    /// Writes a file whole or not at all. What an earlier run left goes when the new model has taken its place, what an earlier
-    /// evaluation left before the new one is written.
+    /// Writes a file whole or not at all. Files of an earlier run are removed once the new model has replaced the old one, those of an
+    /// earlier evaluation before the new one is written.
     fn write(&self, name: &str, bytes: &[u8]) -> Result<(), PipelineError> {
         if name == "evaluation.json" {
             results::remove_stale_evaluation(&self.path)?;
@@ -106,7 +106,7 @@ mod tests {
         assert!(Folder::open(&path.join("x")).is_err());
         drop(again);
         assert_eq!(fs::read_dir(&path).unwrap().count(), 1);
-        // What a killed run left is taken over.
+        // The lock of a killed run is taken over.
         fs::write(path.join(".lnn.lock"), "process 1\nhost elsewhere\n").unwrap();
         fs::write(path.join(".x.4194999.0.tmp"), "half").unwrap();
         drop(Folder::open(&path).unwrap());

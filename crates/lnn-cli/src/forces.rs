@@ -34,10 +34,10 @@ pub struct ForceArgs {
     between: Option<Between>,
 }
 
-/// Forces from outside and inputs as they are known.
+/// External forces and inputs, from all sources.
 #[derive(Clone)]
 pub struct KnownForce {
-    /// Recorded and constant ones; 0 where there is a formula.
+    /// Recorded and constant forces; 0 where there is a formula.
     sampled: SampledForce<f64>,
     /// Formulas of the time, by component.
     formulas: Vec<(usize, NamedFormula)>,
@@ -94,7 +94,7 @@ pub fn names(header: &Header) -> Vec<String> {
     }
 }
 
-/// The error of an input that was not given.
+/// The error for a missing input.
 fn missing(input: &str) -> CliError {
     CliError::usage(format_args!("--force: expected the input {input}, as {input}=VALUE or a column of a CSV"))
 }
@@ -106,11 +106,10 @@ impl ForceArgs {
     }
 
     /// The force on a motion from one time to another, its components `known` by name, one per coordinate and then the inputs; none if none
-    /// was asked for.
+    /// was requested.
     ///
     /// # Errors
-    /// A usage error for names and numbers that make no sense, a data error for a file that is not as said or does not
-    /// cover the motion.
+    /// A usage error for invalid names and numbers, a data error for a file that is invalid or does not cover the motion.
     pub fn force(
         &self,
         coordinates: &[String],
@@ -175,7 +174,7 @@ impl ForceArgs {
         Ok(Some(KnownForce { sampled: sampled?, formulas }))
     }
 
-    /// The columns of a file, constants beside them.
+    /// The columns of a file, together with constants.
     fn with_columns(
         &self,
         path: &Path,

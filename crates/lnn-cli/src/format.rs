@@ -8,7 +8,7 @@ use lnn::scalar::Scalar;
 /// States evaluated together; bounds the memory whatever the length of the file.
 pub const CHUNK: usize = 256;
 
-/// The same of `n` coordinates, whose matrices have `n^2` numbers: those of a chunk have at most a million.
+/// Rows of a chunk for `n` coordinates, whose matrices have `n^2` numbers: at most a million numbers per chunk.
 pub fn chunk(n: usize) -> usize {
     ((1 << 20) / (n * n).max(1)).clamp(1, CHUNK)
 }
@@ -33,10 +33,10 @@ pub enum Format {
     Csv,
 }
 
-/// The first of the rows that failed, and how many more there are.
+/// The first row that failed, and the number of others.
 ///
 /// # Errors
-/// A data error if there is any.
+/// A data error if any row failed.
 pub fn report_failures(place: &str, failures: &[(usize, String)]) -> Result<(), CliError> {
     match failures {
         [] => Ok(()),

@@ -223,7 +223,7 @@ fn in_file(error: FormulaError, reading: &LoadedRecording) -> CliError {
     }
 }
 
-/// What the user chose, or what the data are.
+/// A usage error for the user's choices, a data error for the data.
 fn refused(error: FormulaError) -> CliError {
     match &error {
         FormulaError::Terms { .. } => CliError::usage(format_args!("--basis: {error}")),

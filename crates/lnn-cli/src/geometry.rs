@@ -64,7 +64,7 @@ enum Format {
     Latex,
 }
 
-/// Pieces of a line, at most: seconds of a metric that is written down.
+/// Largest number of pieces of a line: seconds for a metric that is written down.
 const PIECES: usize = 1_000_000;
 
 /// Reads a number of pieces.
@@ -163,7 +163,7 @@ fn written<S: Scalar>(format: Format, report: &PointReport<S>, heading: &str) ->
     }
 }
 
-/// Says so if the velocity matters to the metric.
+/// Notes if the metric depends on the velocity.
 fn note_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) {
     if depends_on_velocity(model, q, v) {
         output::note("the mass matrix depends on the velocity; it is taken at --velocity, by default at rest");

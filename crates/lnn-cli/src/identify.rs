@@ -149,7 +149,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     OutputFile::print(out, &output::shown(&found, args.json, Identified::findings)?)
 }
 
-/// The recording, its columns by the names of the system unless others are given.
+/// The recording; its columns have the names of the system unless others are given.
 fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
     if !instance.readings().is_empty() {
         return read_measured(args, instance);
@@ -176,7 +176,7 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
     read_files(&recording.data, &columns)
 }
 
-/// The recording of what the file of the system says was measured, its columns under the names of the quantities.
+/// The recording of the quantities that the system file declares as measured; its columns have their names.
 fn read_measured(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
     let mut recording = args.recording.clone();
     let given = [
@@ -203,7 +203,7 @@ fn read_measured(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRe
     Ok(reading)
 }
 
-/// What the user chose, or what the data are.
+/// A usage error for the user's choices, a data error for the data.
 fn refused(error: IdentifyError) -> CliError {
     match &error {
         IdentifyError::Constant { .. } | IdentifyError::Repeated { what: "constants", .. } => {
@@ -230,16 +230,16 @@ fn refused(error: IdentifyError) -> CliError {
     }
 }
 
-/// `true` if the result goes into a robot's file.
+/// `true` if the result is written into a robot's file.
 fn is_robot_written(args: &Args) -> bool {
     args.out.as_deref().is_some_and(is_robot)
 }
 
-/// The file of the result: a system file, or that of a robot if the system is one.
+/// The file of the result: a system file, or a robot's file if the system is one.
 fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<'a>, CliError> {
     match is_robot_written(args) && is_robot(Path::new(&args.system)) {
         true => {
-            // What cannot be written is said before the search.
+            // Reports what cannot be written before the search.
             system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &[]))?;
             OutputFile::claim(out, inputs, args.overwrite)
         }

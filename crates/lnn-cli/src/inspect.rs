@@ -164,7 +164,7 @@ fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError>
 /// A model with its Lagrangian.
 type Model<S> = Box<dyn EulerLagrange<S>>;
 
-/// The model in its canonical form at the base state of `text`, at the first of the states `(q, v)` if that is empty.
+/// The model in its canonical form at the base state in `text`, or at the first of the states `(q, v)` if that is empty.
 fn canonical<S: Scalar>(
     model: Model<S>,
     text: &str,
@@ -186,7 +186,7 @@ fn canonical<S: Scalar>(
     Ok((Box::new(Canonical::new(model, form.clone())), form))
 }
 
-/// Eigenvalues of a batch of mass matrices, ascending; of one that is not finite, `NaN`.
+/// Eigenvalues of a batch of mass matrices, ascending; `NaN` for a matrix that is not finite.
 fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
     let mut values = vec![S::nan(); matrices.len() / n];
     // The matrix that fails has NaN eigenvalues already; the state itself is reported by its terms.
@@ -203,14 +203,14 @@ fn squares<S: Scalar>((n, v): (usize, &[S]), terms: &Terms<S>, spectrum: &[S]) -
         let speed = v[k * n..(k + 1) * n].iter().fold(<S as Real>::one(), |sum, &v| sum + v * v);
         let size = terms.mass_matrix[k * n * n..(k + 1) * n * n].iter().fold(zero, |sum, g| sum + g.abs()) * speed;
         let signs = (spectrum[k * n] < zero, spectrum[(k + 1) * n - 1] > zero);
-        // A state that is not finite says nothing.
+        // A state that is not finite is no evidence.
         !size.is_finite() || (signs == (true, true) && (l - energy).abs() <= rounding * size)
     };
     let all = terms.force.is_empty() && values.enumerate().all(is_energy);
     if all { terms.energy.iter().map(|&energy| energy + energy).collect() } else { Vec::new() }
 }
 
-/// What constraints say of a state, and where its Lagrangian is degenerate.
+/// The constraints at a state, and the degenerate directions of its Lagrangian there.
 #[derive(Default)]
 struct ConstrainedState<S> {
     /// `phi(q)`, and `A v - b`.
@@ -224,11 +224,11 @@ struct ConstrainedState<S> {
 
 /// States of the file at which constraints are examined.
 const STATES: usize = 24;
-/// An eigenvalue below so many roundings of the largest counts as zero.
+/// An eigenvalue below this many roundings of the largest counts as zero.
 const ROUNDINGS: f64 = 1024.0;
 
 impl<S: Scalar> ConstrainedState<S> {
-    /// Of every state of a batch.
+    /// For every state of a batch.
     fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], terms: &Terms<S>) -> Vec<Self> {
         let (n, m) = (model.coordinates(), terms.constraints);
         let states = q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate();
@@ -253,10 +253,10 @@ impl<S: Scalar> ConstrainedState<S> {
     }
 }
 
-/// Most parameters whose derivatives are shown: those of systems, not the weights of networks.
+/// Largest number of parameters whose derivatives are shown: those of systems, not the weights of networks.
 const PARAMETERS: usize = 256;
 
-/// The derivatives of the accelerations of a state; empty where it has none.
+/// The derivatives of the accelerations at a state; empty if it has none.
 #[derive(Default)]
 struct Slopes<S> {
     by_q: Vec<S>,
@@ -267,7 +267,7 @@ struct Slopes<S> {
 }
 
 impl<S: Scalar> Slopes<S> {
-    /// Of every state of a batch.
+    /// For every state of a batch.
     fn of(linearizer: &mut Linearizer<'_, S>, n: usize, (q, v): (&[S], &[S])) -> Vec<Self> {
         let states = q.chunks_exact(n).zip(v.chunks_exact(n));
         states.map(|(q, v)| Self::at(linearizer, q, v).unwrap_or_default()).collect()
@@ -302,7 +302,7 @@ impl<S: Scalar> Slopes<S> {
     }
 }
 
-/// All results for state `k` of a batch; `factor` is that of a canonical form.
+/// All results for state `k` of a batch; `factor` is the factor of a canonical form.
 fn fields<'a, S>(
     n: usize,
     k: usize,

@@ -1,5 +1,5 @@
-//! Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a terminal that is closed: work that keeps what it has finishes its step
-//! first, everything else ends at once.
+//! Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a closed terminal: work that can be kept finishes its step first, everything
+//! else ends at once.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown, register_usize};
@@ -7,7 +7,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// A terminal that is closed, by its number: `signal_hook` has no name for it on Windows, where there is none.
+/// A closed terminal, by its number: `signal_hook` has no name for it on Windows, where it does not exist.
 const SIGHUP: i32 = 1;
 
 /// Signals that end the program, with the exit code of each, 128 and its number.
@@ -19,7 +19,7 @@ static CODE: AtomicUsize = AtomicUsize::new(SIGNALS[0].1 as usize);
 /// While it is up, a signal ends the program at once; while it is down, a signal raises it.
 static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// Signals end the program at once with their exit codes, until [`flag`] asks for them; files being written are whole or not there.
+/// Signals end the program at once with their exit codes, until [`flag`] catches them; files being written are then whole or absent.
 ///
 /// # Errors
 /// If a handler cannot be installed.
@@ -29,12 +29,12 @@ pub fn watch() -> io::Result<()> {
     }
     let flag = FLAG.get_or_init(|| Arc::new(AtomicBool::new(true)));
     for (signal, code) in SIGNALS {
-        // What is ignored from the start, as SIGHUP is under nohup, stays ignored.
+        // Signals that are ignored from the start, as SIGHUP under nohup, stay ignored.
         let status = || std::fs::read_to_string("/proc/self/status").ok();
         if signal == SIGHUP && (cfg!(windows) || !ends(signal, status().as_deref())) {
             continue;
         }
-        // In this order: the first signal finds the flag down.
+        // In this order, the first signal finds the flag lowered.
         register_conditional_shutdown(signal, i32::from(code), Arc::clone(flag))?;
         register_usize(signal, &CODE, usize::from(code))?;
         register(signal, Arc::clone(flag))?;
@@ -53,12 +53,12 @@ pub fn flag() -> io::Result<Arc<AtomicBool>> {
     Ok(Arc::clone(flag))
 }
 
-/// Exit code of the signal that came last, 130 if none came.
+/// Exit code of the last signal, 130 if none came.
 pub fn exit_code() -> u8 {
     CODE.load(Ordering::SeqCst) as u8
 }
 
-/// `true` if a signal is known not to be ignored: the mask `SigIgn` of the process's status has a bit for each that is.
+/// `true` if a signal is known not to be ignored: the mask `SigIgn` in the status of the process has a bit for each ignored one.
 fn ends(signal: i32, status: Option<&str>) -> bool {
     let mask = status.and_then(|status| status.lines().find_map(|line| line.strip_prefix("SigIgn:")));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());

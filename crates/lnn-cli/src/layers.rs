@@ -1,5 +1,5 @@
-//! Configurations in layers: a base, the values of a file over it, those of options over both. They are merged by one function and
-//! deserialised once; all mistakes are found at once, each with file and line or with its option.
+//! Configurations in layers: a base, the values of a file over it, and options over both. One function merges them, and they are
+//! deserialised once; all mistakes are reported together, each with file and line or with its option.
 
 use crate::CliError;
 use crate::config::{self, Lines, line_of};
@@ -22,11 +22,11 @@ const KIND: &str = "kind";
 /// A wrong value of a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// Path of the key, such as `phase[0].rate`; empty for what concerns the whole file.
+    /// Path of the key, such as `phase[0].rate`; empty if it concerns the whole file.
     key: String,
     /// The problem in words.
     problem: String,
-    /// The option that gives a key that does not exist.
+    /// The option for a key that does not exist.
     option: Option<String>,
 }
 
@@ -48,7 +48,7 @@ impl From<ConfigError> for Mistake {
 pub struct Entry {
     path: Steps,
     value: Value,
-    /// The option that gives it; none for the file.
+    /// The option that gives the value; none for the file.
     option: Option<String>,
 }
 
@@ -113,7 +113,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// The values of a file, if there is one, and those of options over them, for a configuration with these keys.
+    /// The values of a file, if there is one, with options over them, for a configuration with these keys.
     ///
     /// # Errors
     /// A data error for a file that cannot be read, a usage error for text that is not TOML.
@@ -141,13 +141,13 @@ impl Layers {
         Ok(layers)
     }
 
-    /// Takes a value apart into those of single keys.
+    /// Splits a value into values of single keys.
     fn add(&mut self, entry: Entry, below: Below) {
         let Entry { path, value, option } = entry;
         let at = |step: Step| path.iter().cloned().chain([step]).collect::<Steps>();
         match (value, below) {
             (Value::Table(table), Below::Keys(keys)) if !table.is_empty() => {
-                // Of what kind a table is decides what else is in it.
+                // The kind of a table decides its other keys.
                 let (kind, others): (Vec<_>, Vec<_>) = table.into_iter().partition(|(name, _)| name == KIND);
                 for (name, value) in kind.into_iter().chain(others) {
                     let key = keys.iter().find(|key| key.name == name);
@@ -210,13 +210,13 @@ impl Layers {
         self.lines.contains_key(key) || self.entries.iter().any(|entry| covers(key, &entry.key()))
     }
 
-    /// Passes over what the file says of a key.
+    /// Ignores the file's value of a key.
     pub fn forget(&mut self, key: &str) {
         self.entries.retain(|entry| entry.option.is_some() || entry.key() != key);
         self.lines.remove(key);
     }
 
-    /// Adds what an option means beside its own key; other options have the last word.
+    /// Adds the values that an option implies for other keys; explicit options override them.
     pub fn imply(&mut self, key: &str, also: impl FnOnce(&Value) -> Vec<(String, Value)>) {
         let given = self.entries.iter().find(|entry| entry.option.is_some() && entry.key() == key);
         let Some(Entry { value, option: Some(option), .. }) = given.cloned() else { return };
@@ -287,8 +287,8 @@ impl Layers {
         }
     }
 
-    /// Mistakes of the keys that something else decides and whose values are not those of the `finished` configuration: they would be
-    /// passed over in silence.
+    /// Mistakes for keys that are decided elsewhere and whose values differ from the `finished` configuration: they would be ignored
+    /// silently.
     pub fn overruled(&self, finished: &Value, decided: impl Fn(&str) -> bool, why: &str) -> Vec<Mistake> {
         let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
         let same = |entry: &Entry| {
@@ -322,7 +322,7 @@ impl Layers {
         CliError::all_usage(placed.into_iter().map(|(_, text)| text))
     }
 
-    /// Line and place of a key: the option that gives it, or its line of the file.
+    /// Line and place of a key: the option that sets it, or its line in the file.
     fn place(&self, key: &str) -> (usize, String) {
         let options = self.entries.iter().filter(|entry| entry.option.is_some());
         let around = |entry: &&Entry| covers(&entry.key(), key);
@@ -364,14 +364,14 @@ fn merged(base: &Value, entries: &[&Entry], mistakes: &mut Vec<Mistake>) -> Valu
     root
 }
 
-/// Sets a value, unless there is no place for it.
+/// Sets a value, unless its path does not exist.
 fn put(root: &mut Value, path: &[Step], value: &Value) -> Result<(), &'static str> {
     const NOWHERE: &str = "there is no such key or element";
     let Some((first, rest)) = path.split_first() else {
         match (&mut *root, value) {
             // An empty table means that the key is present.
             (Value::Table(_), Value::Table(new)) if new.is_empty() => {}
-            // Of a list of tables the number; those beyond the base's are as its last.
+            // A list of tables sets the number of tables; additional ones start from the last of the base.
             (Value::Array(old), Value::Array(new)) if is_list_of_tables(old) && is_list_of_tables(new) => {
                 let last = old.last().cloned().unwrap_or_else(|| Table::new().into());
                 old.resize(new.len(), last);
@@ -398,7 +398,7 @@ fn put(root: &mut Value, path: &[Step], value: &Value) -> Result<(), &'static st
     }
 }
 
-/// Gives a penalty that needs them the usual weight and the time of the network.
+/// Gives a penalty that needs them the default weight and the time of the network.
 fn complete(config: &mut Value) {
     let time = config.get("network").and_then(|network| network.get("time_like")).cloned();
     let Some(penalty) = config.get_mut("penalty").and_then(Value::as_table_mut) else { return };
@@ -456,7 +456,7 @@ mod tests {
         expected.lbfgs = Some(Lbfgs { memory: 3, ..Lbfgs::default() });
         expected.parameters.insert("m1".to_string(), 2.0);
         assert_eq!(config, expected);
-        // There are as many phases as in the file; those beyond the base's default to its last one.
+        // There are as many phases as in the file; additional ones start from the base's last one.
         let (config, mistakes) = file("double-pendulum", "[[phase]]\nepochs = 3\n[[phase]]\nrate = 1\n");
         assert_placed(&mistakes, &[]);
         assert_eq!(config.phases.len(), 2);
@@ -500,7 +500,7 @@ mod tests {
         assert_eq!(of("kind = 'lorentzian-sylvester'\nlambda = 2\ntime = 'theta1'"), lorentzian);
         let eigenvalue = Regularizer::Eigenvalue { lambda: 100.0 };
         assert_eq!(penalty("ads4-geodesic", "kind = 'eigenvalue'").0.penalty, eigenvalue);
-        // The time is that of the network, the weight the usual one where there was none.
+        // The time is that of the network, the weight the default if there was none.
         let options = vec![Entry::option("--penalty", "penalty.kind", "lorentzian-sylvester")];
         let (config, _) = over("ads4-geodesic", "[penalty]\nkind = 'none'", options);
         assert_eq!(config.penalty, Regularizer::LorentzianSylvester { lambda: 100.0, time: "t".to_string() });
@@ -533,7 +533,7 @@ mod tests {
             "c.toml:17: lbfgs.itration: unknown key",
         ];
         assert_placed(&mistakes, &beginnings);
-        // What is right is taken.
+        // Valid values are taken.
         assert_eq!(config.lbfgs.unwrap().memory, 3);
     }
 

@@ -34,10 +34,10 @@ pub struct Learned {
     pub unfinished: Option<String>,
 }
 
-/// Opens the directory of a run that begins; `inputs` are the files that it reads beside the model it starts from.
+/// Opens the directory of a new run; `inputs` are the files that it reads in addition to the model that it starts from.
 ///
 /// # Errors
-/// As of [`output_dir::open`].
+/// Those of [`output_dir::open`].
 pub fn open(args: &RunArgs, config: &Config, inputs: &[&Path]) -> Result<Folder, CliError> {
     let usual = PathBuf::from("runs").join(&config.system);
     let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
@@ -90,7 +90,7 @@ impl<'a> Session<'a> {
                 let on = how_to_go_on(path);
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
-            // There is no model, and nothing to continue from.
+            // There is neither a model nor anything to continue from.
             Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
             Err(error) => return Err(keeping(path)(error.into())),
         };

@@ -39,7 +39,7 @@ impl<S: Scalar> Learned<S> {
     /// Reads a model, by its file or by the directory of its run; weights are converted to the precision of `S`.
     ///
     /// # Errors
-    /// A data error for anything but a whole model file.
+    /// A data error for anything but an intact model file.
     pub fn load(path: &Path) -> Result<Self, CliError> {
         let path = &model_file(path)?;
         let ModelFile { header, weights } = ModelFile::load(path).map_err(|e| CliError::file(path, e))?;
@@ -48,10 +48,10 @@ impl<S: Scalar> Learned<S> {
         Ok(Self { header, network })
     }
 
-    /// The same for a command that does not support constraints.
+    /// As [`Learned::load`], for a command that does not support constraints.
     ///
     /// # Errors
-    /// As [`Learned::load`]; a usage error for a model whose motion is held by constraints.
+    /// As [`Learned::load`]; a usage error for a model under constraints.
     pub fn load_free(path: &Path) -> Result<Self, CliError> {
         let learned = Self::load(path)?;
         if learned.header.is_constrained() {
@@ -60,7 +60,7 @@ impl<S: Scalar> Learned<S> {
         Ok(learned)
     }
 
-    /// The motion of the model: that of its network, under the constraints that it was learned under; and its header.
+    /// The motion of the model, that of its network under its constraints, and its header.
     ///
     /// # Errors
     /// A data error for constraints that leave no motion.
@@ -69,10 +69,10 @@ impl<S: Scalar> Learned<S> {
         Ok((self.header, motion))
     }
 
-    /// The system that the model learned, of the catalogue or by its description.
+    /// The system that the model learned, from the catalogue or from its description.
     ///
     /// # Errors
-    /// A data error for a system of which there are only recordings.
+    /// A data error for a system that is known only from recordings.
     pub fn system(&self, path: &Path) -> Result<SystemInstance<f64>, CliError> {
         let known = self.header.description.is_some() || find(&self.header.system).is_ok();
         if !known {

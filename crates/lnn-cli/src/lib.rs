@@ -157,9 +157,9 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     ended(|| run(cli.command))
 }
 
-/// Does the work of a program, whose signals and warnings are those of this one: a failure is one line on standard error, and an exit code.
+/// Runs a program with the signals and warnings of this one: a failure is one line on standard error and an exit code.
 pub fn ended(work: impl FnOnce() -> Result<(), CliError>) -> ExitCode {
-    // A command that has something to keep asks for the flag before it begins its work.
+    // A command with results to keep requests the flag before it begins its work.
     let ready = watch_log().and_then(|()| interrupt::watch().map_err(CliError::signals));
     match ready.and_then(|()| work()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -175,7 +175,7 @@ pub fn ended(work: impl FnOnce() -> Result<(), CliError>) -> ExitCode {
 /// Checks the arguments, the first being the program's own name, without running them.
 ///
 /// # Errors
-/// The usage error that the program ends with. Asking for help or for the version is none.
+/// The usage error that the program ends with. Asking for help or for the version is not an error.
 pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<(), CliError> {
     match Cli::try_parse_from(arguments) {
         Err(error) if error.exit_code() != 0 => Err(argument_error(&error)),
@@ -208,7 +208,7 @@ fn run(command: Command) -> Result<(), CliError> {
     }
 }
 
-/// Help and version go where they are asked for; a wrong argument is one line like any other error.
+/// Prints help and version where they were requested; a wrong argument is reported on one line, like any other error.
 pub fn answer(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {

@@ -1,4 +1,4 @@
-//! `lnn completions` and `lnn man`: what a shell and a reader of manual pages want to know of the program.
+//! `lnn completions` and `lnn man`: shell completions and manual pages.
 
 use crate::files::cannot_write;
 use crate::{CliError, output};

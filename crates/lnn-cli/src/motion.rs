@@ -1,4 +1,4 @@
-//! Results of a roll-out beside its samples: where it left the training range, pictures, facts in JSON.
+//! Results of a roll-out in addition to its samples: where it left the training range, pictures, facts in JSON.
 
 use crate::charges::Charges;
 use crate::files::cannot_write;
@@ -18,9 +18,9 @@ pub mod events;
 pub mod pictures;
 pub mod readings;
 
-/// Points of a curve beyond which every second one is left out.
+/// Number of points of a curve beyond which every second one is left out.
 const MOST_POINTS: usize = 4000;
-/// States of a motion by which its conserved quantity is recognized.
+/// Number of states of a motion from which its conserved quantity is recognized.
 const STATES: usize = 24;
 
 /// The first sample outside the states that a model was trained on.
@@ -28,7 +28,7 @@ const STATES: usize = 24;
 pub struct Leaving {
     /// Its time.
     pub t: f64,
-    /// The component that left.
+    /// The component that left the range.
     pub column: String,
     /// Its value.
     pub value: f64,
@@ -106,7 +106,7 @@ impl Watch {
         }
     }
 
-    /// What a model without friction conserves along its motion; `None` where its terms say nothing.
+    /// The quantity that a model without friction conserves along its motion; `None` if its terms do not show one.
     pub fn invariant(&self, model: &dyn EulerLagrange<f64>) -> Option<Invariant> {
         let n = self.columns.len() / 2;
         let states = (0..self.times.len()).step_by(self.times.len().div_ceil(STATES).max(1));
@@ -137,7 +137,7 @@ pub struct Facts<'a> {
     pub t_end: f64,
     /// Unit of times, if the system is known.
     pub time_unit: Option<&'a str>,
-    /// Name of the parameter of the motion, `t`, or `tau` beside a coordinate `t`.
+    /// Name of the parameter of the motion: `t`, or `tau` if a coordinate is called `t`.
     #[serde(skip)]
     pub parameter: &'static str,
     /// Steps taken.
@@ -152,15 +152,15 @@ pub struct Facts<'a> {
     pub work: Option<f64>,
     /// Energy taken by friction.
     pub dissipated: Option<f64>,
-    /// What took it, in words.
+    /// What took the energy, in words.
     #[serde(skip)]
     pub taken_by: &'static str,
     /// Energy taken by impacts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub impacts: Option<f64>,
-    /// Energy that is not accounted for.
+    /// Energy that friction and forces do not explain.
     pub energy_defect: Option<f64>,
-    /// What the motion conserves without friction and forces, as far as it is kept.
+    /// The quantity that the motion conserves without friction and forces, and its drift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conserved: Option<Kept>,
     /// The events that happened, of a system that has some.
@@ -190,7 +190,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// By the value of `p.v - L`, half of `g(v, v)`, at the start and its largest change.
+    /// From the value of `p.v - L`, half of `g(v, v)`, at the start and its largest change.
     pub fn new(quantity: Invariant, (start, change): (f64, f64)) -> Self {
         let factor = if quantity == Invariant::Square { 2.0 } else { 1.0 };
         Self { quantity, start: factor * start, largest_change: factor * change }
@@ -208,7 +208,7 @@ impl Kept {
 
 /// Place that the samples are written to.
 pub enum Target<'a> {
-    /// Standard output, as they come.
+    /// Standard output, as the samples come.
     Standard,
     /// A file that takes its name when it is whole.
     File { path: &'a Path, growing: AtomicWriter<'a> },
@@ -252,7 +252,7 @@ impl<'a> Target<'a> {
 }
 
 impl Facts<'_> {
-    /// In words, a line each for the motion and its energy.
+    /// In words, one line each for the motion and its energy.
     pub fn text(&self) -> String {
         let unit = self.time_unit.filter(|unit| *unit != "1").map_or(String::new(), |unit| format!(" {unit}"));
         let iterations = self
@@ -287,13 +287,13 @@ impl Facts<'_> {
     /// One line.
     ///
     /// # Errors
-    /// Numbers that JSON cannot hold.
+    /// Numbers that JSON cannot represent.
     pub fn json(&self) -> Result<String, CliError> {
         serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(CliError::data)
     }
 }
 
-/// Where the samples are, in words.
+/// The place of the samples, in words.
 pub fn place(out: &Path) -> String {
     if input::is_standard(out) { "standard output".to_string() } else { out.display().to_string() }
 }

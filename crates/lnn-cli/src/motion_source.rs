@@ -26,11 +26,11 @@ pub struct MotionSource {
     pub forces: Vec<String>,
     /// Values of inputs, if there are any.
     inputs: Option<KnownForce>,
-    /// A system that it is.
+    /// The system, if it is one.
     pub instance: Option<SystemInstance<f64>>,
     /// The states a model was trained on.
     pub domain: Option<Domain<f64>>,
-    /// Unit of times; a system that was only recorded has none, nor has one of another version.
+    /// Unit of times; a recorded system, or a system of another version, has none.
     pub time_unit: Option<String>,
     /// `true` if a time is among the coordinates, so that the parameter of the motion is another one.
     pub time_like: bool,
@@ -42,7 +42,7 @@ impl MotionSource {
     /// A trained model, by its file or by the directory of its run.
     ///
     /// # Errors
-    /// A data error for anything but a whole model file.
+    /// A data error for anything but an intact model file.
     pub fn model(path: &Path) -> Result<Self, CliError> {
         let learned = Learned::<f64>::load(path)?;
         let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
@@ -83,7 +83,7 @@ impl MotionSource {
         Ok(Self { name, model, columns, units, events, forces, inputs, instance, domain, time_unit, time_like, file })
     }
 
-    /// Splits what `--force` gave: forces from outside stay, inputs become the model's.
+    /// Splits the values of `--force`: external forces stay, inputs become the model's.
     ///
     /// # Errors
     /// A usage error for constraints that leave no motion.
@@ -101,7 +101,7 @@ impl MotionSource {
         Ok((!forces.is_zero()).then_some(forces))
     }
 
-    /// What is known at a time: the time, then inputs.
+    /// The known values at a time: the time, then the inputs.
     pub fn known(&self, t: f64) -> Vec<f64> {
         let mut known = vec![t; 1 + self.forces.len() - self.columns.len() / 2];
         if let Some(inputs) = &self.inputs {
@@ -110,7 +110,7 @@ impl MotionSource {
         known
     }
 
-    /// Name of the parameter of the motion, `t`, or `tau` beside a coordinate `t`.
+    /// Name of the parameter of the motion: `t`, or `tau` if a coordinate is called `t`.
     pub fn parameter_name(&self) -> &'static str {
         if self.columns.iter().any(|name| name == "t") { "tau" } else { "t" }
     }
@@ -121,7 +121,7 @@ impl MotionSource {
         with_unit(parameter, self.time_unit.as_deref().unwrap_or_default())
     }
 
-    /// The states that it is watched to stay within: those a model was trained on, all states for a system.
+    /// The states that the motion should stay within: the training states of a model, all states for a system.
     pub fn range(&self) -> Domain<f64> {
         self.domain.clone().unwrap_or_else(|| Domain::new(vec![None; self.columns.len()]))
     }

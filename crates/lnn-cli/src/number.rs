@@ -19,7 +19,7 @@ pub enum Precision {
     Dd,
 }
 
-/// A parser of one value of a type by its name; the help says of each what it is.
+/// A parser of one value of a type by its name; the help describes each value.
 pub fn choice<T: Copy + Send + Sync>(
     all: &'static [T],
     name: fn(T) -> &'static str,
@@ -85,7 +85,7 @@ pub fn rate(text: &str) -> Result<f64, String> {
     number(1e-9, 1e12)(text)
 }
 
-/// A seed: a configuration holds none that is larger.
+/// A seed no larger than a configuration can store.
 pub fn seed(text: &str) -> Result<u64, String> {
     let refused = || format!("expected a whole number from 0 to {}", i64::MAX);
     text.trim().parse().ok().filter(|seed| i64::try_from(*seed).is_ok()).ok_or_else(refused)
@@ -103,10 +103,10 @@ pub fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
 }
 
-/// A finite number for each of `names`, separated by commas, read in the precision of `S`; `option` is the option that they are read for.
+/// A finite number for each of `names`, separated by commas, read in the precision of `S`; `option` is the name of the option.
 ///
 /// # Errors
-/// A usage error that says how many were expected of what.
+/// A usage error with the expected number and names.
 pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec<S>, CliError> {
     let numbers: Option<Vec<S>> = text.split(',').map(|x| S::parse(x.trim()).filter(|x| x.is_finite())).collect();
     let expected = format!("expected {} finite numbers ({})", names.len(), names.join(","));
@@ -117,8 +117,8 @@ pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec
     }
 }
 
-/// A value for each of `names` from `NAME=VALUE,..` in any order, numbers or formulas of numbers, read in the precision of `S`;
-/// `option` is the option that they are read for.
+/// A value for each of `names` from `NAME=VALUE,..` in any order, numbers or formulas of numbers, read in the precision of `S`; `option` is
+/// the name of the option.
 ///
 /// # Errors
 /// A usage error that names an unknown, repeated or missing name, or a value that is not a finite number.
@@ -148,7 +148,7 @@ pub fn named<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Ve
     Ok(values.into_iter().flatten().collect())
 }
 
-/// The parts of a text between the commas that stand outside of parentheses.
+/// The parts of a text between commas outside parentheses.
 fn outer_parts(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0_i32;
     text.split(move |c: char| {
@@ -162,7 +162,7 @@ pub fn thread_count(text: &str) -> Result<usize, String> {
     whole(1, MOST_THREADS)(text)
 }
 
-/// Number of threads: as asked for, or all there are.
+/// Number of threads: the requested one, or that of all cores.
 pub fn threads(asked: Option<usize>) -> usize {
     let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     asked.unwrap_or_else(all).min(MOST_THREADS)

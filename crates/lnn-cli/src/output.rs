@@ -16,7 +16,7 @@ pub fn print(text: &str) -> Result<(), CliError> {
 /// Writes bytes to standard output.
 ///
 /// # Errors
-/// As of [`print`].
+/// Those of [`print`].
 pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
@@ -38,7 +38,7 @@ pub fn json(result: &impl Serialize) -> Result<String, CliError> {
     Ok(serde_json::to_string(result).map_err(CliError::data)? + "\n")
 }
 
-/// Writes how far long work is to standard error, one line; if that is closed, nothing more can be done.
+/// Writes the progress of long work to standard error, on one line; if that is closed, nothing more can be done.
 pub fn progress(text: &str) {
     let _ = writeln!(std::io::stderr(), "progress: {}", lnn::names::one_line(text));
 }

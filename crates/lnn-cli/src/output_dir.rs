@@ -1,16 +1,16 @@
-//! Where a command writes: the directory that was requested, or the first of `NAME`, `NAME-2`, `NAME-3`, .. that is free.
+//! The directory that a command writes into: the requested one, or the first free one of `NAME`, `NAME-2`, `NAME-3`, ..
 
 use crate::folder::{Attempt, Folder};
 use crate::results::{Writer, found, require_no_input, require_room};
 use crate::{CliError, output};
 use std::path::{Path, PathBuf};
 
-/// A directory that is wanted.
+/// A directory request.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// Directory requested, if one was.
+    /// Requested directory, if there is one.
     pub out: Option<&'a Path>,
-    /// Directory that serves if none was.
+    /// Default directory.
     pub usual: &'a Path,
     /// `true` if results that are there may be replaced.
     pub overwrite: bool,
@@ -20,11 +20,11 @@ pub struct Wanted<'a> {
     pub writer: Writer,
 }
 
-/// Opens the directory; without `out` and `overwrite` it is the first that no run has written into and none is writing into.
+/// Opens the directory. Without `out` and `overwrite` it is the first one that contains no run and that no run is writing into.
 ///
 /// # Errors
-/// A data error for a directory that holds a run, that another run holds, where an input would be overwritten, or that
-/// cannot be written.
+/// A data error for a directory that contains a run, that another run has locked, where an input would be overwritten, or that cannot be
+/// written.
 pub fn open(wanted: &Wanted<'_>) -> Result<Folder, CliError> {
     let Wanted { out, usual, overwrite, inputs, writer } = *wanted;
     if let (Some(path), _) | (None, (true, path)) = (out, (overwrite, usual)) {
@@ -79,7 +79,7 @@ mod tests {
         let usual = directory.path().join("runs/arm");
         let wanted = Wanted { out: None, usual: &usual, overwrite: false, inputs: &[], writer: Writer::Learner };
         let first = open(&wanted).unwrap();
-        // The first is held, the second free; then both hold a model.
+        // The first is locked, the second free; then both contain a model.
         let second = open(&wanted).unwrap();
         assert_eq!((first.path(), second.path()), (usual.as_path(), numbered(&usual, 2).as_path()));
         for folder in [first, second] {

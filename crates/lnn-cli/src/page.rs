@@ -28,7 +28,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let path = model_file(&args.model)?;
     let out = OutputFile::claim(&args.out, &[&path], args.overwrite)?;
     let learned = Learned::<f64>::load(&path)?;
-    // Of motion that was only recorded there is nothing exact.
+    // Recorded motion has no exact system.
     let system = learned.system(&path).ok();
     let text = page(&learned.header, &learned.network, system.as_ref()).map_err(|e| CliError::file(&path, e))?;
     out.write(text.as_bytes())?;

@@ -3,8 +3,8 @@
 /// Longest name, in bytes.
 const LONGEST: usize = 100;
 
-/// A plain name: letters, digits, `-`, `_`, `.` and spaces within, the first a letter or digit. What leads elsewhere as a
-/// part of a path, or nowhere, is none.
+/// A plain name: letters, digits, `-`, `_`, `.` and spaces within, the first a letter or digit. Names that lead elsewhere as part of a path
+/// are rejected.
 ///
 /// # Errors
 /// A description of plain names.

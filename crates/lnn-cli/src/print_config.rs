@@ -21,15 +21,14 @@ pub enum PrintFormat {
     Markdown,
 }
 
-/// A configuration file with the values of `root` and a comment for every one of `keys`; `remark` says what the names of an open
-/// table mean.
+/// A configuration file with the values of `root` and a comment for each of `keys`; `remark` explains the names in an open table.
 pub fn commented(keys: &[Key], root: &Table, remark: &dyn Fn(&str) -> Option<String>) -> String {
     let mut text = String::new();
     write_table(keys, Some(root), "", true, remark, &mut text);
     text
 }
 
-/// Writes the keys of a table at `path`, then the tables within; what the keys mean is said once.
+/// Writes the keys of a table at `path`, then the tables within; the meaning of a key is explained once.
 fn write_table(
     keys: &[Key],
     table: Option<&Table>,
@@ -98,7 +97,7 @@ pub fn training_reference() -> String {
     page
 }
 
-/// The keys that a fit has beside those of a training.
+/// The keys that a fit has in addition to those of a training.
 pub fn fit_reference() -> String {
     let mut page = String::new();
     let is_own = |key: &&Key| !["shooting", "training"].contains(&key.name);
@@ -107,7 +106,7 @@ pub fn fit_reference() -> String {
     page
 }
 
-/// Writes the reference of keys and of the tables within; `values` are shown, and `whose` says whose they are.
+/// Writes the reference of keys and of the tables within, with `values`, which are described by `whose`.
 fn describe(keys: &[Key], values: &Json, whose: &str, page: &mut String) {
     // Brackets outside of code would be links.
     let cell = |text: &str| text.replace('|', "\\|").replace('[', "\\[");

@@ -15,7 +15,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A Lagrangian with what is known of its coordinates.
+/// A Lagrangian with the data about its coordinates.
 pub struct Probe {
     /// Name of the system.
     pub name: String,
@@ -23,7 +23,7 @@ pub struct Probe {
     pub model: Box<dyn EulerLagrange<f64>>,
     /// Coordinates, then velocities.
     pub columns: Vec<String>,
-    /// The states of interest: those of a system on which errors are stated, the middle of those a model was trained on.
+    /// The states of interest: for a system, those on which errors are stated; for a model, the middle of the training states.
     pub region: Region,
     /// `true` for a system, whose terms are exact.
     pub exact: bool,
@@ -31,7 +31,7 @@ pub struct Probe {
     pub constraints: BTreeMap<String, String>,
     periodic: Vec<bool>,
     units: Vec<String>,
-    /// The system, or the one that a model learned: its mass shell and its domain.
+    /// The system, or the system that a model learned, with its mass shell and its domain.
     system: Option<SystemInstance<f64>>,
 }
 
@@ -93,14 +93,14 @@ impl Probe {
         if probe.model.manifold().is_some() { Err(held(&name)) } else { Ok(probe) }
     }
 
-    /// The same, of a system with constraints as well.
+    /// As [`Probe::system`], including systems with constraints.
     ///
     /// # Errors
-    /// As [`Probe::system`].
+    /// Those of [`Probe::system`].
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let configure = |system| configure_system::<f64>(system, given).map_err(CliError::usage);
         let mut configured = configure(system_arg::system(name)?)?;
-        // What is read off a Lagrangian does not depend on what drives it.
+        // Properties of a Lagrangian do not depend on the drive of the system.
         if let Some(driven) = configured.system.description().filter(|_| configured.is_timed()) {
             let mut free = driven.clone();
             free.forces.clear();
@@ -129,16 +129,16 @@ impl Probe {
     /// A trained model, by its file or by the directory of its run.
     ///
     /// # Errors
-    /// A data error for anything but a whole model file, a usage error for one whose motion is held by constraints.
+    /// A data error for anything but an intact model file, a usage error for a model under constraints.
     pub fn model(path: &Path) -> Result<Self, CliError> {
         let probe = Self::model_with_constraints(path)?;
         if probe.model.manifold().is_some() { Err(held(&path.display())) } else { Ok(probe) }
     }
 
-    /// The same, of a model under constraints as well.
+    /// As [`Probe::model`], including models under constraints.
     ///
     /// # Errors
-    /// A data error for anything but a whole model file.
+    /// A data error for anything but an intact model file.
     fn model_with_constraints(path: &Path) -> Result<Self, CliError> {
         let learned = Learned::<f64>::load(path)?;
         // A model of recorded motion has no system; its coordinates have no units then.
@@ -166,7 +166,7 @@ impl Probe {
         })
     }
 
-    /// One of the two: a file that ends in `.toml` and a name of the catalogue are systems, any other file or directory is a model.
+    /// A system or a model: a file that ends in `.toml` and a name of the catalogue are systems, any other file or directory is a model.
     ///
     /// # Errors
     /// As [`Probe::system`] and [`Probe::model`].
@@ -182,7 +182,7 @@ impl Probe {
     /// Replaces bounds of columns.
     ///
     /// # Errors
-    /// A usage error for a column that is not there.
+    /// A usage error for a column that does not exist.
     pub fn narrow(&mut self, ranges: &[Bound]) -> Result<(), CliError> {
         let n = self.model.coordinates();
         for (name, range) in ranges {
@@ -198,7 +198,7 @@ impl Probe {
         Ok(())
     }
 
-    /// Narrows the states of both to those of both.
+    /// Narrows the states of both to their common ones.
     ///
     /// # Errors
     /// A usage error if there are none.
@@ -236,19 +236,19 @@ impl Probe {
         parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect()
     }
 
-    /// Functions of the coordinates up to these degrees, or those that are usual for its coordinates.
+    /// Functions of the coordinates up to these degrees, or the default ones for its coordinates.
     ///
     /// # Errors
-    /// A usage error for degrees of too many functions, which are not made.
+    /// A usage error for degrees with too many functions.
     pub fn basis(&self, degrees: Option<Degrees>) -> Result<(Basis, Degrees), CliError> {
         Basis::within(self.coordinates(), &self.charts(), degrees)
             .map_err(|problem| CliError::usage(format_args!("--basis: {problem}")))
     }
 
-    /// Number of states that are examined for so many unknown coefficients: as requested, or the usual one, as far as there is room.
+    /// Number of states for a search with `unknowns` coefficients: the requested one, or the default one as far as memory allows.
     ///
     /// # Errors
-    /// A usage error for more than there is room for.
+    /// A usage error for more states than memory allows.
     pub fn points(&self, asked: Option<usize>, usual: usize, unknowns: usize) -> Result<usize, CliError> {
         let most = most_states(self.model.coordinates(), unknowns);
         match asked {
@@ -286,10 +286,10 @@ impl Probe {
         self.states_beside(self, states, seed)
     }
 
-    /// The same, inside the domain of another system as well, whose mass shell serves if this one has none.
+    /// As [`Probe::states`], but also inside the domain of another system, whose mass shell is used if this one has none.
     ///
     /// # Errors
-    /// As [`Probe::states`].
+    /// Those of [`Probe::states`].
     pub fn states_beside(&self, other: &Self, states: usize, seed: u64) -> Result<(Vec<f64>, Vec<f64>), CliError> {
         let systems: Vec<_> = [other, self].into_iter().filter_map(|probe| probe.system.as_ref()).collect();
         let accept = |q: &[f64], v: &mut [f64]| {

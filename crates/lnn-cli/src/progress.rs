@@ -7,8 +7,8 @@ use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Time after which a search says how far it is where standard error is no terminal, and time between two such lines: short searches
-/// stay silent, logs of long ones stay short.
+/// Time after which a search reports its progress if standard error is not a terminal, and time between reports: short searches stay
+/// silent, logs of long ones stay short.
 const FIRST_LINE: Duration = Duration::from_millis(1500);
 const NEXT_LINE: Duration = Duration::from_secs(10);
 

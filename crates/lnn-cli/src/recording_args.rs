@@ -82,20 +82,20 @@ impl RecordingArgs {
         }
     }
 
-    /// Reads the files; without coordinates, after a guess of what the columns are, which a note states.
+    /// Reads the files. Without coordinates, the roles of the columns are guessed first, and a note states the guess.
     ///
     /// # Errors
-    /// As of [`read`].
+    /// Those of [`read`].
     pub fn read(&self) -> Result<(LoadedRecording, Columns), CliError> {
         let (reading, Guess { columns, table }) = self.load(false)?;
         note(&columns, &table);
         Ok((reading, columns))
     }
 
-    /// Reads the files, and says what the columns were taken as; `beside` with the numbers in other columns.
+    /// Reads the files, and returns the roles of the columns; with `beside`, also the numbers in other columns.
     ///
     /// # Errors
-    /// As of [`read`].
+    /// Those of [`read`].
     pub fn load(&self, beside: bool) -> Result<(LoadedRecording, Guess), CliError> {
         let mut guessed = Guess { columns: self.meaning(), table: Vec::new() };
         let read = read_spooled(&self.data, |files| {
@@ -128,7 +128,7 @@ impl RecordingArgs {
             ("velocity", &columns.velocity),
             ("acceleration", &columns.acceleration),
             ("force", &columns.force),
-            // The usual names need not be said.
+            // The default names need not be stated.
             ("time", &one(&columns.time.clone().filter(|name| name != "t" && name != "time"))),
             ("rate", &one(&columns.rate.map(|rate| rate.to_string()))),
             ("trajectory", &one(&columns.trajectory)),
@@ -149,7 +149,7 @@ impl RecordingArgs {
     /// These arguments with the columns of a guess.
     ///
     /// # Errors
-    /// As of [`read`].
+    /// Those of [`read`].
     pub fn complete(&self) -> Result<Self, CliError> {
         let columns = self.meaning();
         let Guess { columns, table } = guess(&self.data, &columns).map_err(|error| refused(&error, &columns))?;
@@ -160,7 +160,7 @@ impl RecordingArgs {
     }
 }
 
-/// States what columns were taken as, if that was guessed.
+/// States the guessed roles of the columns, if there was a guess.
 fn note(columns: &Columns, table: &[ColumnGuess]) {
     if !table.is_empty() {
         let (coords, angles) = (columns.coords.join(", "), columns.periodic.join(", "));
@@ -169,10 +169,10 @@ fn note(columns: &Columns, table: &[ColumnGuess]) {
     }
 }
 
-/// Reads files whose columns mean this.
+/// Reads files with columns of this meaning.
 ///
 /// # Errors
-/// A usage error for columns that contradict each other, a data error for the first file that is not as said.
+/// A usage error for columns that contradict each other, a data error for the first file that does not match.
 pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, CliError> {
     let reading =
         read_spooled(files, |files| read_recording(files, columns)).map_err(|error| refused(&error, columns))?;

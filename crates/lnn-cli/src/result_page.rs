@@ -15,10 +15,10 @@ pub struct PageArgs {
 }
 
 impl PageArgs {
-    /// The file, found free, if there is to be one.
+    /// The file, checked to be free, if one was requested.
     ///
     /// # Errors
-    /// As of [`OutputFile::claim`].
+    /// Those of [`OutputFile::claim`].
     pub fn claim<'a>(&'a self, inputs: &[&Path], overwrite: bool) -> Result<Option<OutputFile<'a>>, CliError> {
         self.html.as_deref().map(|html| OutputFile::claim(html, inputs, overwrite)).transpose()
     }
@@ -27,7 +27,7 @@ impl PageArgs {
 /// Writes the page of a report.
 ///
 /// # Errors
-/// As of [`OutputFile::write`].
+/// Those of [`OutputFile::write`].
 pub fn write(
     page: Option<OutputFile<'_>>,
     title: &str,

@@ -100,7 +100,7 @@ pub fn require_no_input(directory: &Path, inputs: &[&Path]) -> Result<(), CliErr
     Ok(())
 }
 
-/// Refuses a directory that holds a run, unless it may be replaced; an evaluation is refused where a model is in any case.
+/// Refuses a directory that contains a run, unless it may be replaced; an evaluation never replaces a model.
 ///
 /// # Errors
 /// A data error that names the contents.
@@ -120,7 +120,7 @@ pub fn require_room(directory: &Path, writer: Writer, overwrite: bool) -> Result
     }
 }
 
-/// Removes what an earlier run left, all but the model: to be called when the new run's model has taken its place.
+/// Removes all files of an earlier run except the model; called once the new run's model has replaced it.
 ///
 /// # Errors
 /// [`PipelineError::Output`] naming what cannot be removed.
@@ -142,7 +142,7 @@ pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
     Ok(())
 }
 
-/// Removes what an earlier evaluation left.
+/// Removes the files of an earlier evaluation.
 ///
 /// # Errors
 /// [`PipelineError::Output`] naming what cannot be removed.
@@ -154,7 +154,7 @@ pub fn remove_stale_evaluation(directory: &Path) -> Result<(), PipelineError> {
 fn remove(directory: &Path, names: &[&str]) -> Result<(), PipelineError> {
     let captions = if names.contains(&CAPTIONS) { captioned(directory) } else { Vec::new() };
     for path in captions.into_iter().chain(names.iter().map(|name| directory.join(name))) {
-        // A device behind a link holds nothing of an earlier run.
+        // A link to a device does not contain an earlier run.
         if path.is_file() || path.is_symlink() && !path.exists() {
             let cannot = |e| PipelineError::output(&path, format_args!("cannot remove the previous results: {e}"));
             Disk.remove(&path).map_err(cannot)?;
@@ -163,7 +163,7 @@ fn remove(directory: &Path, names: &[&str]) -> Result<(), PipelineError> {
     Ok(())
 }
 
-/// Pictures that the captions in a directory name, as far as the names are such of pictures in it.
+/// Pictures named by the captions in a directory, if the names are valid for pictures in it.
 fn captioned(directory: &Path) -> Vec<PathBuf> {
     let bytes = read_regular(&directory.join(CAPTIONS), MAX_BYTES).unwrap_or_default();
     let names: BTreeMap<String, serde_json::Value> = serde_json::from_slice(&bytes).unwrap_or_default();

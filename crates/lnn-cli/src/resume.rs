@@ -21,25 +21,24 @@ enum Found {
 /// The text of an existing run.
 #[derive(Clone, Copy, Debug)]
 pub enum Text<'a> {
-    /// That of its checkpoint.
+    /// The text of its checkpoint.
     Checkpoint(&'a str),
     /// Its `config.toml`.
     Configuration(&'a str),
 }
 
-/// Opens the directory of a run to continue with, and what `read` makes of its text; `None` if there is nothing left to do, which is
-/// said then.
+/// Opens the directory of a run to continue, and passes its text to `read`; `None` if nothing is left to do, which is then reported.
 ///
 /// # Errors
-/// A data error if there is no such run, if it ended with an error, if it is of the other kind, or if what is there is damaged; as
-/// of `read`.
+/// A data error if there is no such run, if it ended with an error, if it is of the other kind, or if its files are damaged; errors of
+/// `read`.
 pub fn reopen<T>(
     directory: &Path,
     command: Command,
     json: bool,
     read: impl FnOnce(Text<'_>) -> Result<T, CliError>,
 ) -> Result<Option<(Folder, T)>, CliError> {
-    // Looked for before anything is created, and again when no other process can write.
+    // Searched before anything is created, and again when no other process can write.
     find(directory, command)?;
     let folder = Folder::open(directory)?;
     match find(directory, command)? {
@@ -58,10 +57,10 @@ pub fn has_checkpoint(directory: &Path) -> bool {
     [LATEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
 }
 
-/// Looks for a run of this kind to continue with.
+/// Looks for a run of this kind to continue.
 ///
 /// # Errors
-/// A data error if there is none, if it ended with an error, if it is of the other kind, or if what is there is damaged.
+/// A data error if there is none, if it ended with an error, if it is of the other kind, or if its files are damaged.
 fn find(directory: &Path, command: Command) -> Result<Found, CliError> {
     if !directory.is_dir() {
         return Err(CliError::file(directory, "no such directory"));
@@ -80,7 +79,7 @@ fn find(directory: &Path, command: Command) -> Result<Found, CliError> {
     }
 }
 
-/// The run that left its summary and no checkpoint.
+/// A finished run, which left its summary and no checkpoint.
 fn finished(directory: &Path) -> Result<Found, CliError> {
     /// The part of `summary.json` that describes the end.
     #[derive(Deserialize)]
@@ -108,7 +107,7 @@ pub fn parse<T: DeserializeOwned>(directory: &Path, name: &str, text: &str) -> R
     })
 }
 
-/// Refuses to continue with another configuration than that of the directory.
+/// Refuses to continue with a configuration that differs from that of the directory.
 ///
 /// # Errors
 /// A usage error naming what differs.
@@ -141,8 +140,7 @@ pub fn how_to_go_on(directory: &Path) -> String {
     }
 }
 
-/// An error that ended a run which has learned something, such as a full disk: its checkpoint is still there, and the
-/// message says so.
+/// An error that ended a run with results, such as a full disk: its checkpoint is still there, and the message says so.
 pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
     |error| {
         if error.kind() == Kind::Data && has_checkpoint(directory) {

@@ -101,7 +101,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// What moves, under the constraints that are given.
+    /// The source of the motion, under the given constraints.
     fn source(&self) -> Result<MotionSource, CliError> {
         let mut source = match &self.model {
             Some(path) => MotionSource::model(path)?,
@@ -139,7 +139,7 @@ impl Args {
         Ok(options)
     }
 
-    /// Refuses to write over what is there, or what is read.
+    /// Refuses to overwrite existing files or inputs.
     fn require_room(&self, source: &MotionSource) -> Result<(), CliError> {
         let files = self.forces.files().chain(self.tube.files());
         let inputs: Vec<_> = files.chain(source.file.as_deref()).chain(self.constraints.as_deref()).collect();
@@ -271,7 +271,7 @@ impl Args {
         }
     }
 
-    /// Prints what the motion was like.
+    /// Prints a summary of the motion.
     fn say(
         &self,
         (source, watch): (&MotionSource, &Watch),
@@ -323,7 +323,7 @@ impl Args {
     }
 }
 
-/// Says how much of the motion is a choice.
+/// Reports how many directions of the motion are a free choice.
 fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     let mut terms = Terms::default();
     // The motion itself reports failures.
@@ -336,7 +336,7 @@ fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     ));
 }
 
-/// A motion that is refused before it begins, with the option that was wrong.
+/// An error for a motion that is rejected before it begins, with the wrong option.
 fn refused(error: &RolloutError) -> CliError {
     if let RolloutError::OffConstraints { nearest, .. } = error {
         let nearest: Vec<String> = nearest.iter().map(f64::to_string).collect();

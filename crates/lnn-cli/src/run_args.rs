@@ -66,7 +66,7 @@ fn every(text: &str) -> Result<CheckpointInterval, String> {
 }
 
 impl RunArgs {
-    /// Finishes a training in range: reads the file of a known part, and scales the schedule as the options say.
+    /// Completes a training: reads the file of a known part, and scales the schedule according to the options.
     ///
     /// # Errors
     /// Usage errors for a schedule that cannot be scaled and for the file, a data error for one that cannot be read.
@@ -92,7 +92,7 @@ impl RunArgs {
     }
 }
 
-/// Gives the phases of merged layers, whose training stands at `path`, a `t_max` of all epochs where these alone are given and the
+/// Gives the phases of merged layers, whose training is at `path`, a `t_max` equal to the epochs if only the epochs were given and the
 /// schedule has no periods.
 pub fn fill_periods(config: &mut Config, layers: &Layers, path: &str) {
     for (k, phase) in config.phases.iter_mut().enumerate() {
@@ -103,7 +103,7 @@ pub fn fill_periods(config: &mut Config, layers: &Layers, path: &str) {
     }
 }
 
-/// Adds what options of the training's network, at `path`, mean beside their own keys.
+/// Adds the values that options of the training's network, at `path`, imply for other keys.
 pub fn imply(layers: &mut Layers, path: &str, timed: bool) {
     let at = |key: &str, value: Value| (format!("{path}{key}"), value);
     layers.imply(&format!("{path}network.structure"), |structure| {
@@ -120,7 +120,7 @@ pub fn imply(layers: &mut Layers, path: &str, timed: bool) {
         }
         also
     });
-    // What is known has its own kinetic energy, and the network begins with next to nothing beside it.
+    // A known part has its own kinetic energy, and the output of the network beside it starts near zero.
     layers.imply(&format!("{path}network.known"), |_| {
         vec![at("network.alpha", 0.0.into()), at("network.initialization", "near-zero".into())]
     });

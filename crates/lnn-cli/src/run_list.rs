@@ -25,7 +25,7 @@ enum State {
     OtherConfiguration,
     /// It has a file that cannot be read, and why.
     Damaged(&'static str, String),
-    /// A process works on it; which, as far as that is known.
+    /// A process works on it; which one, if known.
     InProgress(Option<LockOwner>),
     /// No process works on it; `true` if it resumes from a checkpoint.
     Open(bool),
@@ -72,7 +72,7 @@ impl Listed {
         vec![self.number.to_string(), experiment.to_string(), self.run.name.clone(), state]
     }
 
-    /// The same as an object.
+    /// This entry as an object.
     pub fn json(&self, experiment: &str, scale: Option<&str>) -> Value {
         let (state, owner) = match &self.state {
             State::Finished => ("finished", None),

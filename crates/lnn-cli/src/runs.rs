@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Runs of an experiment in their directory.
 pub struct Work {
-    /// What they belong to.
+    /// The experiment that they belong to.
     pub experiment: Box<dyn Experiment>,
     /// Directory.
     pub path: PathBuf,
@@ -63,8 +63,8 @@ const TABLES: [&str; 2] = ["table.csv", "runs.csv"];
 /// Runs experiments, or a share of them.
 ///
 /// # Errors
-/// A usage error for a share that cannot be told, a data error for a directory that cannot be written, an interruption; runs that are
-/// finished stay finished.
+/// A usage error for a share that cannot be determined, a data error for a directory that cannot be written, an interruption; finished runs
+/// are kept.
 pub fn perform(all: Vec<Work>, orders: &Orders) -> Result<(), CliError> {
     let shard = match orders.shard {
         Some(shard) => Some(shard),
@@ -137,7 +137,7 @@ pub fn merge(all: Vec<Work>, json: bool) -> Result<(), CliError> {
     }
 }
 
-/// The runs of a share, of those experiments that have any in it.
+/// The runs of a share, for experiments that have any in it.
 fn share(all: Vec<Work>, shard: Option<Shard>) -> Vec<Work> {
     let Some(shard) = shard else { return all };
     let of = |mut work: Work| {
@@ -147,7 +147,7 @@ fn share(all: Vec<Work>, shard: Option<Shard>) -> Vec<Work> {
     all.into_iter().map(of).filter(|work| !work.runs.is_empty()).collect()
 }
 
-/// Refuses a directory with finished runs of other configurations than those asked for; `hint` says what to do then.
+/// Refuses a directory with finished runs of configurations other than the requested ones; `hint` says what to do then.
 fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
     let store = ExperimentDirectory::new(&work.path);
     let mut others = Vec::new();
@@ -162,7 +162,7 @@ fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
     Err(CliError::file(&work.path.join(first), problem))
 }
 
-/// Runs with files that cannot be read: each file and what is wrong with it.
+/// Runs with unreadable files: each file and its problem.
 fn damaged(work: &Work) -> Result<Vec<String>, CliError> {
     let store = ExperimentDirectory::new(&work.path);
     let mut found = Vec::new();
@@ -208,7 +208,7 @@ fn print_results(work: &Work, done: &ExperimentReport, json: bool) -> Result<(),
     output::print(&format!("{}report: {}\n\n", done.findings, report.display()))
 }
 
-/// Prints what became of a share of an experiment.
+/// Prints the outcome of a share of an experiment.
 fn print_share(work: &Work, shard: Shard, runs: usize, json: bool) -> Result<(), CliError> {
     let (name, scale) = (work.experiment.name(), work.experiment.scale());
     if json {

@@ -122,7 +122,7 @@ struct Metrics {
 }
 
 impl Args {
-    /// Reads what there is to look through.
+    /// Reads the metrics to view.
     fn metrics(&self) -> Result<Metrics, CliError> {
         let (mut system, mut columns, mut known, mut models) = (String::new(), Vec::new(), None, Vec::new());
         let learned = self.model.as_deref().map(Learned::<f64>::load_free).transpose()?;
@@ -213,11 +213,11 @@ impl Args {
     }
 }
 
-/// Traces, writes the picture and prints what it shows.
+/// Traces the rays, writes the picture and prints its properties.
 ///
 /// # Errors
-/// A usage error for an unknown system, wrong parameters, a camera that cannot be; a data error for a bad model and for a picture that cannot be
-/// written.
+/// A usage error for an unknown system, wrong parameters, an impossible camera; a data error for a bad model and for a picture that cannot
+/// be written.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let mut metrics = args.metrics()?;
     let (camera, tracing) = args.scene(&mut metrics)?;
@@ -267,9 +267,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Distance of the sky of an exact metric over that of the camera.
+/// Distance of the sky of an exact metric, relative to that of the camera.
 const FAR: f64 = 100.0;
-/// The same of a learned one, which was trained that far.
+/// Such a distance for a learned metric, which was trained that far.
 const LEARNED_FAR: f64 = 2.0;
 
 /// An error with the option that helps.

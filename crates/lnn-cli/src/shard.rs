@@ -4,7 +4,7 @@ use crate::number::count;
 use std::fmt;
 use std::str::FromStr;
 
-/// The `index`-th of `count` shares, from 1: it holds the runs whose numbers, from 0, leave `index - 1` when divided by `count`.
+/// The `index`-th of `count` shares, from 1: the runs whose numbers, from 0, have the remainder `index - 1` when divided by `count`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     index: usize,
@@ -17,13 +17,13 @@ impl Shard {
         number % self.count == self.index - 1
     }
 
-    /// `true` if there are others.
+    /// `true` if there are other shares.
     pub fn is_part(self) -> bool {
         self.count > 1
     }
 
-    /// The share of a task of a Slurm array, by the variables that Slurm sets; `None` outside of an array. Arrays may begin at any
-    /// number and take steps; of a list such as `1,4,5` it is not known which share is whose.
+    /// The share of a task of a Slurm array, by the variables that Slurm sets; `None` outside of an array. Arrays may begin at any number
+    /// and take steps; a list such as `1,4,5` does not determine the shares.
     ///
     /// # Errors
     /// The problem with the variables.

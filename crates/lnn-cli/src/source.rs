@@ -1,4 +1,4 @@
-//! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
+//! The source of Euler-Lagrange terms: a hand-written system or a trained model.
 
 use crate::learned::Learned;
 use crate::{CliError, forces, output, system_arg};
@@ -9,7 +9,7 @@ use lnn::scalar::Scalar;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// What makes something of a system, by its name or file and the values of its parameters.
+/// Builds a value from a system, given by its name or file and the values of its parameters.
 type FromSystem<T> = fn(&str, &[(String, String)]) -> Result<T, CliError>;
 
 /// Something that moves by a Lagrangian, with the names of its state's components.
@@ -64,7 +64,7 @@ impl<S: Scalar> Source<S> {
     /// A trained model; its weights are converted to the precision of `S`.
     ///
     /// # Errors
-    /// A data error for a file that is not a whole model file, or whose constraints leave no motion.
+    /// A data error for a file that is not an intact model file, or whose constraints leave no motion.
     pub fn model(path: &Path) -> Result<Self, CliError> {
         let (header, model) = Learned::load(path)?.motion(path)?;
         let forces = forces::names(&header);
@@ -98,10 +98,10 @@ pub struct SystemOrModel {
 }
 
 impl SystemOrModel {
-    /// Reads the one that was given.
+    /// Reads the given one.
     ///
     /// # Errors
-    /// That of its reader.
+    /// Those of its reader.
     pub fn read<T>(&self, model: fn(&Path) -> Result<T, CliError>, system: FromSystem<T>) -> Result<T, CliError> {
         match &self.model {
             Some(path) => model(path),

@@ -1,4 +1,4 @@
-//! Recorded motion from standard input: it goes through a temporary file, for arrays are read in several passes.
+//! Recorded motion from standard input goes through a temporary file, because arrays are read in several passes.
 
 use crate::input;
 use lnn::recording::LoadedRecording;

@@ -89,12 +89,11 @@ pub enum StatesError {
 
 /// Reads states from CSV text.
 ///
-/// The first line that is neither blank nor a comment, which begins with `#`, names the columns, all of `columns` (coordinates,
-/// then velocities) in any order; the last comment above numbers may do so too. What stands in other columns, such as the time
-/// and the energy of a roll-out, is left out. Fields are separated by commas, semicolons, tabs, bars or blanks, as in that line;
-/// spaces around them, double quotes, a byte order mark, blank lines and
-/// the line ends of Windows and of old Macs are accepted. Numbers are read in the precision of `S`: a double-double sees the decimal text, not
-/// its nearest `f64`.
+/// The first line that is neither blank nor a comment, which begins with `#`, names the columns, all of `columns` (coordinates, then
+/// velocities) in any order; the last comment above numbers may do so too. Other columns, such as the time and the energy of a roll-out,
+/// are ignored. Fields are separated by commas, semicolons, tabs, bars or blanks, as in that line; spaces around them, double quotes, a
+/// byte order mark, blank lines and the line ends of Windows and of old Macs are accepted. Numbers are read in the precision of `S`: a
+/// double-double sees the decimal text, not its nearest `f64`.
 ///
 /// # Errors
 /// [`StatesError`] naming the first offending row and column.
@@ -102,10 +101,10 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
     Ok(parse_states_at(bytes, columns, &[])?.0)
 }
 
-/// The same beside a column of times, if one is named; the times are empty if none is.
+/// As [`parse_states`], with a column of times if one is named; otherwise the times are empty.
 ///
 /// # Errors
-/// As [`parse_states`].
+/// Those of [`parse_states`].
 pub fn parse_states_at<S: Scalar>(
     bytes: &[u8],
     columns: &[String],
@@ -142,7 +141,7 @@ struct Columns<'a> {
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
 }
 
-/// Finds the names of the columns; `asked` are those that an error tells of.
+/// Finds the names of the columns; `asked` are the columns that an error lists.
 fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|e| {
@@ -223,7 +222,7 @@ fn read_header(row: usize, names: &[String], columns: &[String]) -> Result<Vec<O
     if missing.is_empty() {
         return Ok(order);
     }
-    // Where one is missing, one that is not known may be a misprint of it.
+    // If a column is missing, an unknown one may be a misprint of it.
     let near = |name: &&String| nearest(name, missing.iter().copied()).is_some();
     let foreign = || names.iter().zip(&order).filter(|(_, column)| column.is_none()).map(|(name, _)| name);
     let nothing_known = order.iter().all(Option::is_none);

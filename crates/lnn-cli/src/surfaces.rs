@@ -23,7 +23,7 @@ impl<S: Scalar> Line<'_, S> {
     /// Prints the points where the determinant changes its sign, as one object or as a table.
     ///
     /// # Errors
-    /// A usage error for a coordinate that is not there or is named twice, a data error for a bad model.
+    /// A usage error for a coordinate that does not exist or is named twice, a data error for a bad model.
     pub fn print(&self, source: &Source<S>, table: bool) -> Result<(), CliError> {
         let names = &source.columns[..source.columns.len() / 2];
         let block = self.block.iter().enumerate().map(|(k, name)| {

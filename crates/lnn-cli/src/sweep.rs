@@ -1,4 +1,4 @@
-//! `lnn sweep`: trainings over the values of some keys of a configuration, whole or in shares; finished runs are not run again.
+//! `lnn sweep`: trainings over the values of some keys of a configuration, all runs or a share of them; finished runs are not repeated.
 
 use crate::error::argument_error;
 use crate::number::{thread_count, whole};
@@ -52,10 +52,10 @@ pub struct Args {
     json: bool,
 }
 
-/// Trains every combination, or a share of them, lists them, or makes tables of what is finished.
+/// Trains every combination, or a share of them, lists them, or makes tables of the finished ones.
 ///
 /// # Errors
-/// A usage error for a configuration or a key that is wrong, a data error for files, an interruption; runs that are finished stay finished.
+/// A usage error for a configuration or a key that is wrong, a data error for files, an interruption; finished runs are kept.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let work = vec![args.work()?];
     if args.list {

@@ -1,4 +1,4 @@
-//! `lnn symmetries`: what a Lagrangian conserves.
+//! `lnn symmetries`: symmetries and conserved quantities of a Lagrangian.
 
 use crate::format::TableOrJson;
 use crate::probe::{Bound, Probe, bound, tolerance};
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (basis, _) = probe.basis(args.basis)?;
     let n = probe.model.coordinates();
     let own = unknowns(n, basis.len());
-    // Of quadratic quantities cyclic coordinates leave fewer functions than this.
+    // For quadratic quantities, cyclic coordinates leave fewer functions than this.
     let second = |most: usize| if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(most)) } else { own };
     let points = probe.points(args.points, probe.enough(second(MOST)), second(MOST_UNKNOWNS))?;
     announce(own, points, args.quadratic);
@@ -75,12 +75,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     output::print(&output::shown(&found, json, SymmetrySummary::findings)?)
 }
 
-/// Unknown coefficients of quadratic quantities for which states are drawn, at most.
+/// Largest number of unknown coefficients of quadratic quantities for which states are drawn.
 const MOST: usize = 1300;
 /// Unknown coefficients squared times states from which a search takes some seconds.
 const LONG: f64 = 3e9;
 
-/// Says so before a long search, which is silent.
+/// Announces a long search, which is otherwise silent.
 fn announce(unknowns: usize, points: usize, quadratic: bool) {
     if (unknowns as f64).powi(2) * points as f64 > LONG {
         let more = if quadratic { ", and more for quadratic quantities" } else { "" };

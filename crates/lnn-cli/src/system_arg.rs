@@ -1,4 +1,4 @@
-//! The system that a command is about: one of the catalogue by its name, or another one by its file.
+//! The system of a command: one of the catalogue by its name, or another one by its file.
 
 use crate::{CliError, config, output};
 use lnn::lagrangian::system::System;
@@ -43,7 +43,7 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
     })
 }
 
-/// What is made of the text of a robot's file.
+/// The result of `make` on the text of a robot's file.
 ///
 /// # Errors
 /// A usage error with file and line, a data error for a file that cannot be read.
@@ -52,7 +52,7 @@ pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, S
     make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
 }
 
-/// The system that a model learned, if it is known: of one that was only recorded there is nothing to know.
+/// The system that a model learned, if it is known; a recorded system is not.
 ///
 /// # Errors
 /// A description that has no system, or a name that the catalogue does not have.
@@ -63,7 +63,7 @@ pub fn learned_system(header: &Header) -> Result<Cow<'static, System>, String> {
     }
 }
 
-/// Says of a system with impacts that nothing learns them.
+/// Notes for a system with impacts that a model does not learn them.
 pub fn note_impacts(system: &SystemInstance<f64>) {
     let events = system.events();
     let impacts = events.iter().filter(|given| given.event.is_impact()).map(|given| format!("`{}`", given.event.name));

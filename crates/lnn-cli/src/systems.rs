@@ -1,4 +1,4 @@
-//! `lnn systems`: what can be learned.
+//! `lnn systems`: the systems that can be learned.
 
 use crate::{CliError, output, system_arg};
 use lnn::lagrangian::system::{Bounds, Coordinate, Parameter, Size, System};

@@ -12,7 +12,7 @@ use lnn::names::percent;
 use lnn::pipeline::{Begin, Command, train};
 use lnn::training::LATEST;
 
-/// Trains and writes everything into the output directory; continues with a training that was stopped, if asked to.
+/// Trains and writes everything into the output directory; continues a stopped training on request.
 ///
 /// # Errors
 /// A usage error for arguments and configuration, a data error for files and a training that fails, an interruption;
@@ -59,8 +59,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 /// States that are examined for a remark on the penalty.
 const LOOKED_AT: usize = 512;
 
-/// Share of the training states at which the exact metric is what a penalty forbids; `None` without such a penalty, or where it is not
-/// known.
+/// Share of the training states at which the exact metric violates a penalty; `None` without such a penalty, or if it is unknown.
 fn forbidden_share(config: &Config, system: &SystemInstance<f64>) -> Option<f64> {
     let Penalty::Sylvester { time: Some(time), .. } = config.penalty().ok()? else { return None };
     let mut few = config.clone();

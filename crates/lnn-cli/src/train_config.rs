@@ -48,11 +48,11 @@ enum PresetName {
 }
 
 impl Args {
-    /// The configuration: the preset's or the model's, the file's and the options' over it, every value in range. Beside a
-    /// `saved` one of a checkpoint this is the base where the arguments name no other.
+    /// The configuration: the preset's or the model's, the file's and the options' over it, every value in range. A `saved` configuration
+    /// of a checkpoint is the base unless the arguments name another one.
     ///
     /// # Errors
-    /// Usage errors naming everything that is wrong, or a data error for a file that cannot be read.
+    /// Usage errors naming all mistakes, or a data error for a file that cannot be read.
     pub fn resolve(&self, saved: Option<&Config>) -> Result<(Config, SystemInstance<f64>), CliError> {
         let mut options = self.flags.entries.clone();
         for (symbol, text) in &self.param {
@@ -70,8 +70,7 @@ impl Args {
             Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
             None => resolve(&name).map_err(Unusable::System),
         };
-        // A system of the catalogue that is formulas itself, such as one under constraints, keeps them with what was learned, and links
-        // are written out.
+        // A catalogue system that consists of formulas, such as one under constraints, stores them with the model, and links are expanded.
         let description = system.as_ref().ok().and_then(|system| system.description().cloned()).or(description);
         let mut parameters = match (&start, goes_on) {
             (_, Some(saved)) => saved.parameters.clone(),
@@ -80,7 +79,7 @@ impl Args {
         };
         parameters.extend(layers.numbers("parameters"));
         let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
-        // For an unknown system, the other keys are checked with a known one.
+        // If the system is unknown, the other keys are checked with a known one.
         let usable = match system {
             Ok(system) => system,
             Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
@@ -150,7 +149,7 @@ impl Args {
         self.run.config.iter().map(PathBuf::as_path).chain(system).collect()
     }
 
-    /// The system that the arguments name; whether there is one of this name is found out later.
+    /// The system in the arguments; whether it exists is checked later.
     fn requested(&self) -> Result<Option<Named>, CliError> {
         let Some(argument) = self.system.as_deref() else { return Ok(None) };
         if !system_arg::is_file(argument) {
@@ -164,7 +163,7 @@ impl Args {
     /// The configuration's system; every value is in range.
     ///
     /// # Errors
-    /// Usage errors naming everything that is wrong.
+    /// Usage errors naming all mistakes.
     pub fn check(&self, config: &Config) -> Result<SystemInstance<f64>, CliError> {
         let system = config.system().map_err(CliError::usage)?;
         CliError::all_usage(config.sampling_faults(&system).into_iter().map(|fault| fault.to_string()))?;
@@ -195,7 +194,7 @@ impl Args {
         let place = || self.run.config.as_deref().map_or("the configuration".to_string(), crate::input::name);
         let requested = self.requested()?;
         let in_file = layers.text("system");
-        // A description that is wrong is one of the mistakes of the file.
+        // A wrong description is reported with the other mistakes of the file.
         let written = layers.get("description").and_then(|value| Description::deserialize(value.clone()).ok());
         let name = match (&requested, in_file) {
             (Some(requested), Some(found)) if requested.name != found => {

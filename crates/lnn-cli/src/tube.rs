@@ -1,4 +1,4 @@
-//! `--tube` of `lnn rollout`: a tube around the motion that holds a share of whole motions.
+//! `--tube` of `lnn rollout`: a tube around the motion that contains a share of whole motions.
 
 use crate::config::parse;
 use crate::learned::model_file;
@@ -144,7 +144,7 @@ impl MotionTube {
         self.coordinates.iter().flat_map(|name| ["low", "high"].map(|end| format!("{name}_{end}")))
     }
 
-    /// A line of names with those of the tube at its end.
+    /// A line of names with the names of the tube at its end.
     pub fn header(&self, line: &str) -> String {
         let names: Vec<String> = self.names().map(|name| quoted(&name)).collect();
         format!("{},{}\n", line.trim_end(), names.join(","))

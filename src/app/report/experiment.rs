@@ -99,8 +99,8 @@ fn view(row: &Row) -> Vec<String> {
     ]
 }
 
-/// Rows for people, with their header: the mean over the runs with the lowest and the highest, fractions in per cent, three digits. Columns
-/// without a number are left out, both ours and the paper's.
+/// Rows for people, with their header: the mean over the runs with the lowest and the highest, fractions in per cent, three digits. A column
+/// is shown if it has a number, ours also if the paper's next to it has one.
 pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
     let all: Vec<Vec<String>> = rows.iter().map(view).collect();
     let known = |k: usize| all.iter().any(|row| row[k] != NONE);

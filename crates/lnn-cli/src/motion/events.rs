@@ -29,7 +29,7 @@ pub fn check(file: Option<&Path>, charges: bool, events: &[Event<f64>]) -> Resul
     Ok(())
 }
 
-/// Times, states and, of impacts, energies; velocities of impacts are those after them. Nothing for a system without events.
+/// Times, states and, for impacts, energies; velocities of impacts are those afterwards. None for a system without events.
 pub fn table(source: &MotionSource, events: &[Occurrence<f64>]) -> Option<DataTable> {
     if source.events.is_empty() {
         return None;

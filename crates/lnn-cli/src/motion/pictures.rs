@@ -20,15 +20,15 @@ pub struct Texts<'a> {
     pub title: &'a str,
     /// Label of the parameter of the motion.
     pub parameter: &'a str,
-    /// Name of the energy, or of what stands for it.
+    /// Name of the energy, or of the quantity in its place.
     pub energy: &'a str,
     /// Units of coordinates and velocities.
     pub units: &'a [String],
 }
 
 impl Watch {
-    /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, by the end of the
-    /// file's name; with the ends of a tube around the coordinates, and with the path in the plane of polar coordinates.
+    /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, depending on the extension of
+    /// the file; with the limits of a tube around the coordinates, and with the path in the plane of polar coordinates.
     ///
     /// # Errors
     /// A data error for a motion that has no finite sample, or a file that cannot be written.
@@ -76,7 +76,7 @@ impl Watch {
         trace_plot(&trace).ok()
     }
 
-    /// Lower and upper ends of a tube around every coordinate, at the times that are kept.
+    /// Lower and upper limits of a tube around every coordinate, at the stored times.
     fn ends(&self, tube: &MotionTube) -> Vec<Vec<f64>> {
         let n = self.columns.len() / 2;
         let mut ends = vec![Vec::with_capacity(self.times.len()); 2 * n];
@@ -87,7 +87,7 @@ impl Watch {
         ends
     }
 
-    /// Quantities over time, those of one unit in a panel; a panel that shows nothing but zeros is left out beside others.
+    /// Quantities over time, one panel for each unit; a panel of zeros is left out if there are others.
     fn picture(
         &self,
         (names, units): (&[String], &[String]),

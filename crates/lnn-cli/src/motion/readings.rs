@@ -14,11 +14,11 @@ pub struct ReadingColumns<'a> {
 }
 
 impl<'a> ReadingColumns<'a> {
-    /// Those of a system; none of a model, or of a system without such quantities. Forces from outside are not in accelerations, which are thus
-    /// refused beside them.
+    /// Readings of a system; none for a model, or for a system without measured quantities. Accelerations do not include external forces,
+    /// so quantities with accelerations are then rejected.
     ///
     /// # Errors
-    /// A usage error for a formula with accelerations of a motion that is `driven` from outside.
+    /// A usage error for a formula with accelerations if the motion is `driven` from outside.
     pub fn of(source: &'a MotionSource, driven: bool) -> Result<Option<Self>, CliError> {
         let Some(instance) = &source.instance else { return Ok(None) };
         let own = |reading: &&FormulaReading| !source.columns.contains(&reading.name);
@@ -30,7 +30,7 @@ impl<'a> ReadingColumns<'a> {
         Ok((!readings.is_empty()).then_some(Self { source, instance, readings }))
     }
 
-    /// A line of names with those of the quantities at its end.
+    /// A line of names with the names of the quantities at its end.
     pub fn header(&self, line: &str) -> String {
         let names: Vec<String> = self.readings.iter().map(|reading| quoted(&reading.name)).collect();
         format!("{},{}\n", line.trim_end(), names.join(","))
