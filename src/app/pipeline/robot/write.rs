@@ -75,7 +75,7 @@ pub fn rewrite_robot(text: &str, values: &[(&str, f64)]) -> Result<String, Fault
     Ok(written)
 }
 
-/// The bodies of the parts of a link, each in its own frame; `None` for a part without a body.
+/// The bodies of the parts of a link, each in its own frame; `None` for the first if no body is possible.
 fn shares(link: &Link, whole: &Body) -> Vec<Option<Body>> {
     let seen: Vec<Body> = link.parts.iter().map(|part| part.body.seen(&part.place)).collect();
     let rest = seen[1..].iter().fold(*whole, |rest, part| rest.plus(part, -1.0));
