@@ -265,9 +265,19 @@ const TRIED: usize = 40;
 const ALIKE: f64 = 0.7;
 /// Most halvings of a change until it is small.
 const HALVINGS: i32 = 20;
+/// Smallest relative decrease of the sum of squares that makes a fit farther from the given constants the better one. Fits within it are the
+/// same law written in two ways, such as a drive of the other sign half a turn away, and differ by how far they have converged.
+const BETTER: f64 = 1e-3;
 /// Shortest part of a recording that is searched first, and values that are tried on either side after it doubled.
 const SHORTEST: f64 = 1.0 / 16.0;
 const DOUBLED: usize = 3;
+
+impl Normal {
+    /// `true` if the sum of squares is smaller than that of a fit nearer to the given constants by more than two ways to write a law differ.
+    fn is_better(&self, nearer: &Self) -> bool {
+        self.square < (1.0 - BETTER) * nearer.square
+    }
+}
 
 impl States {
     /// As [`States::fit`] to accelerations, of forces that may have a phase: the sum of squares has many minima over a frequency, as many as
@@ -298,7 +308,7 @@ impl States {
                 let found = part.as_ref().unwrap_or(self).nearest(problem, (&from, k), step, count);
                 let Some((tried, found)) = found else { break };
                 if share == 1.0 {
-                    if found.square < best.square {
+                    if found.is_better(&best) {
                         (*x, best) = (tried, found);
                     }
                     break;
@@ -310,7 +320,7 @@ impl States {
         Some(cut)
     }
 
-    /// The best of the fits that begin at a value of constant `k` and at `count` others on either side of it.
+    /// The best of the fits that begin at a value of constant `k` and at `count` others on either side of it; of equal ones the nearest.
     fn nearest(
         &self,
         problem: &Problem<'_>,
@@ -323,7 +333,7 @@ impl States {
             let mut tried = from.to_vec();
             tried[k] += place * step;
             let Some(found) = self.fit(problem, &mut tried, Met::Accelerations) else { continue };
-            if best.as_ref().is_none_or(|(_, best)| found.square < best.square) {
+            if best.as_ref().is_none_or(|(_, best)| found.is_better(best)) {
                 best = Some((tried, found));
             }
         }
