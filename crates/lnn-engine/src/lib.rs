@@ -15,7 +15,7 @@
 //! | [`cancellation`], [`findings`] | the end of a long search; what a result says, in sentences and tables |
 //!
 //! Shapes, units and numbers are those of `lnn`: batches are row-major `(batch, n)`, units SI, results do not depend on the number of
-//! threads. What is hidden from these pages is shared by the packages of the repository and may change in every version.
+//! threads. Items hidden from these pages are shared by the packages of the repository and may change in every version.
 //!
 //! ```
 //! use lnn_engine::lagrangian::{EulerLagrange, build};
@@ -25,7 +25,7 @@
 //! assert!((acceleration[0] + 9.81 * 0.5_f64.sin()).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-// What only some features use is dead without them; all features together tell what is dead for everybody.
+// Code for some features is dead without them; the build with all features finds code that is always dead.
 #![cfg_attr(not(all(feature = "faer", feature = "model-files", feature = "rollout")), allow(dead_code, unused_imports))]
 #![cfg_attr(not(feature = "std"), no_std)]
 #![cfg_attr(docsrs, feature(doc_cfg))]

@@ -16,8 +16,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 /// Number of products of an elimination that is always worth recording: it takes less time than a call of a solver.
 pub(super) const SMALL: usize = 60;
 
-/// Largest number of coordinates of a Lagrangian whose linearization is recorded as one program. Three turns of `cargo bench --bench hessians
-/// -- linearization` beside programs of the parts: 0.4 to 0.5 times the time at two coordinates, 0.4 to 1.4 at four.
+/// Largest number of coordinates of a Lagrangian whose linearization is recorded as one program. Compared with programs of the parts, in
+/// three runs of `cargo bench --bench hessians -- linearization`: 0.4 to 0.5 times the time at two coordinates, 0.4 to 1.4 at four.
 const WHOLE: usize = 4;
 
 /// Records the equations of motion of a model, at a state and with parameters that are being recorded.
@@ -25,8 +25,8 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
     /// The equations; `None` if they are too large.
     fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>>;
 
-    /// The derivatives of their right sides less their left sides by the state, with the accelerations and the multipliers held: `x` holds `q`,
-    /// `v`, `a`, `lambda`. `None` if they are too large, or not known.
+    /// Derivatives by the state of their right sides minus their left sides, with the accelerations and the multipliers held; `x` holds
+    /// `q`, `v`, `a`, `lambda`. `None` if they are too large, or not known.
     fn record_slopes<'t>(
         &self,
         _x: &[Tracer<'t, S>],
@@ -43,15 +43,15 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
 
 /// A program of accelerations, in which the elimination with the pattern of the mass matrix is recorded too.
 ///
-/// Of a positive definite matrix no pivot has to be searched for, nor of one that constraints border. Whether it is one is seen at each
-/// state: by the pivots, which follow the accelerations among the outputs.
+/// A positive definite matrix needs no search for pivots, even when constraints border it. Each state shows whether it is positive
+/// definite: by the pivots, which follow the accelerations among the outputs.
 #[derive(Clone, Debug)]
 pub struct Solved<'a, S> {
     /// The motion that was recorded, for a model that adds to these equations.
     motion: Arc<dyn RecordMotion<S>>,
     program: Arc<Program<S>>,
     parameters: Vec<S>,
-    /// Number of pairs of a pivot and the element of the diagonal that it was.
+    /// Number of pairs of a pivot and its original diagonal element.
     pivots: usize,
     /// The program of the linearization, recorded on first use.
     linearized: Arc<OnceLock<Option<Linearized<S>>>>,
@@ -60,12 +60,12 @@ pub struct Solved<'a, S> {
 }
 
 impl<'a, S: Scalar> Solved<'a, S> {
-    /// The same until a flag is raised.
+    /// These accelerations until a flag is raised.
     pub(super) fn until(self, flag: &'a AtomicBool) -> Self {
         Self { flag: Some(flag), ..self }
     }
 
-    /// The same until the flag of another one is raised.
+    /// These accelerations until the flag of another one is raised.
     pub(super) fn with_flag_of(self, other: Self) -> Self {
         Self { flag: other.flag, ..self }
     }
@@ -80,7 +80,7 @@ impl<'a, S: Scalar> Solved<'a, S> {
         self.flag.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// The program of the linearization; `None` if its parts are the faster way, or the only one.
+    /// The program of the linearization; `None` if its parts are faster, or are the only way.
     pub(super) fn linearized(&self) -> Option<Linearized<S>> {
         let n = self.program.inputs() / 2;
         self.linearized.get_or_init(|| Linearized::record(self.motion.as_ref(), n, &self.parameters)).clone()
@@ -88,7 +88,7 @@ impl<'a, S: Scalar> Solved<'a, S> {
 }
 
 impl<S: Scalar> Solved<'static, S> {
-    /// Records the accelerations of so many coordinates by an elimination of at most so many products; `None` if it takes more.
+    /// Records the accelerations of `n` coordinates by an elimination of at most `most` products; `None` if it needs more.
     pub(super) fn record(motion: Arc<dyn RecordMotion<S>>, n: usize, parameters: &[S], most: usize) -> Option<Self> {
         let mut pivots = 0;
         let program = Program::record_within(ROWS, (2 * n, parameters.len()), |x, p| {
@@ -107,14 +107,14 @@ impl<S: Scalar> Solved<'static, S> {
         Some(Self { motion, program, parameters, pivots, linearized: Arc::new(OnceLock::new()), flag: None })
     }
 
-    /// Records the accelerations of a Lagrangian by the program of its value; `None` if a dense solver is the faster one.
+    /// Records the accelerations of a Lagrangian from the program of its value; `None` if a dense solver is faster.
     pub(super) fn of_value(value: &Program<S>, parameters: &[S]) -> Option<Self> {
         let (n, most) = (value.inputs() / 2, SMALL.max(value.lane_operations()));
         Self::record(Arc::new(Value(value.clone())), n, parameters, most)
     }
 }
 
-/// The equations of a Lagrangian by the program of its value.
+/// The equations of a Lagrangian from the program of its value.
 #[derive(Debug)]
 struct Value<S>(Program<S>);
 
@@ -138,7 +138,7 @@ impl<S: Scalar> RecordMotion<S> for Value<S> {
     }
 }
 
-/// `true` if every pivot of an elimination is positive, and not much below the element of the diagonal that it was.
+/// `true` if every pivot of an elimination is positive, and not much smaller than its original diagonal element.
 pub(super) fn are_safe<S: Scalar>(guards: &[S]) -> bool {
     let (floor, zero) = (S::of_f64(SMALL_PIVOT), <S as Real>::zero());
     let mut safe = true;
@@ -148,10 +148,10 @@ pub(super) fn are_safe<S: Scalar>(guards: &[S]) -> bool {
     safe
 }
 
-/// The accelerations of a model, state after state or in batches, with buffers of its own: what a solver calls.
+/// The accelerations of a model, state after state or in batches, with its own buffers, for use in a solver.
 ///
-/// Nothing but the accelerations is stored, and nothing is allocated after the first call. A mass matrix of which most elements are zero is
-/// eliminated along its pattern, one that is diagonal is divided by, and what is constant of it is known before.
+/// Nothing but the accelerations is stored, and nothing is allocated after the first call. A sparse mass matrix is eliminated along its
+/// pattern, a diagonal one is divided by, and its constant parts are computed in advance.
 ///
 /// ```
 /// use lnn::lagrangian::{Accelerations, Lagrangian, Mechanics, MechanicsError};
@@ -196,7 +196,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
     /// The accelerations `a` of states `q`, `v`, all `(batch, n)` in physical units.
     ///
     /// # Errors
-    /// As of [`EulerLagrange::terms`]; another length of `a`.
+    /// Those of [`EulerLagrange::terms`]; a wrong length of `a`.
     pub fn at(&mut self, q: &[S], v: &[S], a: &mut [S]) -> Result<(), MechanicsError> {
         if a.len() != q.len() {
             return Err(MechanicsError::Shape { what: "accelerations", expected: q.len(), found: a.len() });
@@ -207,7 +207,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         if self.is_solved(q, v, a) {
             return Ok(());
         }
-        // With a search for pivots, and a reason for every row that fails.
+        // Searches for pivots, and finds a reason for every row that fails.
         let outcome = self.model.terms(q, v, Request::ACCELERATION, &mut self.terms);
         let found = self.terms.acceleration.len();
         if found == a.len() {
@@ -218,7 +218,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         outcome
     }
 
-    /// Fills the accelerations by the program; `false` if there is none, or a state needs a second look.
+    /// Fills the accelerations by the program; `false` if there is none, or a state needs closer examination.
     pub(super) fn is_solved(&mut self, q: &[S], v: &[S], a: &mut [S]) -> bool {
         let Some((solved, replay)) = &mut self.solved else { return false };
         let n = self.model.coordinates();

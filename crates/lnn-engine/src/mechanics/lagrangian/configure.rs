@@ -138,7 +138,7 @@ pub fn systems() -> &'static [System] {
     SYSTEMS
 }
 
-/// The system of a name.
+/// The system with a name.
 ///
 /// # Errors
 /// [`SystemError::UnknownSystem`] with the nearest name.
@@ -170,10 +170,10 @@ impl<S: Scalar> SystemInstance<S> {
         let count = self.inputs().count();
         self.build_with(Box::new((count, |_: S, values: &mut [S]| values.fill(<S as Real>::zero()))))
     }
-    /// The same with values for its inputs, which are otherwise 0.
+    /// As [`build`](Self::build), with values for the inputs, which are otherwise 0.
     ///
     /// # Errors
-    /// As of [`build`](Self::build).
+    /// Those of [`build`](Self::build).
     pub fn build_with(&self, inputs: Box<dyn Inputs<S>>) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let mut model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
         if let Some(forces) = self.forces() {
@@ -211,7 +211,7 @@ impl<S: Scalar> SystemInstance<S> {
         let events = self.system.described.as_ref().map_or(&[][..], |described| &described.events);
         events.iter().map(|event| GivenEvent::new(event.clone(), self.parameters.clone())).collect()
     }
-    /// A model of its Lagrangian with its friction; by recursion too, where these are those of a chain of links.
+    /// Adds the friction to a model of its Lagrangian; uses recursion if both are those of a chain of links.
     pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {
         let model = match self.friction() {
             None => free,
@@ -225,7 +225,7 @@ impl<S: Scalar> SystemInstance<S> {
             None => model,
         }
     }
-    /// A model of the same coordinates, learned for instance, under the constraints of the system; without any, as it is.
+    /// A model of the same coordinates, such as a learned one, under the constraints of the system; unchanged if there are none.
     ///
     /// # Errors
     /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion, or a model of other coordinates.
@@ -252,7 +252,7 @@ impl<S: Scalar> SystemInstance<S> {
     pub fn constraints(&self) -> Option<&ExpressionConstraints> {
         self.system.described.as_ref()?.constraints.as_ref()
     }
-    /// Numbers of the constraints that act; those that follow from others are left out.
+    /// Indices of the active constraints; redundant ones are left out.
     ///
     /// # Errors
     /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion.
@@ -268,7 +268,7 @@ impl<S: Scalar> SystemInstance<S> {
     pub fn dissipation(&self) -> Option<&ExpressionLagrangian> {
         self.system.described.as_ref()?.dissipation.as_ref()
     }
-    /// The same with the values of the parameters, and whether these take all friction away.
+    /// Friction with the values of the parameters, and whether these make it vanish.
     fn friction(&self) -> Option<(Friction<S>, bool)> {
         let (function, mut vanishes) = (self.dissipation()?, false);
         let n = function.coordinates();
@@ -292,19 +292,19 @@ impl<S: Scalar> SystemInstance<S> {
         };
         (draw(&bounds.positions), draw(&bounds.velocities))
     }
-    /// Shows the Lagrangian to a visitor, with the time as its last coordinate if the system depends on it; `None` if the description is not of the catalogue, and of a system with constraints, whose
-    /// Lagrangian alone does not tell its motion.
+    /// Shows the Lagrangian to a visitor, with the time as its last coordinate if the system depends on it; `None` if the description is
+    /// not in the catalogue, and for a system with constraints, whose Lagrangian alone does not determine its motion.
     #[doc(hidden)]
     pub fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         if self.constraints().is_some() { None } else { self.visit_unconstrained(visitor) }
     }
-    /// The same of a system under constraints as well.
+    /// As [`visit`](Self::visit), including systems with constraints.
     #[doc(hidden)]
     pub fn visit_unconstrained<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         visit_lagrangian(self, visitor)
     }
-    /// Acceleration of one state by the closed form, which shares nothing with the Lagrangian but the parameters; of a system by its
-    /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.
+    /// Acceleration of one state by the closed form, which shares only the parameters with the Lagrangian. A system from a description has
+    /// no closed form, and its Lagrangian is differentiated. `NaN` where the mass matrix is singular.
     ///
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
@@ -359,7 +359,7 @@ impl<S: Scalar> SystemInstance<S> {
             None => Ok(()),
         }
     }
-    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text says what is demanded.
+    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text states the violated condition.
     ///
     /// # Errors
     /// The condition that the coordinates violate.
@@ -455,7 +455,7 @@ pub fn configure_system<S: Scalar>(
     )
 }
 
-/// As [`configure_system`], of values that are numbers already.
+/// As [`configure_system`], with numbers as values.
 ///
 /// # Errors
 /// [`SystemError`] for an unknown symbol or a value out of range.
@@ -494,7 +494,7 @@ fn require_symbol(system: &System, symbol: &str) -> Result<(), SystemError> {
     Err(SystemError::UnknownParameter { system, symbol: symbol.to_string(), known })
 }
 
-/// A system of the size and the values that are found by symbol, each with its text; those not found take their defaults.
+/// A system of this size with values from `find` by symbol, each with its text; missing values take their defaults.
 fn assemble<S: Scalar>(
     system: Cow<'static, System>,
     size: impl Fn(&str) -> Option<(Option<usize>, String)>,

@@ -9,7 +9,7 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// Bobs of the longest chain that is listed, and of the longest one there is.
+/// Number of bobs of the longest chain that is listed, and of the longest that is supported.
 const LISTED_BOBS: usize = 20;
 const MOST_BOBS: usize = 500;
 /// Name of a chain, before the number of its bobs.
@@ -76,7 +76,7 @@ pub fn constrained_systems() -> Vec<System> {
     constrained_descriptions().filter_map(|description| description.compile().ok()).collect()
 }
 
-/// A coordinate with its bounds and those of its velocity.
+/// A coordinate with its bounds and its velocity bounds.
 type Bounded<'a> = (&'a str, (f64, f64), (f64, f64));
 
 /// The parts of a system; the unit of each coordinate follows from its name: angles are Greek.
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn constraints_of_the_catalogue_are_independent() {
         for description in constrained_descriptions() {
-            // As a description of a file they are examined.
+            // Checked like the description in a file.
             let system = description.system().unwrap();
             let model = configure_system::<f64>(Cow::Owned(system), &[]).unwrap().build().unwrap();
             let manifold = model.manifold().unwrap();

@@ -1,5 +1,5 @@
-//! `L`, `p`, `g`, `M`, `c` of one state by forward numbers over any base, floats or tracers that record a program; the mass
-//! matrix with its first and second derivatives by the coordinates, of which curvature is made.
+//! `L`, `p`, `g`, `M`, `c` of one state by forward numbers over any base, floats or tracers that record a program; the mass matrix with its
+//! first and second derivatives by the coordinates, from which curvature is computed.
 
 use super::error::MechanicsError;
 use super::taylor::{Space, Taylor};
@@ -9,7 +9,7 @@ use crate::scalar::{Real, Scalar};
 use crate::tape::Depth;
 use alloc::vec::Vec;
 
-/// Where the numbers of one state go; slices that are not needed may be empty.
+/// Outputs of one state; slices that are not needed may be empty.
 pub(super) struct StateTerms<'a, R> {
     pub lagrangian: &'a mut [R],
     pub momentum: &'a mut [R],
@@ -193,8 +193,8 @@ fn directions<L: Lagrangian, R: Real>(
 
 /// Metric `g_ij = d2L/dv_i dv_j` at a point, with its partial derivatives by the coordinates, exact to rounding.
 ///
-/// The metric is the mass matrix as it is: of `L = m g_ij v_i v_j / 2` it is `m g_ij`. Of a Lagrangian that is not quadratic in
-/// the velocities it is the one at the velocity given, which the derivatives keep.
+/// The metric is the mass matrix itself: for `L = m g_ij v_i v_j / 2` it is `m g_ij`. If a Lagrangian is not quadratic in the velocities,
+/// the metric is taken at the given velocity, which the derivatives hold fixed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetricJet<S> {
     /// `g_ij`, `(n, n)`, symmetric.
@@ -221,7 +221,7 @@ impl<S: Scalar> MetricJet<S> {
 /// Velocities that vary together at most: beyond, they are taken in blocks of half as many, two at a time.
 const VELOCITIES: usize = 8;
 
-/// The metric jets of states `(batch, n)` of a Lagrangian that is written over any number.
+/// The metric jets at states `(batch, n)` of a Lagrangian that is generic over numbers.
 pub fn metric_jets<S: Scalar>(
     n: usize,
     (q, v): (&[S], &[S]),
@@ -258,7 +258,7 @@ pub fn metric_jets<S: Scalar>(
     Ok(q.chunks_exact(n).zip(v.chunks_exact(n)).map(jet).collect())
 }
 
-/// Groups of velocities in which every pair stands together.
+/// Groups of velocities such that every pair occurs in one of them.
 fn groups(n: usize) -> Vec<Vec<usize>> {
     if n <= VELOCITIES {
         return vec![(0..n).collect()];

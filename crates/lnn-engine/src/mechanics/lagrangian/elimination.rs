@@ -4,7 +4,7 @@ use crate::scalar::Real;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-/// Rows of a matrix: the columns of what is not zero, rising.
+/// Rows of a matrix: the nonzero elements by increasing column.
 pub(super) type Lists<R> = Vec<Vec<(usize, R)>>;
 
 /// A linear system of equations of motion, `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, without constraints `M a = f`.
@@ -20,7 +20,7 @@ pub(super) struct Balance<R> {
 /// A symmetric matrix after its elimination along its pattern.
 pub(super) struct Eliminated<R> {
     coordinates: usize,
-    /// Rows in the order of their elimination, with the factors by which they were subtracted from which others.
+    /// Rows in the order of their elimination, each with the rows from which it was subtracted, and the factors.
     steps: Vec<(usize, Vec<(usize, R)>)>,
     /// By row.
     pivots: Vec<R>,
@@ -28,18 +28,18 @@ pub(super) struct Eliminated<R> {
     diagonal: Vec<R>,
 }
 
-/// Solves in at most so many products: the solution, and every pivot behind what it was before it was reduced.
+/// Solves in at most `most` products: the solution, and every pivot after its original diagonal element.
 pub(super) fn eliminate<R: Real>(balance: Balance<R>, most: usize) -> Option<(Vec<R>, Vec<[R; 2]>)> {
     let eliminated = Eliminated::of(balance.coordinates, balance.lower, most)?;
     Some((eliminated.solve(balance.right), eliminated.guards()))
 }
 
 impl<R: Real> Eliminated<R> {
-    /// Eliminates the matrix with this lower triangle in at most so many products.
+    /// Eliminates the matrix with this lower triangle in at most `most` products.
     ///
-    /// The coordinates come first, and of them as of the constraints the one that fills in the least. Of a positive definite `M` and
-    /// independent rows `A` the pivots of the former are positive, those of the latter, of `-A M^-1 A^T`, negative; the elements of this
-    /// matrix are what they were.
+    /// The coordinates come first; among them, and among the constraints, the one with the least fill-in. For a positive definite `M` and
+    /// independent rows `A`, the pivots of the coordinates are positive and those of the constraints, of `-A M^-1 A^T`, are negative; the
+    /// original elements are those of this matrix.
     pub fn of(coordinates: usize, lower: Lists<R>, most: usize) -> Option<Self> {
         let count = lower.len();
         let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
@@ -96,7 +96,7 @@ impl<R: Real> Eliminated<R> {
         solution
     }
 
-    /// The inverse, from the row that was eliminated last: each follows from those behind it, and symmetry gives half of them.
+    /// The inverse, starting from the row eliminated last: each row follows from the later ones, and symmetry gives half of them.
     pub fn inverse(&self) -> Vec<Vec<R>> {
         let count = self.pivots.len();
         let mut inverse = vec![vec![R::zero(); count]; count];
@@ -113,7 +113,7 @@ impl<R: Real> Eliminated<R> {
         inverse
     }
 
-    /// Every pivot behind what it was before it was reduced; of constraints with their signs turned.
+    /// Every pivot after its original diagonal element; for constraints with reversed sign.
     pub fn guards(&self) -> Vec<[R; 2]> {
         let signed = |(k, pair): (usize, [R; 2])| if k < self.coordinates { pair } else { pair.map(|x| -x) };
         self.diagonal

@@ -1,7 +1,7 @@
-//! The equations of motion of a system as recorded programs: what they need to be solved, and their slopes by state and parameters.
+//! The equations of motion of a system as recorded programs: the terms needed to solve them, and their slopes by state and parameters.
 //!
-//! With the residual `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q` a change of anything that it depends on, `a` held fixed,
-//! changes the acceleration by `-M^-1 dr`.
+//! With the residual `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q` a change of any of its arguments at fixed `a` changes the
+//! acceleration by `-M^-1 dr`.
 
 use super::linearization::{ProgramSlopes, Rate, SlopePrograms, SparseRows, add};
 use super::programs::derivatives;
@@ -22,17 +22,17 @@ pub struct Equations {
     pub n: usize,
     /// How many known functions of the time they depend on, numbers of each state that both programs take last: the time itself, then inputs.
     pub known: usize,
-    /// Of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv + Q`, `(n)`.
+    /// As functions of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv + Q`, `(n)`.
     pub motion: Arc<Program<f64>>,
-    /// Of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
+    /// As functions of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
     pub slopes: Arc<Program<f64>>,
-    /// The constraints that act, if there are any; their forces are not in `h`.
+    /// The active constraints, if there are any; their forces are not in `h`.
     pub rows: Option<RowEquations>,
 }
 
 impl Equations {
-    /// Records the equations of a system, with slopes by the parameters of these indices, under the constraints that act; `None` of a system
-    /// that is not of the catalogue.
+    /// Records the equations of a system, with slopes by the parameters of these indices, under the active constraints; `None` for a system
+    /// that is not in the catalogue.
     ///
     /// # Errors
     /// [`TapeError`] for a Lagrangian that branches on its data.
@@ -129,8 +129,8 @@ impl Equations {
     }
 }
 
-/// Vectors of `n` coordinates, `q`, `v` and perhaps `a`, as vectors of these, of the time and of inputs, which come last in `x`: behind `q`
-/// stand their values, behind the others their derivatives, which are 0 but the rate of the time.
+/// Extends vectors of `n` coordinates, `q`, `v` and perhaps `a`, by the time and the inputs, which come last in `x`: after `q` by their
+/// values, after the others by their derivatives, which are 0 except for the rate of the time.
 fn with_known<'a>(x: &[Tracer<'a, f64>], (n, vectors): (usize, usize)) -> Vec<Tracer<'a, f64>> {
     let (moving, known) = x.split_at(n * vectors);
     let last = |order: usize| -> Vec<Tracer<'a, f64>> {
@@ -187,7 +187,7 @@ impl EquationPart {
         }
     }
 
-    /// Derivatives of the equations `f` by state and chosen parameters, what is not zero of each row; `x` holds `q`, `v`, `a`.
+    /// Nonzero derivatives of the equations `f` by state and chosen parameters, row by row; `x` holds `q`, `v`, `a`.
     fn slopes<R: Real>(&self, x: &[R], p: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         match self {
             Self::Lagrangian { rate, .. } | Self::Dissipation { rate, .. } => rate.slopes(x, p, chosen),
@@ -275,7 +275,7 @@ mod tests {
         a
     }
 
-    /// A program of `x` and parameters at one point, and what a change of one of its numbers does.
+    /// Values of a program of `x` and parameters at one point, and the effect of a change of one of its numbers.
     fn evaluated(program: &Arc<Program<f64>>, fields: &[&[f64]], p: &[f64], size: usize) -> Vec<f64> {
         let mut out = vec![0.0; size];
         Replay::new(Arc::clone(program)).evaluate(1, fields, p, &mut [&mut out]).unwrap();
@@ -300,7 +300,7 @@ mod tests {
             let found = evaluated(&equations.motion, &[&x[..2], &x[2..], &[t]], p, 6);
             (0..2).map(|i| found[2 * i] * a[0] + found[2 * i + 1] * a[1] - found[4 + i]).collect()
         };
-        // Beside equations without the time.
+        // The equations without the time agree.
         let free = configure_system::<f64>(Cow::Owned(damped().system().unwrap()), &[]).unwrap();
         let free = Equations::record(&free, &[4, 3, 0], &[]).unwrap().unwrap();
         let [own, other] = [
@@ -317,7 +317,7 @@ mod tests {
             assert!((own[4 + i] - other[4 + i] - q[i] - by_time[i]).abs() < 1e-12, "{i} {own:?} {other:?}");
         }
         assert!((own[0] - other[0] - 1.0 - t[0].powi(2) / 9.0).abs() < 1e-12 && own[1..4] == other[1..4]);
-        // The model says the same.
+        // The model gives the same result.
         let mut terms = crate::lagrangian::Terms::default();
         let model = instance.build().unwrap();
         model.terms_at(&t, &x[..2], &x[2..], Request::ACCELERATION, &mut terms).unwrap();
@@ -392,7 +392,7 @@ mod tests {
     fn slopes_of_accelerations_are_those_of_differences() {
         let description = damped();
         let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
-        // Parameters stand in the order of their names: c, e, g, k, m.
+        // Parameters are in the order of their names: c, e, g, k, m.
         let names = ["c", "e", "g", "k", "m"];
         let values = instance.parameters.clone();
         let equations = Equations::record(&instance, &[4, 0, 1], &[]).unwrap().unwrap();

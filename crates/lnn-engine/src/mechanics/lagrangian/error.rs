@@ -1,4 +1,4 @@
-//! Failures of the terms of a batch: what they are, how they are found, merged, and reported.
+//! Failures in the terms of a batch: their kinds, and how they are found, merged and reported.
 
 use super::{Request, Terms};
 use crate::linalg::{Failure, Workspace};
@@ -25,7 +25,7 @@ pub enum MechanicsError {
         /// Estimated 2-norm condition number (infinite if exactly singular).
         condition: f64,
     },
-    /// A constraint that depends on the others at a state, although it does not elsewhere: they leave open what carries the load.
+    /// A constraint that depends on the others at this state, although not elsewhere: the forces of constraint are not unique.
     Dependent {
         /// Row of the batch.
         row: usize,
@@ -36,9 +36,9 @@ pub enum MechanicsError {
     OffConstraints {
         /// Row of the batch.
         row: usize,
-        /// The constraint that is missed most, from 0.
+        /// Index of the most violated constraint.
         constraint: usize,
-        /// Distance to the nearest one that they allow.
+        /// Distance to the nearest state that they allow.
         distance: f64,
     },
     /// Fewer drives than degrees of freedom, or a drive that is given twice.
@@ -60,14 +60,14 @@ pub enum MechanicsError {
         /// Which term.
         what: &'static str,
     },
-    /// A state at which the mass matrix is not certified, of a model that is to move where it is.
+    /// A state at which the mass matrix of a model that requires a certificate is not certified.
     Uncertified {
         /// Row of the batch.
         row: usize,
     },
     /// A model that a flag has ended.
     Interrupted,
-    /// A system that depends on the time, which a state does not tell.
+    /// A system that depends on the time, which a state does not contain.
     Timed,
     /// Derivatives that a model does not have.
     Derivatives {
@@ -111,7 +111,7 @@ impl core::fmt::Display for MechanicsError {
 impl core::error::Error for MechanicsError {}
 
 impl MechanicsError {
-    /// Row of the state that failed; `None` of an error that is not about one state.
+    /// Row of the state that failed; `None` for an error that does not concern one state.
     pub fn row(&self) -> Option<usize> {
         match *self {
             Self::Singular { row, .. }
@@ -150,7 +150,7 @@ impl MechanicsError {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Adds failures to those that are there; one of a row is kept, and of `found` rather than of what is there.
+    /// Merges failures with the existing ones; for each row one is kept, preferably from `found`.
     pub fn prepend_failures(&mut self, mut found: Vec<MechanicsError>) {
         if found.is_empty() {
             return;
@@ -170,8 +170,8 @@ impl<S: Scalar> Terms<S> {
         self.failures.first().map_or(Ok(()), |&error| Err(error))
     }
 
-    /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used. After a success none stands there, even
-    /// of a model that leaves the list alone.
+    /// `true` if [`Terms::failures`] lists all failures, so that the other rows can be used. After a success the list is empty, even if the
+    /// model does not touch it.
     pub fn record_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
         if outcome.is_ok() {
             self.failures.clear();
@@ -243,7 +243,7 @@ fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
     }
 }
 
-/// From so many numbers on the widest vectors are worth a call.
+/// From this many numbers on, calls of the widest vectors pay.
 const WIDE: usize = 64;
 
 #[inline(always)]

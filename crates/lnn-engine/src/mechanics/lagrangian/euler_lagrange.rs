@@ -32,7 +32,7 @@ impl<S: Scalar> Terms<S> {
         self.clear_constraints();
     }
 
-    /// Empties the fields of constraints: of a model that has none.
+    /// Empties the fields of constraints, for a model without any.
     pub(super) fn clear_constraints(&mut self) {
         self.constraints = 0;
         let Self { constraint_matrix, constraint_drift, multipliers, constraint_force, .. } = self;
@@ -60,8 +60,8 @@ impl<S: Scalar> Terms<S> {
     /// Adds `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field; with constraints in the terms,
     /// accelerations, multipliers and forces of constraint.
     ///
-    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them, `Q` if there are forces
-    /// beside those of `L`. One coordinate is divided, not factored.
+    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them, and `Q` if there are forces that are
+    /// not in `L`. A single coordinate is divided, not factored.
     ///
     /// # Errors
     /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite, every such row in
@@ -198,7 +198,7 @@ impl<S: Scalar> Terms<S> {
 
 /// Generalized forces of known states and accelerations, `(batch, n)`, in the unit of `L` per unit of each coordinate.
 ///
-/// `generalized = friction + external + constraint`; they say
+/// `generalized = friction + external + constraint`, where
 ///
 /// ```text
 /// generalized = M a + c - g      everything that acts beside the forces of L, friction included
@@ -207,16 +207,16 @@ impl<S: Scalar> Terms<S> {
 /// constraint  = A^T lambda       what the constraints carry of it, nothing for a model without
 /// ```
 ///
-/// `P` takes out what lies along the rows `A` of constraints. A motion determines no more of a force from outside than its part within
-/// them, since any force along the rows is carried by the constraints: `external` is the shortest one.
+/// `P` removes the part along the rows `A` of constraints. A motion determines an external force only up to forces along the rows, which
+/// the constraints carry: `external` is the smallest one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InverseDynamics<S> {
-    /// All force beside that of `L`, friction included.
+    /// All forces that are not in `L`, including friction.
     pub generalized: Vec<S>,
     /// Force of the model's friction; empty for a model that
     /// [conserves its energy](EulerLagrange::conserves_energy).
     pub friction: Vec<S>,
-    /// Force from outside: the torque of a motor, say; what a model learned with known forces takes for those.
+    /// External force, such as the torque of a motor; for a model learned with known forces, its prediction of them.
     pub external: Vec<S>,
     /// Force of the constraints under it; empty for a model without.
     pub constraint: Vec<S>,
@@ -224,12 +224,12 @@ pub struct InverseDynamics<S> {
     pub multipliers: Vec<S>,
 }
 
-/// Accelerations that miss what constraints allow by less than this share of their size, or of the size that the forces give them, are
-/// taken: as many digits as a person writes.
+/// Accelerations are accepted if they violate the constraints by less than this share of their size, or of the size that the forces give
+/// them: as many digits as a person writes.
 const NEAR: f64 = 1e-3;
 
-/// Forces that give the states `(q, v)` the accelerations `a`, all `(batch, n)` in physical units. No mass matrix is
-/// inverted: it may be singular.
+/// Forces that give the states `(q, v)` the accelerations `a`, all `(batch, n)` in physical units. No mass matrix is inverted, so it may be
+/// singular.
 ///
 /// ```
 /// use lnn::lagrangian::{configure, inverse_dynamics};
@@ -253,12 +253,13 @@ pub fn inverse_dynamics<S: Scalar>(
     inverse_dynamics_by_drives(model, &[], [q, v, a])
 }
 
-/// [`inverse_dynamics`] by drives, the numbers of the coordinates on which forces from outside act: the external force is 0 on all others, the
-/// only one if there are as many drives as degrees of freedom, and the shortest one if there are more. Without drives, any coordinate is driven.
+/// [`inverse_dynamics`] by drives, given by the indices of their coordinates: the external force is 0 on all other coordinates. It is
+/// unique if there are as many drives as degrees of freedom, and the smallest one if there are more. Without drives, every coordinate is
+/// driven.
 ///
 /// # Errors
-/// As of [`inverse_dynamics`]; [`MechanicsError::Drives`] for fewer drives than degrees of freedom, [`MechanicsError::Undriven`] for a state
-/// that can move while they stand still.
+/// Those of [`inverse_dynamics`]; [`MechanicsError::Drives`] for fewer drives than degrees of freedom, [`MechanicsError::Undriven`] for a
+/// state that can move while they stand still.
 pub fn inverse_dynamics_by_drives<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     drives: &[usize],
@@ -268,15 +269,15 @@ pub fn inverse_dynamics_by_drives<S: Scalar>(
     failures.first().map_or(Ok(forces), |&error| Err(error))
 }
 
-/// Parts of the external force of known states and accelerations, `(batch, n)` each: what the motion asks for is
-/// `inertial + coriolis + gravity - friction`, of which constraints may carry a part.
+/// Parts of the external force of known states and accelerations, `(batch, n)` each: the motion requires `inertial + coriolis + gravity -
+/// friction`, and constraints may carry a part of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceParts<S> {
     /// `M a`.
     pub inertial: Vec<S>,
     /// Coriolis and centrifugal forces.
     pub coriolis: Vec<S>,
-    /// `-dL/dq` at rest: what holds the state where it is, against gravity and springs.
+    /// `-dL/dq` at rest: the force that holds the state against gravity and springs.
     pub gravity: Vec<S>,
     /// `-dD/dv`; empty for a model that [conserves its energy](EulerLagrange::conserves_energy).
     pub friction: Vec<S>,
@@ -299,7 +300,7 @@ pub fn force_parts<S: Scalar>(
 /// [`force_parts`] with an error for every row that fails, whose inertial part is `NaN`.
 ///
 /// # Errors
-/// [`MechanicsError`] that is about no row.
+/// A [`MechanicsError`] that concerns no single row.
 pub fn force_parts_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -321,7 +322,7 @@ pub fn force_parts_by_rows<S: Scalar>(
 /// [`inverse_dynamics_by_drives`] with an error for every row that fails, whose forces are `NaN`.
 ///
 /// # Errors
-/// [`MechanicsError`] that is about no row.
+/// A [`MechanicsError`] that concerns no single row.
 pub fn inverse_dynamics_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     drives: &[usize],
@@ -348,7 +349,7 @@ pub fn inverse_dynamics_by_rows<S: Scalar>(
     Ok((InverseDynamics { generalized, friction, external, constraint, multipliers }, failures))
 }
 
-/// `M a + c - g` of every row, and the terms that it is made of; rows that fail stand in their failures.
+/// `M a + c - g` of every row, and its terms; the failures list the rows that fail.
 fn all_forces<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -378,17 +379,17 @@ fn all_forces<S: Scalar>(
     Ok((generalized, terms))
 }
 
-/// Forces divided between what acts from outside and constraints.
+/// Forces divided into external forces and forces of constraint.
 struct Held<S> {
     external: Vec<S>,
     constraint: Vec<S>,
     multipliers: Vec<S>,
-    /// Rows whose accelerations the constraints do not allow, or the drives do not give.
+    /// Rows whose accelerations the constraints do not allow, or the drives cannot produce.
     refused: Vec<MechanicsError>,
 }
 
 impl<S: Scalar> Held<S> {
-    /// Of all forces, `(batch, n)`, friction in the terms.
+    /// Divides all forces, `(batch, n)`, with the friction in the terms.
     fn of(n: usize, terms: &Terms<S>, (generalized, a): (&[S], &[S]), drives: &[usize]) -> Self {
         let mut external = generalized.to_vec();
         external.iter_mut().zip(&terms.force).for_each(|(all, &friction)| *all -= friction);
@@ -495,7 +496,7 @@ mod tests {
         terms.add_force(2, &v, &[-1.0, 2.0, 5.0, 7.0], &mut workspace).unwrap();
         assert_eq!(terms.acceleration, [0.5, 1.25, 5.0, 7.0]);
         assert_eq!((terms.force, terms.dissipation), (vec![-1.0, 2.0, 5.0, 7.0], vec![-3.0, -15.0]));
-        // On top of a friction of the model's own, and one coordinate.
+        // With the model's own friction, and one coordinate.
         let mut one = Terms {
             mass_matrix: vec![2.0],
             acceleration: vec![1.0],

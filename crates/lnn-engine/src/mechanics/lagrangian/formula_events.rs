@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar};
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// An event whose formulas have the time as a coordinate behind those of the system.
+/// An event whose formulas have the time as a coordinate after those of the system.
 #[derive(Clone, Debug)]
 pub struct FormulaEvent {
     /// Its name in the file.
@@ -31,7 +31,7 @@ impl FormulaEvent {
 /// An event of a system file, with values of its parameters.
 #[derive(Clone, Debug)]
 pub struct GivenEvent<S> {
-    /// What the file says.
+    /// The event as described in the file.
     pub event: FormulaEvent,
     parameters: Vec<S>,
 }
@@ -46,7 +46,7 @@ impl<S: Scalar> GivenEvent<S> {
         formula.evaluate(&self.parameters, &[q, &[t]].concat(), v)
     }
 
-    /// The number whose zero is the event.
+    /// The number that vanishes at the event.
     pub fn value(&self, t: S, state: (&[S], &[S])) -> S {
         self.evaluate(&self.event.when, t, state)
     }

@@ -21,7 +21,7 @@ pub struct FormulaForces {
 }
 
 impl FormulaForces {
-    /// Forces of so many coordinates and parameters.
+    /// Forces as functions of the coordinates and parameters.
     pub(super) fn compiled(size: (usize, usize), formulas: Vec<(usize, Formula)>) -> Self {
         Self { size, formulas: formulas.into() }
     }
@@ -67,7 +67,7 @@ impl<S: Scalar> GeneralizedForce<S> for GivenForces<S> {
 struct ForceSlopes<'a, S>(&'a GivenForces<S>);
 
 impl<S: Scalar> ForceSlopes<'_, S> {
-    /// Derivatives of a force at a state by the positions, the velocities and the parameters that it depends on: pairs of place and value.
+    /// Derivatives of a force at a state by the positions, velocities and parameters that it depends on: pairs of index and value.
     fn of(&self, formula: &Formula, (q, v): (&[S], &[S])) -> BTreeMap<usize, S> {
         let (n, zero) = (q.len(), <S as Real>::zero());
         let mut inputs: Vec<Dual<S>> = q.iter().chain(v).chain(&self.0.parameters).map(|x| Dual::lift(*x)).collect();

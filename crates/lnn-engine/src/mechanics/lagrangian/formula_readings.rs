@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar};
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// A measured quantity. Its formula has the time, then inputs, then accelerations as coordinates behind those of the system.
+/// A measured quantity. Its formula has the time, then inputs, then accelerations as coordinates after those of the system.
 #[derive(Clone, Debug)]
 pub struct FormulaReading {
     /// Its name in the file.
@@ -19,7 +19,7 @@ pub struct FormulaReading {
     pub error: Option<String>,
     /// `true` for an angle in radians.
     pub periodic: bool,
-    /// The coordinate that it is, if the formula is nothing else.
+    /// The coordinate, if the formula is just that.
     pub coordinate: Option<usize>,
     /// `true` if the formula has accelerations.
     pub accelerated: bool,
@@ -44,8 +44,8 @@ impl<S: Scalar> SystemInstance<S> {
         self.readings().iter().map(|reading| reading.name.as_str())
     }
 
-    /// What the sensors of the system's file read at a state: the formulas of `[measured]` at positions `q`, velocities `v` and accelerations
-    /// `a`, `(n)` each; `known` holds the time, then inputs. Readings have the units that the file gives them.
+    /// The readings of the sensors in the system's file at a state: the formulas of `[measured]` at positions `q`, velocities `v` and
+    /// accelerations `a`, `(n)` each; `known` holds the time, then inputs. Readings have the units in the file.
     pub fn measure(&self, (q, v, a): (&[S], &[S], &[S]), known: &[S]) -> Vec<S> {
         self.readings().iter().map(|reading| reading.value(&self.parameters, (q, v, a), known)).collect()
     }

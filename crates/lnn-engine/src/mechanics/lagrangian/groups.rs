@@ -11,11 +11,12 @@ const STATES: usize = 64;
 /// Accelerations of states, `(states, n)` each.
 pub(crate) type Accelerations<'a, S> = &'a dyn Fn(&[S], &[S]) -> Vec<f64>;
 
-/// Groups of `n` coordinates that act on each other, given the `accelerations` of states, `(states, n)`; those that are not finite say
-/// nothing.
+/// Groups of `n` coordinates that act on each other, from the `accelerations` at states, `(states, n)`; those that are not finite are
+/// ignored.
 ///
-/// Coordinate `j` acts on `i` if the acceleration of `i` changes by more than `noise[i]`, root mean square over the states, where the place
-/// and the velocity of `j` are those of another state. One state shows nothing: then all coordinates are one group.
+/// Coordinate `j` acts on `i` if the acceleration of `i` changes by more than `noise[i]`, root mean square over the states, when the
+/// position and the velocity of `j` are replaced by those of another state. A single state shows nothing, and all coordinates are then one
+/// group.
 pub fn acting_groups<S: Scalar>(
     n: usize,
     (q, v): (&[S], &[S]),
@@ -52,7 +53,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Groups of coordinates of a Lagrangian that is known to rounding, by its accelerations and its mass matrix at states `(states, n)`: an
-/// influence below half of the digits is none. Under constraints all coordinates are one group.
+/// influence below half of the digits does not count. Under constraints all coordinates are one group.
 pub fn groups<S: Scalar>(model: &dyn EulerLagrange<S>, (q, v): (&[S], &[S])) -> Vec<Vec<usize>> {
     let n = model.coordinates();
     let used = n * STATES.min(q.len() / n.max(1));
@@ -117,7 +118,7 @@ pub struct Regrouped<'a> {
 }
 
 impl<'a> Regrouped<'a> {
-    /// `model` with the factors by which the mass matrices of its groups come nearest to those of `other` at states `(states, n)`; none if all
+    /// `model` with the factors that bring the mass matrices of its groups closest to those of `other` at states `(states, n)`; none if all
     /// coordinates are one group.
     pub fn nearest(
         model: &'a dyn EulerLagrange<f64>,
@@ -196,7 +197,7 @@ mod tests {
     use crate::scalar::Real;
     use rand::Rng;
 
-    /// Three oscillators with a mass matrix that depends on the place, of which the first and the last are joined by `coupling`.
+    /// Three oscillators with a mass matrix that depends on the position; `coupling` joins the first and the last.
     struct Three;
 
     impl Lagrangian for Three {

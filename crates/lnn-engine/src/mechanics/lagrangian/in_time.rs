@@ -1,5 +1,5 @@
-//! Lagrangians that depend on the time, and forces on what is known as a function of it: the time and these inputs are the last coordinates of
-//! a Lagrangian, and the time passes at the rate 1.
+//! Lagrangians and forces that depend on the time, and on inputs known as functions of it: the time and these inputs are the last
+//! coordinates of a Lagrangian, and the time passes at the rate 1.
 
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar};
@@ -8,14 +8,14 @@ use alloc::vec::Vec;
 
 /// A Lagrangian `L(q, v, t)` of `n` coordinates: a model of `n + 1` coordinates, the last of which is the time.
 ///
-/// Write the Lagrangian with the time as its last coordinate. It needs no velocity of the time: whatever it depends on, `dt/dt = 1`. Then
+/// Write the Lagrangian with the time as its last coordinate. It needs no velocity of the time, because `dt/dt = 1`. Then
 ///
 /// ```text
 /// M a = g - c + Q,    c = (d2L/dv dq) v + d2L/dv dt,    dE/dt = v.Q - dL/dt
 /// ```
 ///
-/// with `M`, `g` and `Q` of the first `n` coordinates. What the motion loses by the time, `dL/dt`, counts as [`Terms::dissipation`].
-/// States have these terms at a time, by [`terms_at`](EulerLagrange::terms_at); roll-outs know the time.
+/// with `M`, `g` and `Q` of the first `n` coordinates. The energy lost through the time dependence, `dL/dt`, counts as
+/// [`Terms::dissipation`]. [`terms_at`](EulerLagrange::terms_at) gives these terms at a time; roll-outs know the time.
 ///
 /// ```
 /// use lnn::lagrangian::{InTime, Lagrangian, Mechanics};
@@ -142,7 +142,7 @@ impl<S: Scalar, M: EulerLagrange<S>, U: Inputs<S>> EulerLagrange<S> for InTime<M
             terms.dissipation.resize(batch, <S as Real>::zero());
             for (row, power) in terms.dissipation.iter_mut().enumerate() {
                 let time = row * all + n;
-                // A force along the time moves nothing; the power that it took was counted.
+                // A force along the time moves nothing; its power has been counted.
                 *power += terms.dl_dq[time] + terms.force[time];
             }
         }

@@ -16,29 +16,29 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::any::Any;
 
-/// Up to so many coordinates few states are evaluated by forward numbers on the stack; a call of the interpreter is not worth it.
+/// Up to this many coordinates, a few states are evaluated by forward numbers on the stack; calling the interpreter does not pay.
 const STACK_COORDINATES: usize = 2;
-/// Batches from this size on, a chunk of lanes, are replayed all the same.
+/// Batches of at least this size, a chunk of lanes, are replayed anyway.
 const REPLAY_FROM: usize = 8;
 /// More coordinates take curvature in their own numbers, not wider ones.
 const WIDE_COORDINATES: usize = 4;
 
 /// A Lagrangian and the values of its parameters.
 ///
-/// Few states of up to two coordinates are evaluated by forward numbers on the stack. Everything else replays a program of
-/// the derivatives that is recorded on first use, without what is zero: a single state as it is, several side by side. Where
-/// that program would be too large, some hundreds of coupled coordinates, `n + 3` sweeps of a [`tape::Recorded`] function stand for it. All give
-/// the same numbers up to rounding. A Lagrangian that branches on its data cannot be recorded and is always evaluated state by state.
+/// A few states of up to two coordinates are evaluated by forward numbers on the stack. Everything else replays a program of the
+/// derivatives that is recorded on first use, without zeros: a single state alone, several side by side. If that program would be too
+/// large, with some hundreds of coupled coordinates, `n + 3` sweeps of a [`tape::Recorded`] function replace it. All give the same numbers
+/// up to rounding. A Lagrangian that branches on its data cannot be recorded and is always evaluated state by state.
 #[derive(Debug)]
 pub struct Mechanics<L, S> {
     system: L,
     evaluator: Evaluator<S>,
 }
 
-/// Code that is compiled for every Lagrangian apart: its terms state by state, and the recording of its value.
+/// Code that is compiled separately for every Lagrangian: its terms state by state, and the recording of its value.
 trait Form<S>: Send + Sync {
     fn coordinates(&self) -> usize;
-    /// Number of parameters, if the Lagrangian says so.
+    /// Number of parameters, if the Lagrangian states it.
     fn parameter_count(&self) -> Option<usize>;
     /// Fills the needed fields of a batch, which have their sizes.
     fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Request, terms: &mut Terms<S>);
@@ -118,8 +118,8 @@ struct Scratch<S> {
 }
 
 impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
-    /// A Lagrangian with parameter values in the order it takes them; another number of them than
-    /// [`Lagrangian::parameter_count`] is an error of every call.
+    /// A Lagrangian with parameter values in its order; if their number differs from [`Lagrangian::parameter_count`], every call is an
+    /// error.
     pub fn new(system: L, parameters: impl IntoIterator<Item = S>) -> Self {
         let evaluator = Evaluator {
             routines: Routines::get(),
@@ -151,7 +151,7 @@ impl<S: Scalar> Evaluator<S> {
         self.value.get_or_init(|| form.value(count).ok().map(|value| RecordedValue { value })).as_ref()
     }
 
-    /// The metric jets of a batch in numbers that are as precise or more so, by the program of the value.
+    /// The metric jets of a batch in numbers of the same or higher precision, from the program of the value.
     fn metric_jets<T: Scalar>(
         &self,
         form: &dyn Form<S>,
@@ -193,7 +193,7 @@ impl<S: Scalar> Evaluator<S> {
         Some(Box::new(ProgramSlopes::new(programs, &self.parameters)))
     }
 
-    /// Fills the needed fields of a batch by the engine's sweeps; whether that was possible.
+    /// Fills the needed fields of a batch by the engine's sweeps; `false` if that was not possible.
     fn sweep(
         &self,
         form: &dyn Form<S>,
@@ -242,7 +242,7 @@ impl<S: Scalar> Evaluator<S> {
             replays.push((index, Replay::new(program)));
             replays.len() - 1
         });
-        // The order of the recording; what is not needed is empty.
+        // The order of the recording; fields that are not needed are empty.
         let mut outputs = terms.derivatives_mut().map(Vec::as_mut_slice);
         replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, &mut outputs).is_ok()
     }
@@ -285,8 +285,8 @@ impl<S: Scalar> Evaluator<S> {
         terms.complete(n, v, request, &mut scratch.workspace)
     }
 
-    /// Evaluates the rows that are not finite once more, by forward numbers: those know that an infinite derivative along a direction in
-    /// which nothing changes is none.
+    /// Evaluates the rows that are not finite again, by forward numbers, which treat an infinite derivative along a direction without
+    /// change as zero.
     #[cold]
     fn refine(&self, form: &dyn Form<S>, (q, v): (&[S], &[S]), request: Request, terms: &mut Terms<S>) {
         let n = form.coordinates();
@@ -428,7 +428,7 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
 mod tests {
     use super::*;
 
-    /// Pendula in absolute angles, `n` of them, with a spring that a branch gives another stiffness and a damper-like product.
+    /// A chain of `n` pendula in absolute angles, with a spring whose stiffness depends on a branch, and a damper-like product.
     struct Chain(usize);
 
     impl Lagrangian for Chain {
@@ -490,7 +490,7 @@ mod tests {
         assert!(operations(Request::LAGRANGIAN) < operations(Request::DL_DQ));
     }
 
-    /// A second derivative by the velocities that is infinite where nothing depends on them.
+    /// A second derivative by the velocities that is infinite although nothing depends on them.
     struct Sliding;
 
     impl Lagrangian for Sliding {

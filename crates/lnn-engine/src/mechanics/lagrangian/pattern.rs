@@ -1,4 +1,4 @@
-//! Which second derivatives of a Lagrangian can be other than zero, and which are constant.
+//! Which second derivatives of a Lagrangian can be nonzero, and which are constant.
 
 use crate::linalg::components;
 use crate::scalar::{Real, Scalar};
@@ -19,22 +19,22 @@ pub enum Element {
     Varying,
 }
 
-/// The second derivatives of a Lagrangian that are not zero everywhere, known from its recording alone: rows, columns and what they are.
+/// The second derivatives of a Lagrangian that are not zero everywhere, according to its recording: row, column and kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize))]
 pub struct Pattern {
     /// Number of coordinates `n`.
     pub coordinates: usize,
-    /// Of `M = d2L/dv dv`, both triangles.
+    /// Elements of `M = d2L/dv dv`, both triangles.
     pub mass_matrix: Vec<(usize, usize, Element)>,
-    /// Of `d2L/dv dq`, rows by velocities.
+    /// Elements of `d2L/dv dq`, with rows by velocities.
     pub mixed: Vec<(usize, usize, Element)>,
-    /// Of `d2L/dq dq`, both triangles.
+    /// Elements of `d2L/dq dq`, both triangles.
     pub stiffness: Vec<(usize, usize, Element)>,
 }
 
 impl Pattern {
-    /// Of the Lagrangian with this value; `None` if it is too large.
+    /// The pattern of the Lagrangian with this value; `None` if it is too large.
     pub(crate) fn of<S: Scalar>(value: &Program<S>) -> Option<Self> {
         let n = value.inputs() / 2;
         let mut places = Vec::new();

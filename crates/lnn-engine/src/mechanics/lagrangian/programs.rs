@@ -16,7 +16,7 @@ pub(super) struct Recorded<'t, S> {
     pub coriolis: Vec<Tracer<'t, S>>,
 }
 
-/// The derivatives up to what is needed; `None` if they are too many.
+/// The derivatives that are needed; `None` if they are too many.
 pub(super) fn derivatives<'t, S: Scalar>(
     value: &Program<S>,
     state: &[Tracer<'t, S>],

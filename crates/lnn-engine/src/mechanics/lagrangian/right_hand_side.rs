@@ -5,10 +5,10 @@ use crate::platform::{Mutex, MutexGuard, lock};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// The right-hand side of `dy/dt = f(y)`, `y = (q, v)`, `f = (v, a)`, `2 n` numbers: what solvers of differential equations call.
+/// The right-hand side of `dy/dt = f(y)`, `y = (q, v)`, `f = (v, a)`, `2 n` numbers, for solvers of differential equations.
 ///
-/// Solvers give a right-hand side no way to fail. Its first error is kept instead, and `dy` is `NaN` from then on, which makes them stop.
-/// Buffers are its own: nothing is allocated after the first call.
+/// Solvers do not allow a right-hand side to fail. Instead its first error is kept, and `dy` is `NaN` from then on, which stops them. It
+/// has its own buffers, and nothing is allocated after the first call.
 ///
 /// ```
 /// use lnn::lagrangian::{EulerLagrange, build};
@@ -39,7 +39,7 @@ struct Buffers<'a, S: Scalar> {
 }
 
 impl<'a, S: Scalar> RightHandSide<'a, S> {
-    /// Of a model; [`EulerLagrange::rhs`] is the same.
+    /// The right-hand side of a model; [`EulerLagrange::rhs`] is the same.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         let buffers =
             Buffers { accelerations: Accelerations::new(model), linearizer: None, place: Vec::new(), error: None };

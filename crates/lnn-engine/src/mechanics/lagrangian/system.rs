@@ -93,7 +93,7 @@ impl Layout {
             Self::Net => 3 * chosen * chosen,
         }
     }
-    /// The integer that gives a number of coordinates.
+    /// The integer that gives this number of coordinates.
     pub const fn chosen(self, coordinates: usize) -> usize {
         match self {
             Self::Line => coordinates,
@@ -129,7 +129,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The same for each of `n` coordinates.
+    /// The same bounds for each of `n` coordinates.
     pub fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
         Self { positions: vec![position; n], velocities: vec![velocity; n] }
     }
@@ -146,10 +146,10 @@ pub struct TrajectoryTest {
     pub dt: f64,
 }
 
-/// Refuses coordinates outside a chart, given the parameters, with what is demanded of them.
+/// Rejects coordinates outside a chart, given the parameters, with the violated condition.
 pub(crate) type Domain = fn(parameters: &[f64], q: &[f64]) -> Result<(), &'static str>;
 
-/// A plane in which a picture shows where a system is, in space rather than over its coordinates.
+/// A plane in which a picture shows the position of a system in space, rather than its coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// Labels of the horizontal and the vertical axis, with units.
@@ -163,7 +163,7 @@ pub struct Plane {
 /// Components of a vector at a state, given the parameters.
 pub type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
 
-/// Quantity that exact motion conserves beside its energy.
+/// Quantity that exact motion conserves besides its energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Conserved {
     /// Name, with unit.
@@ -176,9 +176,9 @@ pub struct Conserved {
 /// Property that depends on the number of coordinates of a system.
 #[derive(Clone, Debug)]
 pub(crate) enum PerSize<T> {
-    /// For any number of coordinates.
+    /// A rule for any number of coordinates.
     Rule(fn(usize) -> T),
-    /// For the one number that the system has.
+    /// The value for the system's fixed number of coordinates.
     Given(T),
 }
 
@@ -199,7 +199,7 @@ pub struct LearningAdvice {
     pub states: Option<fn(bounds: &mut Bounds) -> StateAdvice>,
     /// The paper's budget, if the system is one of the paper's.
     pub paper: Option<PaperBudget>,
-    /// Learning rate of a structure, where that of others is not good.
+    /// Learning rate of a structure, if the default is not good.
     pub structure_rate: Option<f64>,
 }
 
@@ -282,16 +282,16 @@ pub struct System {
     pub(crate) trajectory: PerSize<TrajectoryTest>,
     /// Domain of the coordinates; the error states the condition.
     pub(crate) domain: Option<Domain>,
-    /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
+    /// Its position in a plane; `None` for systems of one coordinate, where a plot over time suffices.
     #[doc(hidden)]
     pub plane: Option<Plane>,
-    /// Quantity that is conserved beside the energy, if there is one.
+    /// Quantity that is conserved besides the energy, if there is one.
     #[doc(hidden)]
     pub conserved: Option<Conserved>,
     /// Advice on learning it.
     #[doc(hidden)]
     pub learning: LearningAdvice,
-    /// The description with its Lagrangian, for a system that is none of the catalogue's.
+    /// The description with its Lagrangian, for a system that is not in the catalogue.
     #[doc(hidden)]
     pub described: Option<Arc<Described>>,
 }
@@ -301,7 +301,7 @@ impl System {
     pub fn description(&self) -> Option<&Description> {
         self.described.as_deref().map(|described| &described.description)
     }
-    /// The description as it was given, with other values of parameters, by name; none for a system of the catalogue.
+    /// The original description, with other values of parameters, by name; none for a system of the catalogue.
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Option<Description> {
         self.described.as_deref().map(|described| described.with_defaults(values))
     }
@@ -340,11 +340,11 @@ impl System {
         let positions = coordinates.iter().map(|c| c.name.to_string());
         positions.chain(coordinates.iter().map(|c| format!("{}_dot", c.name))).collect()
     }
-    /// The same columns with their units (`theta1_dot [rad/s]`): labels of axes.
+    /// These columns with their units (`theta1_dot [rad/s]`), as labels of axes.
     pub fn labels(&self, n: usize) -> Vec<String> {
         self.columns(n).iter().zip(self.units(n)).map(|(column, unit)| format!("{column} [{unit}]")).collect()
     }
-    /// Units of the same columns (`rad`, `rad/s`).
+    /// Units of these columns (`rad`, `rad/s`).
     pub fn units(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.unit.to_string());
@@ -393,7 +393,7 @@ impl Range {
     }
 }
 
-/// Shell around a centre, and how fast what moves in it is at most.
+/// Shell around a centre, and the largest speed of motion in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShellAdvice {
     /// Cartesian coordinates around the centre.

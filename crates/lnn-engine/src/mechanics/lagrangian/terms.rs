@@ -1,4 +1,4 @@
-//! Euler-Lagrange terms of a batch of states: what may be requested, where it is stored, how the rest follows.
+//! Euler-Lagrange terms of a batch of states: the possible requests, their storage, and derived terms.
 
 use super::constraints::Manifold;
 use super::derivatives::MetricJet;
@@ -39,7 +39,7 @@ impl Request {
     /// Everything.
     pub const ALL: Self = Self(511);
 
-    /// The same without the solution for the acceleration; what it is made of stays.
+    /// This request without the solution for the acceleration; its ingredients stay.
     pub(crate) const fn without_solution(self) -> Self {
         Self(self.0 & !32)
     }
@@ -89,11 +89,11 @@ pub struct Terms<S> {
     pub mass_matrix: Vec<S>,
     /// `c = (d2L/dv dq) v`, `(batch, n)`.
     pub coriolis: Vec<S>,
-    /// Generalized force `Q` beside those of `L`, friction `-dD/dv` for a dissipation `D`, `(batch, n)`; empty for a model that
-    /// [conserves its energy](EulerLagrange::conserves_energy).
+    /// Generalized force `Q` that is not in `L`: friction `-dD/dv` for a dissipation `D`, `(batch, n)`; empty for a model that [conserves
+    /// its energy](EulerLagrange::conserves_energy).
     pub force: Vec<S>,
-    /// Power that leaves the motion: what `Q` takes, `-v.Q = v.dD/dv`, and `dL/dt` of a Lagrangian that depends on the time; `(batch)`, in
-    /// the unit of `L` per unit of time; empty as `force`.
+    /// Power that leaves the motion: the power of `Q`, `-v.Q = v.dD/dv`, and `dL/dt` of a Lagrangian that depends on the time; `(batch)`,
+    /// in the unit of `L` per unit of time; empty as `force`.
     pub dissipation: Vec<S>,
     /// `a = M^-1 (g - c + Q + A^T lambda)`, `(batch, n)`.
     pub acceleration: Vec<S>,
@@ -114,7 +114,7 @@ pub struct Terms<S> {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Takes over what `request` asks for of the rows `rows` of a batch of `n` coordinates; the rest is emptied.
+    /// Copies the requested fields of the rows `rows` of a batch of `n` coordinates; the others are emptied.
     #[cfg(feature = "rollout")]
     pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: core::ops::Range<usize>, request: Request) {
         let copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
@@ -159,8 +159,8 @@ fn field<S: Scalar>(
 /// A Lagrangian in motion: one written down or learned, with values for its parameters, in physical units.
 ///
 /// Two methods make a model: [`coordinates`](Self::coordinates) and [`terms`](Self::terms). A type that wraps another model adds
-/// [`inner`](Self::inner), and every other method then answers as that model does. The trait is object safe: roll-outs, evaluations
-/// and reports take `&dyn EulerLagrange<S>`.
+/// [`inner`](Self::inner), and every other method then delegates to that model. The trait is object safe: roll-outs, evaluations and
+/// reports take `&dyn EulerLagrange<S>`.
 ///
 /// ```
 /// use lnn::prelude::*;
@@ -185,10 +185,11 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
 
-    /// The same at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; it refuses states without.
+    /// As [`terms`](Self::terms), at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; it refuses
+    /// states without times.
     ///
     /// # Errors
-    /// As of [`terms`](Self::terms).
+    /// Those of [`terms`](Self::terms).
     fn terms_at(
         &self,
         _t: &[S],
@@ -205,8 +206,8 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.inner().is_some_and(|inner| inner.is_timed())
     }
 
-    /// The wrapped model of a type that wraps one. The methods below answer as it does, so that a wrapper cannot forget one of them;
-    /// it overrides those that it changes.
+    /// The wrapped model of a wrapper. The methods below delegate to it, so that a wrapper cannot forget one of them; it overrides those
+    /// that it changes.
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         None
     }
@@ -214,7 +215,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// Accelerations `a` of a batch, `(batch, n)`.
     ///
     /// # Errors
-    /// As of [`terms`](Self::terms).
+    /// Those of [`terms`](Self::terms).
     fn acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         field(&mut |terms| self.terms(q, v, Request::ACCELERATION, terms), |terms| terms.acceleration)
     }
@@ -222,7 +223,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// Mass matrices `M = d2L/dv dv` of a batch, `(batch, n, n)`.
     ///
     /// # Errors
-    /// As of [`terms`](Self::terms).
+    /// Those of [`terms`](Self::terms).
     fn mass_matrix(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         field(&mut |terms| self.terms(q, v, Request::MASS_MATRIX, terms), |terms| terms.mass_matrix)
     }
@@ -230,7 +231,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// Momenta `p = dL/dv` of a batch, `(batch, n)`.
     ///
     /// # Errors
-    /// As of [`terms`](Self::terms).
+    /// Those of [`terms`](Self::terms).
     fn momentum(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         field(&mut |terms| self.terms(q, v, Request::MOMENTUM, terms), |terms| terms.momentum)
     }
@@ -238,7 +239,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// Energies `E = p.v - L` of a batch, `(batch)`.
     ///
     /// # Errors
-    /// As of [`terms`](Self::terms).
+    /// Those of [`terms`](Self::terms).
     fn energy(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         field(&mut |terms| self.terms(q, v, Request::ENERGY, terms), |terms| terms.energy)
     }
@@ -256,8 +257,8 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// `q` and `v` are `(batch, n)` in physical units. Numbers that are not finite are passed on.
     ///
     /// # Errors
-    /// [`MechanicsError::Shape`]; [`MechanicsError::Derivatives`] of a model that cannot be differentiated: one that branches on its
-    /// data, or one that neither overrides this method nor wraps a model that does.
+    /// [`MechanicsError::Shape`]; [`MechanicsError::Derivatives`] for a model that cannot be differentiated: one that branches on its data,
+    /// or one that neither overrides this method nor wraps a model that does.
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         match self.inner() {
             Some(inner) => inner.metric_jets(q, v),
@@ -265,8 +266,8 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         }
     }
 
-    /// The same in double-double numbers, where a model can give them at a cost that is worth it: curvature is a difference of
-    /// larger terms, of flat space in curved coordinates. `None` of models that cannot, or are that precise themselves.
+    /// The metric jets in double-double numbers, if a model can give them at a reasonable cost: curvature is a difference of larger terms,
+    /// for example of flat space in curved coordinates. `None` for models that cannot, or are that precise themselves.
     ///
     /// # Errors
     /// As [`EulerLagrange::metric_jets`].
@@ -274,8 +275,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.inner().map_or(Ok(None), |inner| inner.wide_metric_jets(q, v))
     }
 
-    /// Which second derivatives of the Lagrangian are zero and which are constant, whatever the state; `None` of a model that is not
-    /// recorded.
+    /// Which second derivatives of the Lagrangian are zero and which are constant at all states; `None` for a model that is not recorded.
     fn pattern(&self) -> Option<Pattern> {
         self.inner().and_then(|inner| inner.pattern())
     }
@@ -285,24 +285,24 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.inner().and_then(|inner| inner.manifold())
     }
 
-    /// `true` if the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
+    /// `true` if the motion conserves the energy `E = p.v - L`: no friction and no other forces that are not in `L`.
     fn conserves_energy(&self) -> bool {
         self.inner().is_none_or(|inner| inner.conserves_energy())
     }
 
-    /// The program of the accelerations alone, for [`Accelerations`](super::Accelerations); `None` of a model that has none.
+    /// The program of the accelerations alone, for [`Accelerations`](super::Accelerations); `None` if there is none.
     #[doc(hidden)]
     fn solved(&self) -> Option<Solved<'_, S>> {
         None
     }
 
-    /// The derivatives of the equations of motion, for a [`Linearizer`](super::Linearizer); `None` of a model that has none.
+    /// The derivatives of the equations of motion, for a [`Linearizer`](super::Linearizer); `None` if there are none.
     #[doc(hidden)]
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
         None
     }
 
-    /// The chain of links that it is, whose recursions give what [`Torques`](super::Torques) asks for; `None` of any other model.
+    /// The chain of links of the model, whose recursions serve [`Torques`](super::Torques); `None` for any other model.
     #[doc(hidden)]
     fn links(&self) -> Option<&Chain<S>> {
         None
@@ -392,7 +392,7 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 mod tests {
     use super::*;
 
-    /// A model whose every method gives another answer than the default.
+    /// A model whose every method differs from the default.
     struct Odd;
 
     impl EulerLagrange<f64> for Odd {

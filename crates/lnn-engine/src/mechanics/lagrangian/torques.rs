@@ -1,12 +1,12 @@
-//! Forces that make a motion by the recursion of a chain of links, and a handle for those of one state after the other.
+//! Forces for a motion by the recursion of a chain of links, and a handle that computes them state after state.
 
 use super::recursion::Passes;
 use super::{EulerLagrange, InverseDynamics, MechanicsError, inverse_dynamics};
 use crate::scalar::{Scalar, are_finite};
 use alloc::vec::Vec;
 
-/// The forces of states `(batch, n)` with accelerations by the recursion of a model; `None` of a model without one, and where a force is not
-/// finite or there are not as many numbers as there should be: what is wrong is found by the terms.
+/// The forces for accelerations at states `(batch, n)` by the recursion of a model. `None` for a model without one, and if a force is not
+/// finite or a slice has the wrong length; the terms then find the error.
 pub(super) fn recursive_forces<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     [q, v, a]: [&[S]; 3],
@@ -23,7 +23,7 @@ pub(super) fn recursive_forces<S: Scalar>(
     Some(InverseDynamics { generalized, friction, external, constraint: Vec::new(), multipliers: Vec::new() })
 }
 
-/// Writes the external forces of states with accelerations by the recursion of a model, if it has one; `true` if they are all finite.
+/// Writes the external forces for accelerations at states by the recursion of a model, if it has one; `true` if all are finite.
 fn write_torques<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     [q, v, a]: [&[S]; 3],
@@ -44,10 +44,10 @@ fn write_torques<S: Scalar>(
     are_finite(torques)
 }
 
-/// The external forces that make a motion, the torques of an arm's motors for instance, state after state, with buffers of its own: what a
-/// controller calls.
+/// The external forces for a motion, such as the torques of an arm's motors, state after state, with its own buffers, for use in a
+/// controller.
 ///
-/// They are those of [`inverse_dynamics`]. Of a chain of links they are computed by the recursion of Newton and Euler, and nothing is allocated
+/// They are those of [`inverse_dynamics`]. For a chain of links the recursive Newton-Euler method computes them, and nothing is allocated
 /// after the first call.
 ///
 /// ```
@@ -74,7 +74,7 @@ impl<'a, S: Scalar> Torques<'a, S> {
     /// The forces of states `q`, `v` with accelerations `a`, all `(batch, n)` in physical units.
     ///
     /// # Errors
-    /// As of [`inverse_dynamics`]; another length of `torques`.
+    /// Those of [`inverse_dynamics`]; a wrong length of `torques`.
     pub fn at(&mut self, q: &[S], v: &[S], a: &[S], torques: &mut [S]) -> Result<(), MechanicsError> {
         if torques.len() != q.len() {
             return Err(MechanicsError::Shape { what: "torques", expected: q.len(), found: torques.len() });

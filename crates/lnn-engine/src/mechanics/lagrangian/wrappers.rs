@@ -1,5 +1,5 @@
-//! Models around a model: with forces beside its Lagrangian, generalized forces `Q(q, v)` or Rayleigh's dissipation, and
-//! with a flag that ends it.
+//! Models around a model: with forces that are not in its Lagrangian, generalized forces `Q(q, v)` or Rayleigh's dissipation, and with a
+//! flag that ends it.
 
 use super::linearization::{ProgramSlopes, Rate, SlopePrograms, add_jacobian, with_force};
 use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
@@ -79,7 +79,7 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
     }
 }
 
-/// A model and forces beside those of its Lagrangian: `M a = g - c + Q`, where `Q` includes the forces of the model itself.
+/// A model with additional forces: `M a = g - c + Q`, where `Q` includes the forces of the model itself.
 ///
 /// ```
 /// use lnn::lagrangian::{Dissipation, EulerLagrange, Rayleigh, Request, Terms, WithForces, configure};
@@ -114,7 +114,7 @@ impl<M, F> WithForces<M, F> {
         Self { model, force, acts: true }
     }
 
-    /// The model beside a force that vanishes with the values of its parameters, but not its derivatives by them.
+    /// The model with a force that vanishes at its parameter values, unlike its derivatives by them.
     pub(crate) fn vanishing(model: M, force: F) -> Self {
         Self { model, force, acts: false }
     }
@@ -173,9 +173,9 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
     }
 }
 
-/// A model without its own friction: `M a = g - c + Q` with `Q = 0`, for what a motion would be, or what its torques would be, if nothing rubbed.
+/// A model without its own friction: `M a = g - c + Q` with `Q = 0`, to compute its motion or torques without friction.
 ///
-/// Its linearization is that of a type of yours: by differences.
+/// It is linearized like your own types: by differences.
 #[derive(Clone, Copy)]
 pub struct Frictionless<'a, S>(
     /// The model.

@@ -15,7 +15,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// A row at unit length whose part beside the rows before it is below this at every state follows from them.
+/// A unit row is redundant if its part outside the span of the rows before it is below this at every state.
 const REDUNDANT: f64 = 1e-6;
 
 /// Why constraints leave no motion.
@@ -24,9 +24,9 @@ const REDUNDANT: f64 = 1e-6;
 pub enum ConstraintError {
     /// No state was found that satisfies all of them.
     Contradiction {
-        /// The constraint that is missed most.
+        /// The most violated constraint.
         name: String,
-        /// By how much, in units of the coordinates; not finite if it is not at any state.
+        /// Its violation, in units of the coordinates; not finite if it is finite at no state.
         defect: f64,
     },
     /// As many independent rows as coordinates.
@@ -69,8 +69,8 @@ impl core::error::Error for ConstraintError {}
 
 /// A model under constraints: `M a = g - c + Q + A^T lambda`, `A a = -gamma`, of any Lagrangian, written or learned.
 ///
-/// [`Terms::multipliers`] and [`Terms::constraint_force`] say what the constraints do. `M` may be singular along directions
-/// that the constraints take away. Energy, momenta and mass matrix are those of the model.
+/// [`Terms::multipliers`] and [`Terms::constraint_force`] state the effect of the constraints. `M` may be singular along directions that
+/// the constraints exclude. Energy, momenta and mass matrix are those of the model.
 ///
 /// ```
 /// use lnn::lagrangian::{Constrained, Constraints, EulerLagrange, ExpressionLagrangian, Mechanics, Request, Terms};
@@ -99,7 +99,7 @@ pub struct Constrained<M, C, S> {
     model: M,
     constraints: C,
     parameters: Vec<S>,
-    /// `true` if they are those of the model.
+    /// `true` if they are shared with the model.
     shared: bool,
     /// Rows of `constraints`, and which of them act.
     rows: usize,
@@ -143,23 +143,23 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
         })
     }
 
-    /// The same with parameters that are those of the model in the same order.
+    /// This model with parameters shared with the inner model, in the same order.
     pub(crate) fn with_parameters_of_model(self) -> Self {
         Self { shared: true, ..self }
     }
 
-    /// The same under only those rows.
+    /// This model under these rows only.
     pub(crate) fn only(mut self, kept: Vec<usize>) -> Self {
         self.names = kept.iter().map(|&row| self.names[row].clone()).collect();
         self.kept = kept;
         self
     }
 
-    /// The same without the constraints that follow from those before them at all of some states, `(batch, n)` each, which are
-    /// projected onto the constraints first.
+    /// This model without the constraints that depend on earlier ones at all given states, `(batch, n)` each, which are first projected
+    /// onto the constraints.
     ///
     /// # Errors
-    /// [`ConstraintError::Contradiction`] if none of the states can be, [`ConstraintError::TooMany`] if no motion is left.
+    /// [`ConstraintError::Contradiction`] if no state can be projected, [`ConstraintError::TooMany`] if no motion is left.
     pub fn independent(mut self, q: &[S], v: &[S]) -> Result<Self, ConstraintError> {
         let n = self.model.coordinates().max(1);
         let (mut needed, mut nearest): (Vec<usize>, Option<super::OffManifold>) = (Vec::new(), None);
@@ -256,7 +256,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
         let lift = |x: &S| HyperDual::lift(Dual::lift(*x));
         let parameters: Vec<_> = self.parameters.iter().map(lift).collect();
         let mut values = vec![lift(&zero); self.rows];
-        // The direction of the derivative is that of the inner number.
+        // The inner number carries the direction of the derivative.
         let number = |x: &[S], i: usize, at: Option<usize>| Dual {
             value: x[i],
             tangent: if at == Some(i) { one } else { zero },
@@ -362,7 +362,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
         Some(Box::new(Sum(self.model.slopes()?, Box::new(ProgramSlopes::new(programs, parameters)))))
     }
 
-    /// None: across the constraints a mass matrix means nothing.
+    /// Always an error: across the constraints a mass matrix has no meaning.
     fn metric_jets(&self, _: &[S], _: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         Err(MechanicsError::Derivatives { what: "mass matrix under constraints" })
     }

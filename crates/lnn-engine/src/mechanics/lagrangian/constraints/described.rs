@@ -49,8 +49,7 @@ impl ExpressionConstraints {
         self.rows[row].value.evaluate(parameters, q, v)
     }
 
-    /// The same rows, those first that are written first: `place` is where a constraint of a name stands. Of rows that depend on each other
-    /// the later ones are left out.
+    /// Sorts the rows by `place`, the position of a constraint in the file. Of dependent rows the later ones are left out.
     #[must_use]
     pub(crate) fn in_order(&self, place: impl Fn(&str) -> usize) -> Self {
         let mut rows = self.rows.to_vec();
@@ -58,7 +57,7 @@ impl ExpressionConstraints {
         Self { rows: Arc::new(rows), ..self.clone() }
     }
 
-    /// The same without the constraints of these names.
+    /// Leaves out the constraints with these names.
     pub(super) fn without(&self, names: &[String]) -> Self {
         let rows = self.rows.iter().filter(|row| !names.contains(&row.name)).cloned().collect();
         Self { rows: Arc::new(rows), ..self.clone() }

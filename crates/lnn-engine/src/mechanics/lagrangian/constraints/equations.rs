@@ -1,4 +1,4 @@
-//! Constraints of a system as recorded programs, with slopes by state and parameters: what fits of its constants need.
+//! Constraints of a system as recorded programs, with slopes by state and parameters, for fits of its constants.
 
 use super::formulas::Free;
 use super::rows::{complement, independent_rows};
@@ -20,19 +20,20 @@ pub struct RowEquations {
     chosen: Vec<usize>,
     /// Names of the rows.
     pub names: Vec<String>,
-    /// Of `(q, v)`: the rows `A`, `(m, n)`, and their drift `gamma`, `(m)`.
+    /// As functions of `(q, v)`: the rows `A`, `(m, n)`, and their drift `gamma`, `(m)`.
     pub rows: Arc<Program<f64>>,
-    /// Of `(q, v, a, lambda)`: the derivatives of `-A^T lambda` and of `A a + gamma` by `q`, `v` and the chosen parameters, row by row,
-    /// `(n + m, 2n + chosen)`.
+    /// As functions of `(q, v, a, lambda)`: the derivatives of `-A^T lambda` and of `A a + gamma` by `q`, `v` and the chosen parameters,
+    /// row by row, `(n + m, 2n + chosen)`.
     pub slopes: Arc<Program<f64>>,
 }
 
 /// How a state on constraints may change to first order, in rows of `2n` numbers.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    /// The independent changes that keep it on them: those of positions with the velocities that they ask for, then those of velocities.
+    /// The independent changes that keep it on them: changes of positions with the velocities that they require, then changes of
+    /// velocities.
     pub free: Vec<f64>,
-    /// Its least changes, positions first, that follow a change of each chosen parameter.
+    /// Its smallest changes, positions first, after a change of each chosen parameter.
     pub following: Vec<f64>,
 }
 
@@ -55,7 +56,7 @@ impl RowEquations {
         })?;
         let rate = Rate::of_constraints(constraints, (all.len(), kept), &vec![0.0; count], true)?;
         let slopes = Program::record_within(ROWS, (3 * n + m, count), |x, p| {
-            // Of `A^T lambda` and of `-(A a + gamma)`.
+            // Slopes of `A^T lambda` and of `-(A a + gamma)`.
             let found = rate.slopes(x, p, chosen)?;
             let columns = 2 * n + chosen.len();
             let element = |at: usize| found[at / columns].get(&(at % columns)).map_or_else(Tracer::zero, |x| -*x);
@@ -91,8 +92,8 @@ impl RowEquations {
         Ok(all.only(self.kept.clone()))
     }
 
-    /// What vanishes at a state, the functions of the coordinates and the rates of all rows, by each chosen parameter: two numbers for each
-    /// row, `(m, 2)` for each parameter.
+    /// Derivatives of the constraint functions and of the rates of all rows by each chosen parameter: two numbers for each row, `(m, 2)`
+    /// for each parameter.
     pub fn by_parameters(&self, values: &[f64], (q, v): (&[f64], &[f64])) -> Vec<f64> {
         let lift = |x: &f64| HyperDual::lift(*x);
         let moving: Vec<_> = q.iter().zip(v).map(|(&q, &v)| HyperDual::new(q, v, 0.0, 0.0)).collect();
@@ -122,7 +123,7 @@ impl RowEquations {
         let functions: Vec<usize> = (0..self.kept.len()).filter(of_functions).collect();
         let gradients: Vec<f64> =
             functions.iter().flat_map(|row| &rows.matrix[row * n..(row + 1) * n]).copied().collect();
-        // Velocities that follow a change of positions by the least change.
+        // The smallest change of velocities required by a change of positions.
         let with_velocities = |dq: &[f64], own: &[f64]| -> Vec<f64> {
             let asked = rates.chunks_exact(n).zip(own).map(|(row, own)| own + super::dot(row, dq));
             let dv = along_rows(n, &rows.matrix, &asked.collect::<Vec<_>>()).0;
@@ -151,7 +152,7 @@ impl RowEquations {
     }
 }
 
-/// Rows of constraints at one state: of all their rows, those that are `kept`.
+/// Rows of constraints at one state; only those in `kept`.
 pub(super) fn evaluate<R: Real>(
     constraints: &impl Constraints,
     (all, kept): (usize, &[usize]),
@@ -166,7 +167,7 @@ pub(super) fn evaluate<R: Real>(
     let lift = |x: &[R]| x.iter().map(|&x| Dual::lift(x)).collect::<Vec<_>>();
     let (of_rows, mut state) = (lift(parameters), [lift(q), lift(v)]);
     let mut values = vec![Dual::lift(zero); all];
-    // A function of coordinates has its gradient by them, a row that is linear in the velocities by those.
+    // A function of coordinates has its gradient by the coordinates, a row linear in the velocities its gradient by the velocities.
     for (by, kind) in [(0, true), (1, false)] {
         if !holonomic.contains(&kind) {
             continue;

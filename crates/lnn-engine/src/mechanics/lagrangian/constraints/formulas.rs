@@ -70,7 +70,7 @@ impl From<ConstraintError> for FormulaError {
     }
 }
 
-/// A point in space that nothing moves: what constraints are beside before there is a model.
+/// A point in space without a Lagrangian, used as the model of constraints before there is one.
 pub(super) struct Free(pub usize);
 
 impl Lagrangian for Free {
@@ -108,7 +108,7 @@ impl FormulaConstraints {
         Ok(Self { formulas, compiled })
     }
 
-    /// The same with those first that are written first.
+    /// Sorts the constraints by `place`, their position in the file.
     #[must_use]
     pub fn in_order(self, place: impl Fn(&str) -> usize) -> Self {
         Self { compiled: self.compiled.in_order(place), ..self }
@@ -138,12 +138,12 @@ impl FormulaConstraints {
     /// The states that they allow.
     ///
     /// # Errors
-    /// None, since the coordinates are their own.
+    /// Never, because the coordinates match.
     pub fn manifold<S: Scalar>(&self) -> Result<impl Manifold<S> + use<S>, ConstraintError> {
         self.alone()
     }
 
-    /// Those of them that do not follow from others at any of some states, `(batch, n)` each, and the names of the others.
+    /// The constraints that are independent at some of these states, `(batch, n)` each, and the names of the others.
     ///
     /// # Errors
     /// [`FormulaError::Constraints`] for constraints that contradict each other or leave no motion.

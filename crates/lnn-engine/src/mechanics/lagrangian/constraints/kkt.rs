@@ -38,7 +38,7 @@ pub fn accelerate<S: Scalar>(
     }
 }
 
-/// The matrices `[M A^T; A 0]` of a batch and what is solved with them; the buffers are reused.
+/// The matrices `[M A^T; A 0]` of a batch and their solver; the buffers are reused.
 #[derive(Clone, Debug)]
 pub struct Bordered<S> {
     size: (usize, usize),
@@ -79,7 +79,7 @@ impl<S: Scalar> Bordered<S> {
     }
 
     /// Solves for `[x; y]` with `[upper; lower]` on the right, `(batch, n)` and `(batch, m)`, 0 if `lower` is empty; `true` if no row
-    /// failed. Those that did are `NaN`, and named by the workspace.
+    /// failed. Failed rows are `NaN`, and the workspace lists them.
     pub fn solve(&mut self, upper: &[S], lower: &[S], x: &mut [S], y: &mut [S], workspace: &mut Workspace<S>) -> bool {
         let (n, m) = self.size;
         let (k, zero) = (n + m, <S as Real>::zero());

@@ -26,7 +26,7 @@ pub struct LeastNormMotion<S> {
     pub multipliers: Vec<S>,
     /// Dimension of the directions along which it was chosen.
     pub open: usize,
-    /// Size of the force along them, which nothing can balance: 0 but for rounding where there is a motion.
+    /// Size of the force along them, which nothing can balance: 0, up to rounding, if there is a motion.
     pub unbalanced: S,
 }
 

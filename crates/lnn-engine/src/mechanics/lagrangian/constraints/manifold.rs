@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 /// Constraints at one state, `m` rows of `n` coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct ManifoldRows<S> {
-    /// `phi(q)`, `(m)`; 0 of a row that is linear in the velocities.
+    /// `phi(q)`, `(m)`; 0 for a row that is linear in the velocities.
     pub values: Vec<S>,
     /// `A`, `(m, n)`.
     pub matrix: Vec<S>,
@@ -19,7 +19,8 @@ pub struct ManifoldRows<S> {
 }
 
 impl ManifoldRows<f64> {
-    /// Distance of the state from constraint `c`, `phi` over the length of its gradient or `(A v - b)` over that of its row, and this length.
+    /// Distance of the state from constraint `c`: `phi` over the length of its gradient, or `A v - b` over the length of its row; and that
+    /// length.
     pub fn distance(&self, manifold: &(impl Manifold<f64> + ?Sized), c: usize) -> (f64, f64) {
         let n = manifold.coordinates();
         let length = self.matrix[c * n..(c + 1) * n]
@@ -38,7 +39,7 @@ pub trait Manifold<S: Scalar>: Send + Sync {
     /// Names of the `m` constraints that act.
     fn names(&self) -> &[String];
 
-    /// Names of constraints that were left out since they follow from the others.
+    /// Names of redundant constraints, which were left out.
     fn redundant(&self) -> &[String];
 
     /// `true` if a row is a function `phi(q)` of the coordinates alone.
@@ -47,7 +48,7 @@ pub trait Manifold<S: Scalar>: Send + Sync {
     /// Evaluates the rows at one state; the buffers are reused.
     fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>);
 
-    /// Programs of the rows with their pattern, recorded on first use; `None` of constraints that have none.
+    /// Programs of the rows with their pattern, recorded on first use; `None` if they cannot be recorded.
     #[doc(hidden)]
     fn programs(&self) -> Option<&RowPrograms<S>> {
         None
@@ -56,8 +57,8 @@ pub trait Manifold<S: Scalar>: Send + Sync {
     /// Writes the derivatives of the rates by the coordinates, `d(A v - b)/dq`, `(m, n)`.
     fn rate_gradients(&self, q: &[S], v: &[S], gradients: &mut Vec<S>);
 
-    /// Adds the derivatives by `q` and `v` of `load.(A x) - pull.(A a + gamma)`, `x`, `a`, `(n)`, and `load`, `pull`, `(m)`, held: what
-    /// a change of the rows does to a function of the accelerations.
+    /// Adds the derivatives by `q` and `v` of `load.(A x) - pull.(A a + gamma)`, `x`, `a`, `(n)`, and `load`, `pull`, `(m)`, held: the
+    /// effect of a change of the rows on a function of the accelerations.
     fn pull_back(&self, state: (&[S], &[S]), along: RowAdjoint<'_, S>, derivatives: (&mut [S], &mut [S]));
 }
 

@@ -1,4 +1,4 @@
-//! Constraints beside a Lagrangian: `phi(q) = 0`, and rows `A(q) v = b(q)` linear in the velocities.
+//! Constraints in addition to a Lagrangian: `phi(q) = 0`, and rows `A(q) v = b(q)` linear in the velocities.
 //!
 //! A holonomic constraint enters the motion by `A = dphi/dq`, `b = 0`. With `gamma = (dA/dt) v - db/dt` along the motion and
 //! multipliers `lambda`
@@ -8,8 +8,8 @@
 //! [ A   0  ] [ -lambda ] = [  -gamma   ]
 //! ```
 //!
-//! which has one solution where the rows of `A` are independent and no direction that they allow has `M z = 0` within
-//! them: `M` itself may be singular. `A^T lambda` is the force of constraint, such as the tension of a rod.
+//! which has one solution where the rows of `A` are independent and no direction `z` that they allow has `M z = 0` within them: `M` itself
+//! may be singular. `A^T lambda` is the force of constraint, such as the tension of a rod.
 
 mod constrained;
 mod described;
@@ -49,7 +49,7 @@ pub trait Constraints: Send + Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
-    /// Names of the rows, for messages; their number is that of the constraints.
+    /// Names of the rows, for messages; one for each constraint.
     fn names(&self) -> Vec<String>;
 
     /// `true` if a row is a function `phi(q)` of the coordinates alone, `false` if it is `A(q) v - b(q)`.
@@ -60,6 +60,6 @@ pub trait Constraints: Send + Sync {
         None
     }
 
-    /// Writes what vanishes, one number for every row: `phi(q)`, or `A(q) v - b(q)`, linear in `v`.
+    /// Writes the vanishing quantities, one number per row: `phi(q)`, or `A(q) v - b(q)`, linear in `v`.
     fn values<R: Real>(&self, parameters: &[R], q: &[R], v: &[R], values: &mut [R]);
 }

@@ -1,4 +1,4 @@
-//! Programs of constraints: their rows by the pattern, the least changes that bring a state to them, whether they are independent.
+//! Programs of constraints: their rows by the pattern, the smallest changes that project a state onto them, and a test of independence.
 
 use super::Constraints;
 use crate::forward::Dual;
@@ -12,10 +12,10 @@ use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// An elimination is recorded up to so many products for each element of the full matrix; with more a dense solver is the faster one.
+/// An elimination is recorded with up to this many products per element of the full matrix; with more, a dense solver is faster.
 const PRODUCTS: usize = 8;
 
-/// Products of an elimination of so many rows at most.
+/// Largest number of products in an elimination of `rows` rows.
 pub(super) fn most_products(rows: usize) -> usize {
     PRODUCTS * rows * rows
 }
@@ -24,7 +24,7 @@ pub(super) fn most_products(rows: usize) -> usize {
 #[derive(Debug)]
 pub(super) struct RecordedRows<S> {
     rate: Rate<S>,
-    /// Values and rates of `q`, `v`.
+    /// Programs of the values and rates at `q`, `v`.
     along: Program<S>,
 }
 
@@ -36,7 +36,7 @@ struct Rows<R> {
 }
 
 impl<S: Scalar> RecordedRows<S> {
-    /// Those rows of constraints with these numbers; `None` if they are too large, or branch on their data.
+    /// The rows of the constraints with these indices; `None` if they are too large, or branch on their data.
     pub fn record(
         constraints: &impl Constraints,
         (all, kept): (usize, &[usize]),
@@ -73,7 +73,7 @@ impl<S: Scalar> RecordedRows<S> {
 /// The equations of motion of a model under constraints.
 #[derive(Debug)]
 pub(super) struct Under<S> {
-    /// Those of the model alone.
+    /// The equations of the model without constraints.
     pub beneath: Arc<dyn RecordMotion<S>>,
     pub rows: Arc<RecordedRows<S>>,
 }
@@ -113,7 +113,7 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
     }
 }
 
-/// The lower triangle of `A A^T`; `None` of more products than are allowed.
+/// The lower triangle of `A A^T`; `None` if it needs too many products.
 fn gram<R: Real>(matrix: &[Vec<(usize, R)>], most: usize) -> Option<Lists<R>> {
     let mut columns: BTreeMap<usize, Vec<(usize, R)>> = BTreeMap::new();
     for (c, row) in matrix.iter().enumerate() {

@@ -16,17 +16,17 @@ const ROUNDINGS: f64 = 1024.0;
 /// A state from which no way to the constraints was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffManifold {
-    /// The row that is missed most.
+    /// The most violated row.
     pub row: usize,
-    /// By how much, over the length of its gradient: a distance in units of the coordinates, or of the velocities.
+    /// Its violation over the length of its gradient: a distance in units of the coordinates, or of the velocities.
     pub defect: f64,
 }
 
-/// Brings a state to the constraints by changes along the rows, which are the least ones, and returns how far the coordinates were
-/// away and how far the velocities: `q` to `phi(q) = 0` by Newton's method, then `v` to `A v = b`.
+/// Projects a state onto the constraints by the smallest changes, along the rows, and returns the distances of coordinates and velocities:
+/// `q` to `phi(q) = 0` by Newton's method, then `v` to `A v = b`.
 ///
 /// # Errors
-/// [`OffManifold`] where no state was found; `q` and `v` are the nearest then.
+/// [`OffManifold`] if no state was found; `q` and `v` are then the nearest.
 pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) -> Result<[f64; 2], OffManifold> {
     let mut values = Defects::new(manifold, false);
     let before = [q.to_vec(), v.to_vec()];
@@ -39,7 +39,7 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
         let size = largest(change);
         q.iter_mut().zip(change).for_each(|(q, &change)| *q -= change);
         let rounding = S::epsilon() * largest(q);
-        // As good as the numbers are, or no longer better.
+        // The step has reached rounding, or no longer improves.
         if size <= rounding || (step > 3 && size > last * S::half() && size < rounding.ldexp(10)) {
             break;
         }
@@ -65,8 +65,8 @@ struct Defects<'a, S: Scalar> {
     of_rates: bool,
     /// The rows.
     of: Vec<usize>,
-    /// The program of the correction, where there is one, and what it gave: the change, pairs of an element of the diagonal of `A A^T` and
-    /// its pivot, the defects, and this diagonal.
+    /// The program of the correction, if there is one, and its results: the change, pairs of a diagonal element of `A A^T` and its pivot,
+    /// the defects, and this diagonal.
     program: Option<Replay<S>>,
     change: Vec<S>,
     guards: Vec<S>,
@@ -86,7 +86,7 @@ impl<'a, S: Scalar> Defects<'a, S> {
         Self { manifold, of_rates, of, program, change, guards, defects, squares, rows: ManifoldRows::default() }
     }
 
-    /// Evaluates the program; whether there is one.
+    /// Evaluates the program; `false` if there is none.
     fn replay(&mut self, q: &[S], v: &[S]) -> bool {
         let outputs = &mut [&mut self.change[..], &mut self.guards, &mut self.defects, &mut self.squares];
         self.program.as_mut().is_some_and(|program| program.evaluate(1, &[q, v], &[], outputs).is_ok())
@@ -100,8 +100,8 @@ impl<'a, S: Scalar> Defects<'a, S> {
         self.defects.extend(self.of.iter().map(|&row| all[row]));
     }
 
-    /// The shortest change of the coordinates or velocities, to be subtracted, that mends the defects to first order. Rows that may depend
-    /// on each other are left to a solver that knows of it.
+    /// The smallest change of the coordinates or velocities, to be subtracted, that removes the defects to first order. Possibly dependent
+    /// rows are left to a solver that handles them.
     fn least_change(&mut self, q: &[S], v: &[S]) -> &[S] {
         if !(self.replay(q, v) && are_safe(&self.guards) && are_finite(&self.change)) {
             self.evaluate(q, v);
@@ -145,7 +145,7 @@ impl<'a, S: Scalar> Defects<'a, S> {
     }
 }
 
-/// Brings an acceleration at a state on the constraints to `A a = -gamma` by the least change.
+/// Projects an acceleration at a state on the constraints onto `A a = -gamma`.
 pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &[S], a: &mut [S]) {
     let mut rows = ManifoldRows::default();
     manifold.rows(q, v, &mut rows);
@@ -156,14 +156,14 @@ pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &
     a.iter_mut().zip(&change).for_each(|(a, &change)| *a -= change);
 }
 
-/// The shortest `x` with `A x = defects` for some of the rows, as near to it as can be where they depend on each other.
+/// The smallest `x` with `A x = defects` for some of the rows; the best approximation if they depend on each other.
 fn least_change<S: Scalar>(n: usize, rows: &ManifoldRows<S>, of: &[usize], defects: &[S]) -> Vec<S> {
     let picked: Vec<S> = of.iter().flat_map(|&row| rows.matrix[row * n..(row + 1) * n].iter().copied()).collect();
     along_rows(n, &picked, defects).0
 }
 
-/// The shortest `x = A^T w` with `A x = right`, and the shortest `w`, of rows `A`, `(m, n)`; as near to it as can be where the rows depend
-/// on each other. A row that vanishes asks for nothing.
+/// The smallest `x = A^T w` with `A x = right`, and the smallest `w`, for rows `A`, `(m, n)`; the best approximation if the rows depend on
+/// each other. Zero rows impose nothing.
 pub fn along_rows<S: Scalar>(n: usize, rows: &[S], right: &[S]) -> (Vec<S>, Vec<S>) {
     let (m, zero) = (right.len(), <S as Real>::zero());
     let sizes: Vec<S> = rows.chunks_exact(n).map(length).collect();

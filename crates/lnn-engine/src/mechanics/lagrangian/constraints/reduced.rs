@@ -5,7 +5,8 @@ use crate::linalg::{LinalgError, Workspace, eigh};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// `Z^T M Z` of one state, `Z` an orthonormal basis of the directions that the constraints allow: what motion determines of `M`.
+/// `Z^T M Z` at one state, where `Z` is an orthonormal basis of the directions that the constraints allow: the part of `M` that motion
+/// determines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReducedMass<S> {
     /// `Z`, rows `(d, n)`.
@@ -19,7 +20,7 @@ pub struct ReducedMass<S> {
 }
 
 impl<S: Scalar> ReducedMass<S> {
-    /// Of a mass matrix `(n, n)` and the rows `A`, `(m, n)`, of constraints; without rows, of the mass matrix itself.
+    /// Reduces a mass matrix `(n, n)` by the rows `A`, `(m, n)`, of constraints; without rows, it is the mass matrix itself.
     ///
     /// # Errors
     /// [`LinalgError::NotFinite`].
@@ -45,9 +46,9 @@ impl<S: Scalar> ReducedMass<S> {
         Ok(Self { basis, matrix, eigenvalues, directions })
     }
 
-    /// Directions `z` with `M z = 0` within the constraints, which no equation moves: the Lagrangian is degenerate along them.
+    /// Null directions `z` with `M z = 0` within the constraints: the Lagrangian is degenerate along them.
     ///
-    /// An eigenvalue counts as zero below so many roundings of the largest.
+    /// An eigenvalue below `roundings` roundings of the largest counts as zero.
     pub fn null_directions(&self, roundings: f64) -> Vec<&[S]> {
         let d = self.eigenvalues.len();
         let n = self.directions.len() / d.max(1);

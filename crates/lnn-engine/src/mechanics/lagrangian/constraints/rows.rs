@@ -1,12 +1,12 @@
-//! Rows of small matrices: which of them are independent, and what is perpendicular to them.
+//! Rows of small matrices: independent rows and orthogonal complements.
 
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// Rows at unit length whose part beside the others is below this many roots of the rounding depend on them.
+/// Unit rows depend on others if their part outside the span of those is below this many roots of the rounding.
 const RANK: f64 = 16.0;
 
-/// Takes out of `x` what lies along orthonormal rows, `(k, n)`, twice, since once leaves rounding.
+/// Removes the part of `x` along orthonormal rows, `(k, n)`, twice, since once leaves rounding.
 pub fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
     for _ in 0..2 {
         for u in basis.chunks_exact(x.len()) {
@@ -33,13 +33,13 @@ pub(in crate::mechanics::lagrangian) fn length<S: Scalar>(x: &[S]) -> S {
     }
 }
 
-/// Largest magnitude; `NaN` if there is one.
+/// Largest magnitude; `NaN` if there is a `NaN`.
 pub(super) fn largest<S: Scalar>(x: &[S]) -> S {
     x.iter().fold(<S as Real>::zero(), |most, x| Real::max(most, x.abs()))
 }
 
-/// Rows of an `(m, n)` matrix at unit length that keep a part of more than `tolerance` beside the kept ones before them: the
-/// indices of those kept, and an orthonormal basis of what they span.
+/// Unit rows of an `(m, n)` matrix with a part of more than `tolerance` outside the span of the kept rows before them: their indices, and
+/// an orthonormal basis of their span.
 pub(super) fn independent<S: Scalar>(n: usize, matrix: &[S], tolerance: f64) -> (Vec<usize>, Vec<S>) {
     let (mut kept, mut basis) = (Vec::new(), Vec::new());
     for (i, row) in matrix.chunks_exact(n).enumerate() {
@@ -63,11 +63,11 @@ pub fn independent_rows<S: Scalar>(n: usize, matrix: &[S]) -> (Vec<usize>, Vec<S
     independent(n, matrix, RANK * S::epsilon().to_f64().sqrt())
 }
 
-/// An orthonormal basis, `(n - k, n)`, of what is perpendicular to orthonormal rows, `(k, n)`.
+/// An orthonormal basis, `(n - k, n)`, of the complement of orthonormal rows, `(k, n)`.
 pub(in crate::mechanics::lagrangian) fn complement<S: Scalar>(n: usize, rows: &[S]) -> Vec<S> {
     let mut all = rows.to_vec();
     while all.len() < n * n {
-        // The axis with the largest part outside what there is.
+        // The axis with the largest part outside the present span.
         let outside = |i: usize| {
             let mut axis = vec![<S as Real>::zero(); n];
             axis[i] = <S as Real>::one();

@@ -15,7 +15,7 @@ fn states(count: usize) -> (Vec<f64>, Vec<f64>) {
     ((0..count).map(|k| number(k, 0.37)).collect(), (0..count).map(|k| 2.0 * number(k, 0.71)).collect())
 }
 
-/// Coordinates `x`, `y`, `z` and a Lagrangian in which two of them pull each other.
+/// Coordinates `x`, `y`, `z` and a Lagrangian in which two of them attract each other.
 fn free() -> Mechanics<ExpressionLagrangian, f64> {
     let lagrangian = "m*(x_dot^2 + y_dot^2 + z_dot^2)/2 + x_dot*y_dot*cos(z)/2 - g*z";
     Mechanics::new(ExpressionLagrangian::new(&NAMES, &["m", "g"], lagrangian).unwrap(), [2.0, 9.8])
@@ -28,7 +28,7 @@ fn constrained(
     Constrained::new(free(), ExpressionConstraints::new(&NAMES, &["c"], formulas).unwrap(), [0.7]).unwrap()
 }
 
-/// Compares the accelerations by the program with those of the terms.
+/// Compares the accelerations of the program with those of the terms.
 fn check(name: &str, model: &dyn EulerLagrange<f64>, (q, v): (&[f64], &[f64])) {
     let mut a = vec![0.0; q.len()];
     assert!(Accelerations::new(model).is_solved(q, v, &mut a), "{name}: no program");
@@ -107,7 +107,7 @@ fn models_around_constraints_and_beneath_them_keep_their_answers() {
     Accelerations::new(&around).at(&q, &v, &mut a[0]).unwrap();
     Accelerations::new(&within).at(&q, &v, &mut a[1]).unwrap();
     assert!(around.solved().is_none() && within.solved().is_none() && a[0] == a[1]);
-    // Constraints of constraints are refused as ever.
+    // Constraints on a constrained model are refused as always.
     let alone = Constrained::new(free(), surface(), []).unwrap();
     let twice = Constrained::new(&alone as &dyn EulerLagrange<f64>, surface(), []).unwrap();
     assert!(matches!(Accelerations::new(&twice).at(&q, &v, &mut a[0]), Err(MechanicsError::Shape { .. })));

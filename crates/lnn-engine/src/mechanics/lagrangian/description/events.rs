@@ -30,7 +30,7 @@ pub struct EventDescription {
     then: Consequence,
 }
 
-/// What an event does to the motion.
+/// The effect of an event on the motion.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize), serde(untagged))]
 pub enum Consequence {
@@ -43,7 +43,7 @@ pub enum Consequence {
     },
 }
 
-/// What an event without an impact does.
+/// The effect of an event without an impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "lowercase"))]
 pub enum Word {
@@ -104,8 +104,8 @@ impl Description {
         Ok(events)
     }
 
-    /// Refuses a coefficient of restitution that the defaults of the parameters put out of its range; one that depends on the state is not
-    /// known here.
+    /// Rejects a coefficient of restitution that is out of range for the default parameters; one that depends on the state is not known
+    /// here.
     fn check_restitution(&self, formula: &Formula) -> Result<(), String> {
         let value = |text: &str| text.trim().parse().unwrap_or(f64::NAN);
         let defaults: Vec<f64> = self.parameters.values().map(|parameter| value(&parameter.default.0)).collect();

@@ -1,4 +1,4 @@
-//! Measured quantities of a description: formulas of what sensors read.
+//! Measured quantities of a description: formulas of the readings of sensors.
 
 use super::{CoordinateDescription, Description, DescriptionError};
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value};
@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::Serialize;
 
-/// Columns of roll-outs beside those of states.
+/// Columns of roll-outs other than those of states.
 const TAKEN: [&str; 3] = ["t", "tau", "energy"];
 
 /// A measured quantity: a formula, or a table with more about it.
@@ -71,7 +71,7 @@ impl Description {
         Ok(readings)
     }
 
-    /// The names of formulas, with inputs and accelerations beside the others; accelerations are behind the inputs.
+    /// The names in formulas, including inputs and accelerations; accelerations come after the inputs.
     fn with_accelerations(
         &self,
         scope: &BTreeMap<String, Meaning>,
@@ -87,7 +87,7 @@ impl Description {
         Ok(scope)
     }
 
-    /// All readings have columns of standard deviations, or none has.
+    /// Either all readings have columns of standard deviations, or none has.
     fn check_errors(&self) -> Result<(), DescriptionError> {
         let without = self.measured.iter().find(|(_, own)| own.error.is_none());
         match without.filter(|_| self.measured.values().any(|own| own.error.is_some())) {
@@ -99,7 +99,7 @@ impl Description {
         }
     }
 
-    /// Names and columns: short, on one line, and none of a column of states that holds something else.
+    /// Names and columns: short, on one line, and different from columns of states with other contents.
     fn check_reading(&self, name: &str, own: &MeasuredDescription) -> Result<(), DescriptionError> {
         let short =
             |text: &str| !text.trim().is_empty() && text.chars().count() <= 100 && !text.chars().any(char::is_control);

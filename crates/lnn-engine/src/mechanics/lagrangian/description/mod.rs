@@ -210,7 +210,7 @@ impl TrajectoryDescription {
 }
 
 impl Description {
-    /// The same with other values of parameters, by name.
+    /// This description with other values of parameters, by name.
     fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
         let mut changed = self.clone();
         for (name, value) in values {
@@ -351,7 +351,7 @@ impl Described {
         self.written.is_some()
     }
 
-    /// Number of the links that it was written with.
+    /// Number of links in the original description.
     pub(crate) fn links(&self) -> usize {
         self.written.as_ref().map_or(0, |written| written.links.len())
     }
@@ -362,7 +362,7 @@ impl Described {
         self.written.as_ref().map_or_else(Vec::new, |written| written.shown_links(&names))
     }
 
-    /// The description as it was given, with other values of parameters, by name.
+    /// The original description, with other values of parameters, by name.
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Description {
         let plain = self.description.with_defaults(values);
         match &self.written {

@@ -1,4 +1,4 @@
-//! Pairs of numbers in a file: a list of two, no more. serde itself passes over what a list of fixed length has beyond it.
+//! Pairs of numbers in a file: a list of exactly two. serde itself ignores additional elements of a list of fixed length.
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;

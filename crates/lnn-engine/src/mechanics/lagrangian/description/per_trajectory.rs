@@ -38,7 +38,7 @@ impl Description {
     /// The description for trajectories of these names, its links written out. Values that are known are not learned.
     ///
     /// # Errors
-    /// A known value of a trajectory that there is not; a name that is taken.
+    /// A known value of a trajectory that does not exist; a name that is taken.
     #[doc(hidden)]
     pub fn per_trajectory(&self, names: &[String]) -> Result<PerTrajectory, DescriptionError> {
         let mut all = self.unfolded()?;
@@ -90,7 +90,7 @@ impl Description {
         self.marks.len()
     }
 
-    /// The same with other values for trajectories whose parameter is not known: those of a system with values of its parameters.
+    /// Sets another value for trajectories whose parameter is not known, as in a system with values of its parameters.
     pub fn with_default(&mut self, symbol: &str, value: f64) {
         if let Some(own) = self.parameters.get_mut(symbol) {
             own.default = Decimal(value.to_string());

@@ -34,7 +34,7 @@ type Outcome<T> = Result<T, DescriptionError>;
 /// Demand of the mass shell, in words.
 const SHELL: &str = "from the mass shell g(v, v) = -1, to the future";
 
-/// Refuses what no formula can call by its name.
+/// Rejects names that formulas cannot use.
 fn check_name(key: String, name: &str) -> Outcome<()> {
     if !is_name(name) {
         let problem =
@@ -51,7 +51,7 @@ impl Description {
     /// The system, its Lagrangian ready to be evaluated.
     ///
     /// # Errors
-    /// The first key that is wrong, and how.
+    /// The first wrong key, and its problem.
     pub fn system(&self) -> Outcome<System> {
         let taken = constrained_description(&self.name);
         if systems().iter().any(|system| system.name == self.name)
@@ -63,10 +63,10 @@ impl Description {
         self.unfolded()?.compile_plain(self, false)
     }
 
-    /// Compiles a description of the catalogue, which may be larger than one of a file and has constraints that are independent.
+    /// Compiles a description of the catalogue, which may be larger than one in a file and has independent constraints.
     ///
     /// # Errors
-    /// The first key that is wrong, and how.
+    /// The first wrong key, and its problem.
     pub(in crate::mechanics::lagrangian) fn compile(&self) -> Outcome<System> {
         self.unfolded()?.compile_plain(self, true)
     }
@@ -298,7 +298,7 @@ impl Description {
         Ok(Some(value))
     }
 
-    /// The generalized forces, functions of so many coordinates and parameters.
+    /// The generalized forces as functions of the coordinates and parameters.
     fn forces(
         &self,
         compiler: &mut Compiler,
@@ -320,7 +320,7 @@ impl Description {
         Ok((!formulas.is_empty()).then(|| FormulaForces::compiled(size, formulas)))
     }
 
-    /// The names of forces: inputs beside all others.
+    /// The names in formulas of forces, including inputs.
     pub(super) fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
         let mut scope = scope.clone();
         for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| !self.marks.contains(*name)) {

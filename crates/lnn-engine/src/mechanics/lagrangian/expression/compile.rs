@@ -1,4 +1,4 @@
-//! From trees of names to one program of operations, equal parts shared.
+//! From trees of names to one program of operations that shares equal parts.
 
 use super::parse::Number;
 use super::{Expression, ExpressionError, Node, PI};
@@ -99,7 +99,7 @@ impl Compiler {
         }
     }
 
-    /// The value of what is given from outside.
+    /// The value of an input.
     pub fn meaning(&mut self, meaning: Meaning) -> Value {
         match meaning {
             Meaning::Parameter(i) => self.entry(Entry::Parameter(i as u32)),
@@ -190,7 +190,7 @@ impl Compiler {
         entries.into_iter().all(|(entry, _)| !matches!(entry, Entry::Position(_) | Entry::Velocity(_)))
     }
 
-    /// Degree of a value in the velocities, 0 or 1, as its operations show it; `None` if it is not linear in them.
+    /// Degree of a value in the velocities, 0 or 1, according to its operations; `None` if it is not linear in them.
     pub fn velocity_degree(&self, value: Value) -> Option<u8> {
         let mut degrees: Vec<Option<u8>> = Vec::with_capacity(value.0 as usize + 1);
         for entry in &self.entries[..=value.0 as usize] {
@@ -221,7 +221,7 @@ impl Compiler {
         self.given(value, |entry| if let Entry::Position(i) = entry { Some(*i as usize) } else { None })
     }
 
-    /// Those of the entries that a value is made of that are picked.
+    /// The picked entries among those that a value depends on.
     fn given(&self, value: Value, pick: impl Fn(&Entry) -> Option<usize>) -> Vec<usize> {
         let entries = self.entries.iter().zip(self.needed(value)).filter(|(_, needed)| *needed);
         entries.filter_map(|(entry, _)| pick(entry)).collect()
@@ -319,7 +319,7 @@ impl Value {
     }
 }
 
-/// Where a number is.
+/// The location of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Operand {
     Register(u32),
@@ -352,7 +352,7 @@ pub struct Formula {
     result: Operand,
 }
 
-/// Programs of at most so many registers keep them on the stack.
+/// Programs with at most this many registers keep them on the stack.
 const FEW: usize = 16;
 
 impl Formula {

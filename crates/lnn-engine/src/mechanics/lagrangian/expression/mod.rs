@@ -8,9 +8,9 @@
 //! atom    = number | "pi" | name | function "(" sum { "," sum } ")" | "(" sum ")"
 //! ```
 //!
-//! [`Expression`] is what a text says; [`Compiler`] gives its names a meaning and shares what occurs twice; [`Formula`] is
-//! the result, evaluated over any [`Real`](crate::scalar::Real): floats, forward numbers, tracers of a tape. Numbers keep their decimal text's
-//! value in the precision they are evaluated in.
+//! [`Expression`] is a parsed text; [`Compiler`] gives its names a meaning and shares common parts; [`Formula`] is the result, evaluated
+//! over any [`Real`](crate::scalar::Real): floats, forward numbers, tracers of a tape. Numbers keep the value of their decimal text in the
+//! precision of the evaluation.
 
 mod compile;
 mod parse;
@@ -68,10 +68,10 @@ enum Node {
     Binary(Binary, u32, u32),
 }
 
-/// A formula as a tree, written `m*l^2*theta_dot^2/2`; [`fmt::Display`] writes what reads back to the same formula.
+/// A formula as a tree, written `m*l^2*theta_dot^2/2`; [`fmt::Display`] writes text that reads back to the same formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
-    /// Operands before what is made of them, the whole last.
+    /// Operands before the operations on them, the whole formula last.
     nodes: Vec<Node>,
 }
 
@@ -133,7 +133,7 @@ enum Function {
     Two(Binary),
 }
 
-/// All functions; of two names for the same one the first is written.
+/// All functions; if one has two names, the first is written.
 const FUNCTIONS: [(&str, Function); 26] = [
     ("sqrt", Function::One(Unary::Sqrt)),
     ("exp", Function::One(Unary::Exp)),
@@ -196,16 +196,16 @@ pub fn quantity<S: Scalar>(text: &str) -> Result<S, ExpressionError> {
     Ok(compiler.formula(value).evaluate::<S>(&[], &[], &[]))
 }
 
-/// A formula of numbers that it names, such as `0.3*cos(1.2*t)` of the number `t`.
+/// A formula of named numbers, such as `0.3*cos(1.2*t)` of the number `t`.
 #[derive(Clone, Debug)]
 pub struct NamedFormula {
-    /// What it names, each once.
+    /// Its names, each once.
     pub names: Vec<String>,
     formula: Arc<Formula>,
 }
 
 impl NamedFormula {
-    /// Its value for those of its names.
+    /// Its value for these values of its names.
     pub fn value(&self, values: &[f64]) -> f64 {
         self.formula.evaluate(values, &[], &[])
     }
@@ -263,7 +263,7 @@ impl ExpressionLagrangian {
         Ok(Self::compiled((coordinates.len(), count), compiler.formula(value)))
     }
 
-    /// The Lagrangian of so many coordinates and parameters whose value is a compiled formula.
+    /// The Lagrangian of `n` coordinates and some parameters whose value is a compiled formula.
     pub(in crate::mechanics::lagrangian) fn compiled(
         (coordinates, parameters): (usize, usize),
         value: Formula,

@@ -1,4 +1,4 @@
-//! From a text to a tree: numbers, names and signs, then recursive descent that writes operands before what is made of them.
+//! From a text to a tree: numbers, names and signs, then recursive descent that writes operands before the operations on them.
 
 use super::{Expression, ExpressionError, FUNCTIONS, Function, Node, PI, function};
 use crate::names::nearest;
@@ -10,7 +10,7 @@ use core::str::FromStr;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-/// Deepest nesting of parentheses, signs and powers: far more than formulas need, far less than the stack holds.
+/// Deepest nesting of parentheses, signs and powers: far more than formulas need, far less than the stack allows.
 const MAX_DEPTH: usize = 100;
 
 /// Reads a formula.
@@ -315,7 +315,7 @@ pub(super) struct Number {
 }
 
 impl Number {
-    /// Reads decimal text that a scalar's own parser takes; `None` for what is not finite.
+    /// Reads decimal text that a scalar's own parser accepts; `None` if it is not finite.
     pub fn parse(text: &str) -> Option<Self> {
         let (exact, single) = (Dd::parse(text)?, f32::parse(text)?);
         exact.is_finite().then_some(Self { exact, single })
@@ -328,7 +328,7 @@ impl Number {
     pub fn value<S: Scalar>(self) -> S {
         if S::NAME == f32::NAME { S::of_f64(f64::from(self.single)) } else { self.exact.cast() }
     }
-    /// Its value if it is a whole one that is an exponent.
+    /// Its value if it is an integer that can be an exponent.
     pub fn integer(self) -> Option<i32> {
         let (high, low) = self.exact.parts();
         let whole = low == 0.0 && high.fract() == 0.0 && high.abs() <= f64::from(i32::MAX);

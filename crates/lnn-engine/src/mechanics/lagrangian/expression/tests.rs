@@ -114,7 +114,7 @@ fn numbers_are_read_in_the_precision_of_the_run() {
     assert_eq!(evaluate("0.1", point), Ok(tenth));
     assert_ne!(Dd::of_f64(0.1), tenth);
     assert_eq!(evaluate("pi", point), Ok(<Dd as Scalar>::pi()));
-    // In between two f32: rounded once, not by way of f64.
+    // Between two f32 numbers: rounded once, not via f64.
     let text = "1.000000059604644775390625000000000000001";
     assert_eq!(evaluate(text, POINT.map(|x| x as f32)), Ok(f32::parse(text).unwrap()));
     assert_ne!(f32::parse(text).unwrap(), f64::parse(text).unwrap() as f32);

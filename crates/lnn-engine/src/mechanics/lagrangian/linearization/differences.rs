@@ -16,7 +16,7 @@ fn step<S: Scalar>(x: S) -> S {
     (x + h) - x
 }
 
-/// Calls `f` with every displaced state, `(q, v)` in one vector, the column that is moved and the factor of its value.
+/// Calls `f` with every displaced state, `(q, v)` in one vector, the displaced column and the factor of its value.
 fn displaced<S: Scalar>(
     (q, v): (&[S], &[S]),
     mut f: impl FnMut(&[S], usize, S) -> Result<(), MechanicsError>,

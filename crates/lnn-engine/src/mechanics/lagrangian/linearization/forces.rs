@@ -1,4 +1,4 @@
-//! Derivatives of a model and a force beside it.
+//! Derivatives of a model together with a force.
 
 use super::{Held, Products, Slopes};
 use crate::lagrangian::{GeneralizedForce, MechanicsError};
@@ -16,7 +16,7 @@ pub(crate) fn with_force<'a, S: Scalar>(
     Box::new(Sum(model, force))
 }
 
-/// Of two parts of the equations.
+/// The sum of two parts of the equations.
 pub(crate) struct Sum<'a, S>(pub Box<dyn Slopes<S> + 'a>, pub Box<dyn Slopes<S> + 'a>);
 
 impl<S: Scalar> Slopes<S> for Sum<'_, S> {

@@ -21,7 +21,7 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use differences::Differences;
 
-/// A batch of states with their accelerations and multipliers, which are held.
+/// A batch of states with their accelerations and multipliers, which are held fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct Held<'a, S> {
     /// Number of coordinates `n`.
@@ -43,7 +43,7 @@ pub struct Products<'a, S> {
     pub by_q: &'a mut [S],
     /// By the velocities, `(batch, n)`.
     pub by_v: &'a mut [S],
-    /// By the parameters, summed over the batch; left alone by a part without.
+    /// By the parameters, summed over the batch; unchanged by a part without parameters.
     pub by_parameters: &'a mut Vec<S>,
 }
 
@@ -73,13 +73,13 @@ pub trait Slopes<S: Scalar> {
     /// Adds `df/d(q, v)` to matrices `(batch, n + m, 2 n)`.
     ///
     /// # Errors
-    /// As of [`EulerLagrange::terms`].
+    /// Those of [`EulerLagrange::terms`].
     fn add_matrices(&mut self, held: &Held<'_, S>, matrices: &mut [S]) -> Result<(), MechanicsError>;
 
-    /// Adds the derivatives of `weights.f`, weights `(batch, n + m)`; by the matrices where there is no shorter way.
+    /// Adds the derivatives of `weights.f`, weights `(batch, n + m)`; by default through the matrices.
     ///
     /// # Errors
-    /// As of [`EulerLagrange::terms`].
+    /// Those of [`EulerLagrange::terms`].
     fn add_products(
         &mut self,
         held: &Held<'_, S>,
@@ -115,18 +115,19 @@ pub struct Gradient<S> {
     pub by_v: Vec<S>,
     /// By a generalized force, `(batch, n)`.
     pub by_force: Vec<S>,
-    /// By the parameters of the Lagrangian, summed over the batch; empty of a model that has none, or is a type of yours. A system
-    /// from a file has one list of parameters for its Lagrangian, its friction and its constraints; those of other forces and
-    /// constraints are held.
+    /// By the parameters of the Lagrangian, summed over the batch; empty for a model without parameters, and for your own types. A system
+    /// from a file has one list of parameters for its Lagrangian, its friction and its constraints; parameters of other forces and
+    /// constraints are held fixed.
     pub by_parameters: Vec<S>,
 }
 
-/// Linearizes a model about states, with buffers of its own: what an implicit integrator, a filter, or a controller calls.
+/// Linearizes a model about states, with its own buffers, for an implicit integrator, a filter, or a controller.
 ///
-/// With `f = g - c + Q` the motion is `M a = f`, so that `da/dx = M^-1 (df/dx - dM/dx a)`: the inverse times the derivatives of
-/// the equations at fixed accelerations. Those are exact: of a Lagrangian written down by a program of its third derivatives that is
-/// recorded on first use, without what is zero; of `[[links]]` by their recursion; of a network by the sweeps of its training. Forces given as a closure, and types of yours
-/// that implement [`EulerLagrange`] themselves, are differentiated numerically, with errors of about `eps^(4/5)`.
+/// With `f = g - c + Q` the motion is `M a = f`, so that `da/dx = M^-1 (df/dx - dM/dx a)`: the inverse times the derivatives of the
+/// equations at fixed accelerations. Those are exact. For a Lagrangian that is written down they come from a program of its third
+/// derivatives, recorded on first use without zeros; for `[[links]]` from their recursion; for a network from the sweeps of its training.
+/// Forces given as a closure, and your own types that implement [`EulerLagrange`], are differentiated numerically, with errors of about
+/// `eps^(4/5)`.
 ///
 /// ```
 /// use lnn::lagrangian::{Linearizer, build};
@@ -144,7 +145,7 @@ pub struct Gradient<S> {
 /// ```
 pub struct Linearizer<'a, S: Scalar> {
     model: &'a dyn EulerLagrange<S>,
-    /// Of a small model: its program.
+    /// The program of a small model.
     whole: Option<(Solved<'a, S>, Linearized<S>, Replay<S>)>,
     slopes: Option<Box<dyn Slopes<S> + 'a>>,
     terms: Terms<S>,
@@ -182,7 +183,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
     /// Accelerations and their derivatives at states `q`, `v`, `(batch, n)` in physical units.
     ///
     /// # Errors
-    /// As of [`EulerLagrange::terms`]: of the first state that fails.
+    /// Those of [`EulerLagrange::terms`], for the first state that fails.
     pub fn at(&mut self, q: &[S], v: &[S]) -> Result<&Linearization<S>, MechanicsError> {
         self.under(q, v, None)
     }
@@ -192,10 +193,10 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         &self.linearization
     }
 
-    /// The same under generalized forces from outside, `(batch, n)`, if there are any.
+    /// As [`at`](Self::at), under external generalized forces, `(batch, n)`, if there are any.
     ///
     /// # Errors
-    /// As of [`EulerLagrange::terms`]; another length of the forces.
+    /// Those of [`EulerLagrange::terms`]; a wrong length of the forces.
     pub fn under(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<&Linearization<S>, MechanicsError> {
         let n = self.model.coordinates();
         if force.is_none()
@@ -239,11 +240,11 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         Ok(&self.linearization)
     }
 
-    /// Derivatives of `w.a` by everything that the accelerations depend on: the product of the linearization with `w`, `(batch, n)`, from the
-    /// left, by one sweep instead of `n`.
+    /// Derivatives of `w.a` by all arguments of the accelerations: the product of `w`, `(batch, n)`, from the left with the linearization,
+    /// by one sweep instead of `n`.
     ///
     /// # Errors
-    /// As of [`EulerLagrange::terms`]; another length of `w`.
+    /// Those of [`EulerLagrange::terms`]; a wrong length of `w`.
     pub fn gradient(&mut self, q: &[S], v: &[S], w: &[S]) -> Result<&Gradient<S>, MechanicsError> {
         if w.len() != q.len() {
             return Err(MechanicsError::Shape { what: "weights", expected: q.len(), found: w.len() });
@@ -299,7 +300,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
     }
 }
 
-/// The derivatives of the equations of motion, by differences where a model knows none.
+/// The derivatives of the equations of motion, by differences if a model does not provide them.
 fn slopes<'a, S: Scalar>(model: &'a dyn EulerLagrange<S>) -> Box<dyn Slopes<S> + 'a> {
     model.slopes().unwrap_or_else(|| Box::new(Differences::new(model)))
 }

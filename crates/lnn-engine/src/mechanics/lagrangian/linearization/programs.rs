@@ -16,12 +16,12 @@ pub(crate) struct SlopePrograms<S> {
     /// Nonzero elements of `df/d(q, v)` and their positions: row and column of `2 n`.
     matrices: Arc<Program<S>>,
     places: Arc<[(usize, usize)]>,
-    /// Of the derivatives of `weights.f` by the state and the parameters.
+    /// Derivatives of `weights.f` by the state and the parameters.
     products: Arc<Program<S>>,
 }
 
 impl<S: Scalar> SlopePrograms<S> {
-    /// Of a part with this rate; `None` if they are too large.
+    /// Programs of a part with this rate; `None` if they are too large.
     pub(crate) fn of(rate: &Rate<S>) -> Option<Self> {
         let ((n, m), k) = (rate.size, rate.parameters());
         let mut places = Vec::new();
@@ -70,7 +70,7 @@ pub(crate) struct ProgramSlopes<S> {
 }
 
 impl<S: Scalar> ProgramSlopes<S> {
-    /// Buffers for programs; `parameters` those that the recorded functions take.
+    /// Buffers for programs; `parameters` are those of the recorded functions.
     pub fn new(programs: SlopePrograms<S>, parameters: &[S]) -> Self {
         Self {
             matrices: Replay::new(Arc::clone(&programs.matrices)),

@@ -1,13 +1,13 @@
 //! The rate along the motion, from whose derivatives all equations of motion follow.
 //!
-//! Of a Lagrangian it is `w.dL/dq + a.dL/dv`, `w = v`. With a dissipation function `D`, with the rows `A` of constraints, their multipliers
-//! `lambda` and weights `y` of their second derivatives,
+//! For a Lagrangian it is `w.dL/dq + a.dL/dv`, `w = v`. With a dissipation function `D`, with the rows `A` of constraints, their
+//! multipliers `lambda` and weights `y` of their second derivatives,
 //!
 //! ```text
 //! R(q, v, w, a, lambda, y) = w.dL/dq + a.dL/dv + D + lambda.(A w) - y.(A a + gamma)
 //! ```
 //!
-//! holds the equations
+//! contains the equations
 //!
 //! ```text
 //! g - c - M a - dD/dv + A^T lambda = dR/dw - dR/dv,    -(A a + gamma) = dR/dy.
@@ -47,11 +47,11 @@ enum Input {
     Parameter(usize),
 }
 
-/// Rows by their columns; what is not there is zero.
+/// Rows by their columns; missing elements are zero.
 pub(crate) type SparseRows<R> = Vec<BTreeMap<usize, R>>;
 
 impl<S: Scalar> Rate<S> {
-    /// Of the Lagrangian with this value.
+    /// The rate of the Lagrangian with this value.
     ///
     /// # Errors
     /// [`TapeError::Full`], here and below.
@@ -66,7 +66,7 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, 0), symmetric: true })
     }
 
-    /// Of the dissipation function with this value.
+    /// The rate of the dissipation function with this value.
     pub fn of_dissipation(value: &Program<S>) -> Result<Self, TapeError> {
         let (n, k) = (value.inputs() / 2, value.parameters());
         let program =
@@ -74,7 +74,7 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, 0), symmetric: true })
     }
 
-    /// Of those rows of constraints with these numbers; `shared` if their parameters are the Lagrangian's.
+    /// The rate of the constraint rows with these indices; `shared` if their parameters are the Lagrangian's.
     pub fn of_constraints(
         constraints: &impl Constraints,
         (all, kept): (usize, &[usize]),
@@ -91,7 +91,8 @@ impl<S: Scalar> Rate<S> {
             let (zero, at) = (Tracer::zero(), |field: usize, i: usize| x[field * n + i]);
             let p: Vec<_> = own.iter().map(|&p| Dual::lift(p)).collect();
             let mut sum = zero;
-            // Of a function the row is the gradient by the coordinates, of a row that is linear in the velocities by those.
+            // The row of a function is its gradient by the coordinates; that of a row linear in the velocities is the gradient by the
+            // velocities.
             for holonomic in [true, false] {
                 let along = |field: usize, moves: bool| -> Vec<_> {
                     let tangent = |i: usize| if moves { at(2, i) } else { zero };
@@ -154,11 +155,11 @@ impl<S: Scalar> Rate<S> {
         Some(of_motion.chain(by[4 * n + m..4 * n + 2 * m].iter().copied()).collect())
     }
 
-    /// What is not zero of the rows `A` of constraints, by rising columns, and their drift `gamma`, at a state `q`, `v`; of constraints whose
-    /// parameters are constants.
+    /// Nonzero elements of the rows `A` of constraints, by increasing column, and their drift `gamma`, at a state `q`, `v`; for constraints
+    /// whose parameters are constants.
     pub fn rows<R: Real>(&self, state: &[R]) -> Option<(Lists<R>, Vec<R>)> {
         let (n, m) = self.size;
-        // Only `A` is left where nothing but `w` and `lambda` moves: it does not matter where they are.
+        // If only `w` and `lambda` vary, just `A` remains, whatever their values.
         let inputs = [state, &vec![R::zero(); 2 * n + 2 * m]].concat();
         let seed = |k: usize| match self.input(k) {
             Input::Speed(i) => vec![(i as u32, R::one())],
@@ -176,7 +177,7 @@ impl<S: Scalar> Rate<S> {
         Some((matrix, found.first[4 * n + m..].iter().map(|&by| -by).collect()))
     }
 
-    /// The elements of `df/d(q, v)` that are not zero, `n + m` rows and `2 n` columns, and behind those the derivatives by chosen parameters.
+    /// The nonzero elements of `df/d(q, v)`, `n + m` rows and `2 n` columns, followed by the derivatives by chosen parameters.
     pub fn slopes<R: Real>(&self, x: &[R], parameters: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         let ((n, m), count) = (self.size, self.program.inputs());
         // Velocities move along the first directions, coordinates along the next, parameters along the others.

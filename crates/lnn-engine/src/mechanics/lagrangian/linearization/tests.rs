@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 type Given = Vec<(String, String)>;
 
-/// Builds the same model with parameters of another kind, one of them changed.
+/// Builds the same model with parameters of another number type, one of them changed.
 trait Family {
     fn model<S: Scalar>(&self, changed: Option<(usize, S)>) -> Box<dyn EulerLagrange<S>>;
     fn parameters(&self) -> usize;
@@ -153,7 +153,7 @@ impl Dissipation for Cubic {
     }
 }
 
-/// A model that gives no information about its derivatives.
+/// A model that provides no derivatives.
 struct Plain<M>(M);
 
 impl<M: EulerLagrange<f64>> EulerLagrange<f64> for Plain<M> {

@@ -15,12 +15,12 @@ pub(crate) struct Linearized<S> {
     program: Arc<Program<S>>,
     n: usize,
     parameters: Vec<S>,
-    /// Number of pairs of a pivot and the element of the diagonal that it was.
+    /// Number of pairs of a pivot and its original diagonal element.
     pivots: usize,
 }
 
 impl<S: Scalar> Linearized<S> {
-    /// Records the linearization of so many coordinates; `None` if its parts are faster, or not known.
+    /// Records the linearization of `n` coordinates; `None` if its parts are faster, or not known.
     pub fn record(motion: &dyn RecordMotion<S>, n: usize, parameters: &[S]) -> Option<Self> {
         if n > motion.linearized_up_to() {
             return None;
@@ -29,7 +29,7 @@ impl<S: Scalar> Linearized<S> {
         let program = Program::record_within(ROWS, (2 * n, parameters.len()), |x, p| {
             let balance = motion.record(x, p)?;
             let eliminated = Eliminated::of(n, balance.lower, usize::MAX)?;
-            // Behind the accelerations stand the multipliers with their signs turned.
+            // The multipliers follow the accelerations, with reversed sign.
             let (mut acceleration, inverse) = (eliminated.solve(balance.right), eliminated.inverse());
             acceleration[n..].iter_mut().for_each(|multiplier| *multiplier = -*multiplier);
             let slopes = motion.record_slopes(&[x, &acceleration].concat(), p)?;

@@ -1,4 +1,4 @@
-//! The mass matrix by composite bodies: what a joint moves is one rigid body of the links behind it.
+//! The mass matrix by composite bodies: a joint moves the links behind it as one rigid body.
 
 use super::vector::{add, outer, scaled, sum, symmetric};
 use super::{Body, Chain, Frame, Load};
@@ -6,7 +6,7 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 impl<R: Real> Body<R> {
-    /// In and about the frame before.
+    /// The body in and about the previous frame.
     fn seen(&self, frame: &Frame<R>) -> Self {
         let turned = frame.outward::<true>(self.first);
         let first = add(turned, scaled(self.mass, frame.place));

@@ -1,11 +1,11 @@
 //! Dynamics of a tree of rigid links by recursion over its links, in a number of operations that grows with their number.
 //!
-//! Vectors stand in the frame of a joint, whose `z` is its axis. From the frame of the link that carries it, `r' = R r + p` with
-//! `R = Rot_z(gamma) Rot_x(alpha) Rot_z(theta)`; rows of Denavit and Hartenberg have `gamma = 0` and `p = (a, -d sin alpha, d cos alpha)`, and of
-//! a chain of them nothing is computed that only a tree needs. A link is a distribution of mass with the moments
-//! `m = sum 1`, `h = sum r` and `J = sum r r^T` about the origin of its frame, so that its inertia is `I = tr(J) - J`. With the angular
-//! velocity `w` and the acceleration `s` of the origin, less that of gravity, the point `r` is accelerated by `s + B r`,
-//! `B = [dw/dt] + w w^T - w^2`, and the link takes the force and the moment
+//! Vectors are given in the frame of a joint, whose `z` is its axis. From the frame of the link that carries it, `r' = R r + p` with `R =
+//! Rot_z(gamma) Rot_x(alpha) Rot_z(theta)`; Denavit-Hartenberg rows have `gamma = 0` and `p = (a, -d sin alpha, d cos alpha)`, and a chain
+//! of them skips computations that only a tree needs. A link is a distribution of mass with the moments `m = sum 1`, `h = sum r` and `J =
+//! sum r r^T` about the origin of its frame, so that its inertia is `I = tr(J) - J`. With the angular velocity `w` and the acceleration `s`
+//! of the origin, less that of gravity, the point `r` has the acceleration `s + B r`, `B = [dw/dt] + w w^T - w^2`, and the link requires
+//! the force and the moment
 //!
 //! `f = m s + B h`,  `n = h x s + sum_k (row k of B J) as a skew matrix`.
 //!
@@ -43,7 +43,7 @@ pub(super) struct Shape {
 pub(super) struct Row {
     /// Where its joint is.
     pub joint: Joint,
-    /// Where the ten constants of the link stand among the parameters: `m`, `h`, `Ixx`, `Ixy`, `Ixz`, `Iyy`, `Iyz`, `Izz`.
+    /// Indices of the link's ten constants among the parameters: `m`, `h`, `Ixx`, `Ixy`, `Ixz`, `Iyy`, `Iyz`, `Izz`.
     pub inertia: [usize; 10],
     /// Index of the inertia of the drive.
     pub armature: Option<usize>,
@@ -66,9 +66,9 @@ pub(super) struct Joint {
     pub place: [f64; 3],
     /// `true` if the joint slides.
     pub slides: bool,
-    /// Index of the coordinate that moves it, and how far it moves for each unit of that.
+    /// Index of the coordinate that moves it, and its motion per unit of that coordinate.
     pub drive: (usize, f64),
-    /// The axes of this frame, as columns, in the frame in which the constants of the link are given; `None` if they are one frame.
+    /// The axes of this frame, as columns, in the frame of the link's constants; `None` if the frames coincide.
     pub axes: Option<Matrix<f64>>,
 }
 
@@ -89,14 +89,14 @@ struct Body<R> {
 }
 
 impl<R: Real> Body<R> {
-    /// Of the ten constants of a link.
+    /// A body from the ten constants of a link.
     fn of([m, hx, hy, hz, xx, xy, xz, yy, yz, zz]: [R; 10]) -> Self {
         let half = (xx + yy + zz) * R::half();
         let second = [[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]];
         Self { mass: m, first: [hx, hy, hz], second }
     }
 
-    /// In a frame of the same origin with these axes, as columns in the own one: `A^T h` and `A^T J A`.
+    /// The body in a frame of the same origin with these axes, as columns in its own frame: `A^T h` and `A^T J A`.
     fn along(self, axes: &Matrix<f64>) -> Self {
         let axes = transposed(*axes).map(|axis| axis.map(R::of));
         let halfway = transposed(self.second.map(|row| applied(&axes, row)));
@@ -136,7 +136,7 @@ struct Link<R> {
 /// Data of each link during a recursion.
 #[derive(Debug)]
 pub(super) struct Passes<R> {
-    /// Its frame, and the forces that it alone needs to move.
+    /// Its frame, and the forces for its own motion.
     links: Vec<(Frame<R>, Load<R>)>,
     /// Its motion, in a tree.
     motions: Vec<Motion<R>>,
@@ -152,7 +152,7 @@ impl<R> Default for Passes<R> {
 #[derive(Clone, Debug)]
 pub struct Chain<R> {
     links: Vec<Link<R>>,
-    /// `true` if a link is not carried by the one before it, or bent.
+    /// `true` if a link is not carried by the previous one, or is bent.
     is_tree: bool,
     /// The coordinate of each joint and how far it moves for each unit of that, unless every joint has its own.
     drives: Option<Vec<(usize, R)>>,
@@ -163,8 +163,8 @@ pub struct Chain<R> {
 impl<R: Real> Chain<R> {
     /// A shape with values of its parameters.
     ///
-    /// What lies on the axis of a joint that turns moves with the link before as well: its mass, first and second moment are counted there,
-    /// which changes no force of a joint and leaves less to compute.
+    /// Mass on the axis of a revolute joint also moves with the previous link: its mass, first and second moment are counted there, which
+    /// changes no joint force and saves operations.
     pub(super) fn new(shape: &Shape, parameters: &[R]) -> Self {
         let value = |at: Option<usize>| at.map_or(R::zero(), |at| parameters[at]);
         let link = |row: &Row| {
@@ -200,7 +200,7 @@ impl<R: Real> Chain<R> {
         Self { links, is_tree, drives, gravity: shape.gravity.map(R::of), coulomb_speed: R::of(shape.coulomb_speed) }
     }
 
-    /// What coordinates, velocities or accelerations are of each joint.
+    /// Coordinates, velocities or accelerations of the joints.
     fn of_joints(&self, x: &[R]) -> Option<Vec<R>> {
         self.drives.as_ref().map(|drives| drives.iter().map(|&(at, ratio)| ratio * x[at]).collect())
     }
@@ -217,7 +217,7 @@ impl<R: Real> Chain<R> {
         moved.fold(R::zero(), |sum, (joint, &(_, ratio))| sum + ratio * own(joint, ratio * v))
     }
 
-    /// Writes the torques and forces that give a state the accelerations `a`, `M a + c - g`, by the recursion of Newton and Euler; the buffer
+    /// Writes the torques and forces for the accelerations `a` at a state, `M a + c - g`, by the recursive Newton-Euler method; the buffer
     /// is overwritten.
     pub(super) fn inverse_dynamics(&self, state: [&[R]; 3], buffer: &mut Passes<R>, torques: &mut [R]) {
         let Some(drives) = &self.drives else { return self.joint_forces(state, buffer, torques) };
@@ -228,7 +228,7 @@ impl<R: Real> Chain<R> {
         drives.iter().zip(forces).for_each(|(&(at, ratio), force)| torques[at] += ratio * force);
     }
 
-    /// The same, where every joint has its own coordinate.
+    /// The torques and forces if every joint has its own coordinate.
     fn joint_forces(&self, state: [&[R]; 3], buffer: &mut Passes<R>, forces: &mut [R]) {
         buffer.links.clear();
         buffer.motions.clear();
@@ -238,7 +238,7 @@ impl<R: Real> Chain<R> {
         }
     }
 
-    /// The same of a tree or of a chain; the buffer is empty.
+    /// The torques and forces for a tree or a chain; the buffer is empty.
     fn forces_in<const TREE: bool>(&self, [q, v, a]: [&[R]; 3], buffer: &mut Passes<R>, forces: &mut [R]) {
         let base = Motion::of_base(self.gravity);
         let mut motion = base;
@@ -281,7 +281,7 @@ impl<R: Real> Link<R> {
     }
 }
 
-/// Where a link is, seen from the one that carries it: sines and cosines of bend, twist and angle, and the place of its origin.
+/// The frame of a link, seen from its carrier: sines and cosines of bend, twist and angle, and the position of its origin.
 #[derive(Clone, Copy, Debug)]
 struct Frame<R> {
     bend: [R; 2],
@@ -319,14 +319,14 @@ impl<R: Real> Frame<R> {
 struct Motion<R> {
     turning: Vector<R>,
     spinning: Vector<R>,
-    /// `B` beside its diagonal, and the negative of its diagonal.
+    /// Off-diagonal part of `B`, and the negative of its diagonal.
     beside: Matrix<R>,
     inwards: Vector<R>,
     origin: Vector<R>,
 }
 
 impl<R: Real> Motion<R> {
-    /// Of the base, which rests: that it does not fall is as if it was accelerated upwards.
+    /// Motion of the base, which rests: gravity acts as an upward acceleration.
     fn of_base(gravity: Vector<R>) -> Self {
         let still = [R::zero(); 3];
         Self { turning: still, spinning: still, beside: [still; 3], inwards: still, origin: gravity.map(|g| -g) }
@@ -339,7 +339,7 @@ impl<R: Real> Motion<R> {
         [row(0, 1, 2), row(1, 2, 0), row(2, 0, 1)]
     }
 
-    /// Of the next link, whose joint moves with a velocity and an acceleration.
+    /// Motion of the next link, whose joint has a velocity and an acceleration.
     fn carried<const TREE: bool>(&self, frame: &Frame<R>, slides: bool, (v, a): (R, R)) -> Self {
         let origin = frame.inward::<TREE>(add(self.origin, self.swung(frame.place)));
         let [x, y, z] = frame.inward::<TREE>(self.turning);
@@ -381,7 +381,7 @@ struct Load<R> {
 }
 
 impl<R: Real> Load<R> {
-    /// In and about the frame before.
+    /// The load in and about the previous frame.
     fn seen<const TREE: bool>(&self, frame: &Frame<R>) -> Self {
         let force = frame.outward::<TREE>(self.force);
         Self { force, moment: add(frame.outward::<TREE>(self.moment), cross(frame.place, force)) }

@@ -25,7 +25,7 @@ pub(in crate::mechanics::lagrangian) struct Recursive<S> {
 }
 
 impl<S: Scalar> Recursive<S> {
-    /// The model of a Lagrangian and a friction that are those of a chain.
+    /// The model of a chain's Lagrangian and friction.
     pub(in crate::mechanics::lagrangian) fn new(
         model: Box<dyn EulerLagrange<S>>,
         shape: &Arc<Shape>,
@@ -35,7 +35,7 @@ impl<S: Scalar> Recursive<S> {
         Self { model, chain, shape: Arc::clone(shape), parameters: parameters.to_vec(), solved: OnceLock::new() }
     }
 
-    /// Records the accelerations: the mass matrix is eliminated in the program. What the constants leave out is not computed.
+    /// Records the accelerations, including the elimination of the mass matrix. Constant parts are not computed.
     fn solve(&self) -> Option<Solved<'static, S>> {
         let recursion = Recursion { shape: Arc::clone(&self.shape), parameters: self.parameters.clone() };
         Solved::record(Arc::new(recursion), self.shape.coordinates, &[], usize::MAX)
@@ -90,7 +90,7 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
     }
 }
 
-/// A row of a lower triangle with the columns of what is not zero, and of its diagonal.
+/// A row of a lower triangle as columns and nonzero values, including its diagonal.
 fn sparse<R: Real>((k, row): (usize, Vec<R>)) -> Vec<(usize, R)> {
     row.into_iter().enumerate().filter(|(j, m)| *j == k || !m.is_exact_zero()).collect()
 }

@@ -34,7 +34,7 @@ pub fn transposed<R: Real>(m: Matrix<R>) -> Matrix<R> {
     [0, 1, 2].map(|k| [m[0][k], m[1][k], m[2][k]])
 }
 
-/// The same matrix by its upper triangle, of one that is symmetric: what stands below is not computed apart.
+/// A symmetric matrix from its upper triangle; the lower one is not computed separately.
 pub(super) fn symmetric<R: Real>(m: Matrix<R>) -> Matrix<R> {
     [m[0], [m[0][1], m[1][1], m[1][2]], [m[0][2], m[1][2], m[2][2]]]
 }

@@ -67,12 +67,12 @@ pub const fn system(
             dt: 0.01,
         }),
         domain: Some(|_, q| if q.last().is_some_and(|&z| z > 0.0) { Ok(()) } else { Err("z must be positive") }),
-        // With x there is a plane of space, without it one of space and time.
+        // With x there is a plane in space, otherwise one of space and time.
         plane: Some(Plane {
             labels: [if n == 2 { "t [m]" } else { "x [m]" }, "z [m]"],
             point: |_, q| (q[usize::from(q.len() > 2)], q[q.len() - 1]),
         }),
-        // The metric is the same at every time and place but for z.
+        // The metric depends only on z.
         conserved: Some(Conserved {
             name: "momenta but that of z [1]",
             vector: |parameters, q, v| {

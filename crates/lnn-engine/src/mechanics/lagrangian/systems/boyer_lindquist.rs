@@ -280,8 +280,8 @@ impl ClosedForm for KerrGeodesic {
         vec![t, delta * (along_r - r_dot * stretch_rate) / sigma, (along_theta - theta_dot * sigma_rate) / sigma, phi]
     }
 
-    /// `t' = C/(sqrt(b^2 - g_tt C) - b)`, `b = g_tphi phi'`, `C = 1 + g(v, v)` of the velocity without `t'`: the future outside and
-    /// inside the ergosphere alike.
+    /// `t' = C/(sqrt(b^2 - g_tt C) - b)`, `b = g_tphi phi'`, `C = 1 + g(v, v)` of the velocity without `t'`: future-directed both outside
+    /// and inside the ergosphere.
     fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
         let still = [R::zero(), v[1], v[2], v[3]];
         let form = Forms::new(parameters, q, &still)?;
@@ -289,7 +289,7 @@ impl ClosedForm for KerrGeodesic {
         let stretch = (form.spin * form.sin).sqr() - form.delta;
         let c = R::one() + form.interval(&still);
         let root = (b.sqr() - stretch / form.sigma * c).sqrt();
-        // Of b > 0, a motion against the spin, the other form does not cancel; it needs g_tt < 0.
+        // For b > 0, a motion against the spin, the other form does not cancel; it needs g_tt < 0.
         let outside = b.select(-stretch, -R::one());
         Some(outside.select((root + b) * form.sigma / (-stretch), c / (root - b)))
     }

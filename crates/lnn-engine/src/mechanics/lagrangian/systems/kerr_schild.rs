@@ -23,7 +23,7 @@ pub enum KerrSchild {
     Schwarzschild,
     /// Mass `M`, angular momentum per mass `a` along `z`.
     Kerr,
-    /// Mass `M`, charge `Q`; what falls has none.
+    /// Mass `M`, charge `Q`; falling matter has no charge.
     ReissnerNordstrom,
 }
 

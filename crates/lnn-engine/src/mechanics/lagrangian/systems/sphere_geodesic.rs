@@ -63,7 +63,7 @@ pub const SPHERE: System = System {
         },
     }),
     learning: LearningAdvice {
-        // Near the poles the azimuth turns fast, and most great circles of the test are slower than the box.
+        // Near the poles the azimuth changes fast, and most great circles of the test are slower than the box.
         states: Some(|bounds| {
             bounds.velocities[1] = (-6.5, 6.5);
             StateAdvice { log_uniform: Vec::new(), acceleration_weighting: 0.3, trajectory_fraction: 0.5, shell: None }

@@ -1,9 +1,9 @@
 //! Taylor polynomials of a function of positions and velocities, of the second degree in each: the number that a Lagrangian is
 //! evaluated on for the second derivatives of its mass matrix.
 //!
-//! A number holds no more than its own degrees: a constant one coefficient, a function of the positions those of the
-//! positions, and what is linear in the velocities no squares of them. With `n` positions and velocities the largest numbers
-//! have `((n + 1)(n + 2)/2)^2` coefficients, and all of them come out of one evaluation.
+//! A number stores only its own degrees: a constant has one coefficient, a function of the positions only coefficients of the positions,
+//! and a number linear in the velocities no squares of them. With `n` positions and velocities the largest numbers have `((n + 1)(n +
+//! 2)/2)^2` coefficients, and one evaluation gives all of them.
 
 mod number;
 
@@ -163,12 +163,12 @@ impl Degrees {
             positions: DEGREE.min(self.positions + other.positions),
         }
     }
-    /// Of a power series in it.
+    /// Degrees of a power series in it.
     pub fn of_series(self) -> Self {
         let all = |degree: usize| if degree > 0 { DEGREE } else { 0 };
         Self { velocities: all(self.velocities), positions: all(self.positions) }
     }
-    /// Largest total degree of a power of it that is kept.
+    /// Largest total degree of its powers that is kept.
     pub fn total(self) -> usize {
         let all = self.of_series();
         all.velocities + all.positions
@@ -192,7 +192,7 @@ impl Variables {
         count(self.positions, degrees.positions)
     }
 
-    /// `out += factor a`, `out` of degrees at least those of `a`.
+    /// `out += factor a`, where `out` has at least the degrees of `a`.
     pub fn add_scaled<S: Scalar>(self, factor: S, (a, from): (&[S], Degrees), (out, to): (&mut [S], Degrees)) {
         let blocks = a.chunks_exact(self.block(from)).zip(out.chunks_exact_mut(self.block(to)));
         for (a, out) in blocks {

@@ -20,7 +20,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         }
     }
 
-    /// The same linear map on every coefficient.
+    /// Applies a linear map to every coefficient.
     fn each(self, place: Place<'a, S>, map: impl Fn(S) -> S) -> Self {
         place.space.number(place.degrees, |before, out| {
             out.iter_mut().zip(place.of(before).0).for_each(|(out, &x)| *out = map(x));
@@ -86,7 +86,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         })
     }
 
-    /// A function of the table; its third and fourth derivatives are those of its second.
+    /// A function of the table; its third and fourth derivatives come from its second one.
     fn chain(self, f: impl Elementary) -> Self {
         let zero = <S as Real>::zero();
         match self.place {
@@ -203,7 +203,7 @@ impl<S: Scalar> Real for Taylor<'_, S> {
         match (self.place, exponent.place) {
             (None, None) => Self::constant(self.value.powf(exponent.value)),
             (Some(_), None) => self.constant_power(exponent.value),
-            // `ln |a|` stands for `ln a`.
+            // `ln |a|` replaces `ln a`.
             (_, Some(_)) => {
                 let growth = (exponent * self.abs().ln()).with_value(<S as Real>::zero());
                 growth.exp().scaled(self.value.powf(exponent.value))

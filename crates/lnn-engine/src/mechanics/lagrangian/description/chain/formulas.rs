@@ -56,7 +56,7 @@ fn cross(a: &Vector, b: &Vector, i: usize) -> [Term; 2] {
 }
 
 impl Description {
-    /// Adds a link: the name of its part of the Lagrangian, and the base that it is for others.
+    /// Adds a link: the name of its part of the Lagrangian, and its base for other links.
     pub(super) fn add_link(
         &mut self,
         (number, joint): (usize, &Joint),
@@ -220,7 +220,7 @@ impl Description {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Motion of what carries a link, in the frame of its joint, the acceleration of gravity there, and `g.r` of its origin.
+/// Motion of the carrier of a link, in the frame of its joint, the acceleration of gravity there, and `g.r` of its origin.
 #[derive(Clone)]
 pub(super) struct Base {
     turning: Vector,
@@ -230,7 +230,7 @@ pub(super) struct Base {
 }
 
 impl Base {
-    /// What stands on the ground.
+    /// A base on the ground.
     pub(super) fn at_rest(gravity: [f64; 3]) -> Self {
         let still = [0.0; 3].map(Term::number);
         Self { turning: still.clone(), moving: still, gravity: gravity.map(Term::number), height: Term::number(0.0) }

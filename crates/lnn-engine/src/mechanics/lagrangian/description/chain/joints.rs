@@ -1,4 +1,4 @@
-//! Where the joints of a description are: from its rows to frames whose `z` is the axis of the joint.
+//! Frames of the joints of a description: from its rows to frames whose `z` is the axis of the joint.
 
 use super::Convention;
 use crate::lagrangian::description::{Description, DescriptionError, Quantity};
@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-/// Part of a sine or cosine that is rounding.
+/// Size of a sine or cosine that counts as rounding.
 const ROUNDING: f64 = 1e-15;
 /// Frame of the base, and of a link whose constants stand in the frame of its joint.
 const SAME: Matrix<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -38,7 +38,7 @@ fn about_z([s, c]: [f64; 2]) -> Matrix<f64> {
     [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
 }
 
-/// Axes of a joint, as columns, of which the third is `axis`; of an axis of the frame the others are axes of it too.
+/// Axes of a joint, as columns; the third is `axis`. If that is an axis of the frame, so are the others.
 fn around(axis: [f64; 3]) -> Matrix<f64> {
     let far = if axis[0].abs() > axis[1].abs() { 0 } else { 1 };
     let far = if axis[2].abs() > axis[far].abs() { 2 } else { far };
@@ -146,7 +146,7 @@ impl Description {
         self.chain.as_ref().is_some_and(|chain| chain.convention == Convention::Standard)
     }
 
-    /// Number of a link, from 1, by its name or as it stands; 0 for the base.
+    /// Index of a link, from 1, by its name or number; 0 for the base.
     fn numbered(&self, text: &str) -> Option<usize> {
         let named = self.links.iter().position(|link| link.name.as_deref() == Some(text));
         named.map(|at| at + 1).or_else(|| text.parse().ok().filter(|number| *number <= self.links.len()))
@@ -214,7 +214,7 @@ fn fault(k: usize, key: &str, problem: &str) -> DescriptionError {
     DescriptionError::new(format!("links[{k}]{dot}{key}"), problem)
 }
 
-/// Three finite numbers, or those of a key that is left out.
+/// Three finite numbers, or the defaults of a missing key.
 pub(super) fn triple(key: &str, given: &Option<Vec<Quantity>>, usual: [f64; 3]) -> Outcome<[f64; 3]> {
     let Some(given) = given else { return Ok(usual) };
     let given: Vec<f64> = given.iter().map(|x| x.0).filter(|x| x.is_finite()).collect();

@@ -57,7 +57,7 @@ pub struct ChainDescription {
     armature: bool,
 }
 
-/// Where the frame of a link is.
+/// The place of a link's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 enum Convention {
@@ -153,7 +153,7 @@ pub fn loss_symbols(link: usize) -> [String; 3] {
 }
 
 impl Description {
-    /// The chain of its links if there is nothing beside them; constants stand where their names do in `parameters`.
+    /// The chain of its links if there is nothing else; constants are at the index of their names in `parameters`.
     pub(super) fn shape(&self, parameters: &BTreeMap<String, ParameterDescription>) -> Option<Shape> {
         let beside = [&self.lagrangian, &self.dissipation].into_iter().flatten().next().is_some();
         if self.links.is_empty() || beside || !self.constraints.is_empty() {
@@ -195,12 +195,12 @@ impl Description {
         self.links.iter().zip(self.joints().unwrap_or_default()).map(shown).collect()
     }
 
-    /// The same with links written out; as it is if they are wrong, which its compilation says.
+    /// The description with its links expanded; unchanged if they are wrong, which its compilation reports.
     pub fn plain(&self) -> Self {
         self.unfolded().unwrap_or_else(|_| self.clone())
     }
 
-    /// The same without links: their coordinates, parameters and formulas written out.
+    /// The description without links: their coordinates, parameters and formulas are expanded.
     pub(super) fn unfolded(&self) -> Result<Self, DescriptionError> {
         let fault = |key: &str, problem: String| Err(DescriptionError::new(key, problem));
         let mut plain = Self { chain: None, links: Vec::new(), ..self.clone() };
@@ -250,7 +250,7 @@ impl Description {
         if chain.friction {
             plain.dissipation = whole(losses, &self.dissipation);
         }
-        // What the file says of a constant counts; one that is neither of the links nor in a formula would be passed over in silence.
+        // The file's settings of a constant are used; a constant that neither a link nor a formula uses would be ignored silently.
         let known = || plain.parameters.keys().map(String::as_str);
         let stray = |name: &&String| !plain.parameters.contains_key(*name) && !self.uses(name);
         if let Some(name) = self.parameters.keys().find(stray) {
@@ -263,7 +263,7 @@ impl Description {
         Ok(plain)
     }
 
-    /// `true` if a formula of the file holds a name.
+    /// `true` if a formula of the file contains a name.
     fn uses(&self, name: &str) -> bool {
         let formulas = [&self.lagrangian, &self.dissipation].into_iter().flatten();
         let mut formulas = formulas.chain(self.definitions.values()).chain(self.constraints.values());

@@ -139,7 +139,7 @@ fn turn(axis: [f64; 3], angle: f64, x: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| cosine * x[i] + sine * swung[i] + (1.0 - cosine) * along * axis[i])
 }
 
-/// A link of a tree, without the rest of this crate: what its keys say, and its mass at points.
+/// A link of a tree, without the rest of this crate: the values of its keys, and its mass as points.
 struct Limb {
     parent: usize,
     xyz: [f64; 3],
