@@ -1,13 +1,13 @@
-//! Settings of the property tests, of those beside the code and of those in `tests`.
+//! Settings of the property tests, both next to the code and in `tests`.
 
 use proptest::test_runner::{Config, FileFailurePersistence, RngSeed};
 
 /// Cases of a property that every run tries at least, if it has as many.
 const LEAST_CASES: u32 = 32;
 
-/// Settings of a property over random cases: a quarter of `cases`, all of them with `LNN_THOROUGH=1` (and as many as
-/// `PROPTEST_CASES` says). They are the same in every run unless `PROPTEST_RNG_SEED` names others, as the continuous integration
-/// does anew in every run; seeds that failed are kept in a file beside the test's source.
+/// Settings of a property over random cases: a quarter of `cases`, all of them with `LNN_THOROUGH=1` (and as many as `PROPTEST_CASES`
+/// says). They are the same in every run unless `PROPTEST_RNG_SEED` sets a seed, which the continuous integration changes in every run;
+/// failed seeds are kept in a file next to the test's source.
 pub fn properties(cases: u32) -> Config {
     let mut config = Config::default();
     if std::env::var_os("PROPTEST_CASES").is_none() {

@@ -1,8 +1,8 @@
-//! Numbers, their derivatives, and small matrices: everything that knows no mechanics.
+//! Numbers, their derivatives, and small matrices, without any mechanics.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`platform`] | what the standard library gives, and what stands in for it without |
+//! | [`platform`] | services of the standard library, and their replacements without it |
 //! | [`scalar`] | number types, vector lanes, exact sums |
 //! | [`random`] | random streams: one seed, independent draws for each purpose |
 //! | [`ops`] | the one table of operations: values, first and second partial derivatives |

@@ -1,4 +1,4 @@
-//! The standard library's services, and replacements without it: locks, values made once, maps, functions of floats.
+//! Services of the standard library, and replacements without it: locks, lazily made values, maps, functions of floats.
 //!
 //! With the feature `std` these are the standard library's own. Without it locks spin, maps are ordered, and functions of floats are those of `libm`.
 

@@ -50,7 +50,7 @@ struct Reports {
     now: Mutex<(SearchProgress, Option<Instant>)>,
 }
 
-/// The flag that ends a search and the receiver of its reports; clones share both. One that is made by `default` ends nothing.
+/// The flag that ends a search and the receiver of its reports; clones share both. The default one never ends a search.
 ///
 /// ```
 /// use lnn::cancellation::Cancellation;
@@ -72,14 +72,14 @@ impl Cancellation {
         Self { flag: Arc::clone(flag), reports: None }
     }
 
-    /// The same with a receiver of reports, which is called from several threads, at most five times a second.
+    /// Adds a receiver of reports, which is called from several threads, at most five times a second.
     #[must_use]
     pub fn reporting(self, to: impl Fn(SearchProgress) + Send + Sync + 'static) -> Self {
         let reports = Reports { to: Box::new(to), now: Mutex::default() };
         Self { reports: Some(Arc::new(reports)), ..self }
     }
 
-    /// A cancellation of its own that is raised with this one, and after a time. It is noticed when the search reports.
+    /// A separate cancellation that is raised with this one, or after a time. The search notices it when it reports.
     #[must_use]
     pub fn within(&self, limit: Duration) -> Self {
         let (outer, inner, started) = (self.clone(), Self::default(), Instant::now());
@@ -107,7 +107,7 @@ impl Cancellation {
         self.flag.load(Ordering::SeqCst)
     }
 
-    /// Goes on unless the flag was raised.
+    /// Continues unless the flag was raised.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -143,7 +143,7 @@ impl Cancellation {
     }
 }
 
-/// Searches for the same are equal, whoever may end them.
+/// Searches with the same settings are equal, whatever may end them.
 impl PartialEq for Cancellation {
     fn eq(&self, _: &Self) -> bool {
         true

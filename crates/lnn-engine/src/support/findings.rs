@@ -10,14 +10,14 @@ use core::fmt::{Display, Formatter, Result};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Finding {
-    /// What matters most, in a sentence, and a few quantities with their values.
+    /// The most important result in a sentence, and a few quantities with their values.
     Summary {
         /// The sentence.
         sentence: String,
         /// Quantities and values.
         rows: Vec<[String; 2]>,
     },
-    /// What follows is about.
+    /// The subject of the following items.
     Heading(String),
     /// A sentence, or a line of a list.
     Line(String),
@@ -25,7 +25,7 @@ pub enum Finding {
     Code(String),
     /// The end of a paragraph.
     Gap,
-    /// A table: what its columns are, and its rows.
+    /// A table: the meaning of its columns, and its rows.
     Table {
         /// A word or two for each column.
         headers: Vec<String>,
@@ -51,7 +51,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Adds what matters most: a sentence, and quantities with their values.
+    /// Adds the most important result: a sentence, and quantities with their values.
     pub fn summary(&mut self, sentence: impl Into<String>, rows: &[[String; 2]]) -> &mut Self {
         self.parts.push(Finding::Summary { sentence: sentence.into(), rows: rows.to_vec() });
         self
@@ -142,9 +142,9 @@ const LEAST: usize = 24;
 /// Text of a table with aligned columns: numbers to the right, words to the left, no trailing blanks, lines of at most
 /// `WIDTH` characters.
 ///
-/// Of a table that is wider the headers are wrapped at spaces, then the longest words; finally it is split into several tables below
-/// each other, which begin with the same column. Rows may be shorter than the header. A cell counts as a number if it begins
-/// with a digit, a sign or a point.
+/// In a wider table the headers are wrapped at spaces, then the longest words; finally it is split into several tables below each other,
+/// which begin with the same column. Rows may be shorter than the header. A cell counts as a number if it begins with a digit, a sign or a
+/// point.
 pub fn text_table<H: AsRef<str>, C: AsRef<str>>(headers: &[H], rows: &[Vec<C>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(headers.len());
     let columns: Vec<Column> = (0..columns).map(|k| Column::new(headers, rows, k)).collect();
@@ -181,7 +181,7 @@ impl Column {
         Self { header: headers.get(k).map_or("", AsRef::as_ref).to_string(), cells, numeric }
     }
 
-    /// Width of the cells as they are.
+    /// Width of the unwrapped cells.
     fn cells(&self) -> usize {
         self.cells.iter().map(|cell| width(cell)).max().unwrap_or(0)
     }
@@ -216,13 +216,13 @@ fn widths(columns: &[&Column]) -> Vec<usize> {
         return natural;
     }
     let mut widths: Vec<usize> = columns.iter().map(|column| column.cells().max(column.word())).collect();
-    // Words are cut in the widest column, as long as it is the widest.
+    // Words are wrapped in the widest column, as long as it is the widest.
     for _ in most..widths.iter().sum::<usize>() {
         let narrowed = (0..columns.len()).filter(|&k| widths[k] > columns[k].least()).max_by_key(|&k| widths[k]);
         let Some(k) = narrowed else { break };
         widths[k] -= 1;
     }
-    // Headers get the remaining width, those of most lines first.
+    // Headers get the remaining width, starting with those of most lines.
     loop {
         let used: usize = widths.iter().sum();
         let wider = |k: usize| {
@@ -295,7 +295,7 @@ mod tests {
         let mut findings = Findings::default();
         findings.heading("on top").summary("good", &[["of", "it"].map(String::from)]).heading("below");
         assert_eq!(findings.to_string(), "on top\ngood\nof: it\n\nbelow\n");
-        // Words are wrapped, and what is to be copied is not.
+        // Words are wrapped, but text to be copied is not.
         let long = "word ".repeat(40);
         let mut findings = Findings::default();
         findings.line(long.trim_end()).code(long.trim_end());

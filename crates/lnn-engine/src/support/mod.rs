@@ -1,9 +1,9 @@
-//! Common ground of all floors above: cancellation, names in messages, files, memory.
+//! Common base of all floors above: cancellation, names in messages, files, memory.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`cancellation`] | the flag that ends a long search, and reports of how far it is |
-//! | [`findings`] | what a result says, in sentences and tables |
+//! | [`cancellation`] | the flag that ends a long search, and its progress reports |
+//! | [`findings`] | a result in sentences and tables |
 //! | [`names`] | nearest known name for error messages, numbers and counts in words |
 //! | [`storage`] | files: read within limits, written completely or not at all; locks of directories; the container of model files and checkpoints |
 

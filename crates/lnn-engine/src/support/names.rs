@@ -1,11 +1,11 @@
-//! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits,
-//! columns of results beside those of coordinates.
+//! Names and numbers in messages: the known name nearest to a mistyped one, wrapped and single-line texts, counts, digits, names of result
+//! columns.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
-/// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.
+/// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if each needs edits to more than a
+/// third of the letters: `y` is not near `x`, nor `m3` near `m1`.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
     let near = |candidate: &'a str| {
@@ -55,8 +55,8 @@ fn edits(a: &[char], b: &[char]) -> usize {
     above[b.len()]
 }
 
-/// Lines joined by a space, control characters written out: an error is one line whatever a file name contains. The numbers of
-/// the system's errors are left out, and numbers of many digits have an exponent.
+/// Lines joined by a space, with control characters escaped: an error is one line, whatever a file name contains. Numbers of system errors
+/// are left out, and numbers of many digits get an exponent.
 pub fn one_line(text: &str) -> String {
     let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
     short_numbers(&without_error_numbers(&joined)).chars().fold(String::with_capacity(joined.len()), |mut line, c| {
@@ -91,7 +91,7 @@ fn short_numbers(text: &str) -> String {
         let length = rest[start..].find(|c| !is_part(c)).unwrap_or(rest.len() - start);
         let (before, number, after) = (&rest[..start], &rest[start..start + length], &rest[start + length..]);
         let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || "_/\\-".contains(c));
-        // A sign is no part of a word if none stands before it.
+        // A minus sign is not part of a word if none precedes it.
         let left = before.strip_suffix('-').filter(|left| !inside(left.chars().last())).unwrap_or(before);
         let apart = length > MOST_DIGITS && !inside(left.chars().last()) && !inside(after.chars().next());
         whole.push_str(before);
@@ -104,8 +104,8 @@ fn short_numbers(text: &str) -> String {
     whole + rest
 }
 
-/// The first coordinate that has the name of another column, and what that column is: results have the time as `t`, or as `tau` beside a
-/// coordinate `t`, the energy, and for every coordinate `NAME_dot`, `NAME_ddot` and `NAME_force`.
+/// The first coordinate with the name of another column, and the meaning of that column: results have the time as `t`, or as `tau` if a
+/// coordinate is called `t`, the energy, and for every coordinate `NAME_dot`, `NAME_ddot` and `NAME_force`.
 pub fn taken_column(coordinates: &[&str]) -> Option<(usize, String)> {
     coordinates.iter().enumerate().find_map(|(index, name)| {
         let of_another = |end: &str| name.strip_suffix(end).filter(|other| coordinates.contains(other));
@@ -127,8 +127,8 @@ pub fn number(x: f64) -> String {
     rounded(x, 3)
 }
 
-/// A number with so many significant digits, decimal from `0.0001` to a million and with an exponent beyond; digits before
-/// the point are all shown. No finite number is `-`.
+/// A number with this many significant digits, decimal from `0.0001` to a million and with an exponent beyond; digits before the point are
+/// all shown. Numbers that are not finite become `-`.
 pub fn rounded(x: f64, digits: usize) -> String {
     let after = digits.max(1) - 1;
     if !x.is_finite() {
@@ -201,8 +201,7 @@ pub fn width(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Lines of at most `most` characters, cut at blanks, but not between a number and its `%`; a word that is longer has a line of
-/// its own.
+/// Lines of at most `most` characters, cut at blanks, but not between a number and its `%`; a longer word gets a line of its own.
 pub fn cut(text: &str, most: usize) -> Vec<String> {
     let (mut lines, mut words) = (Vec::<String>::new(), Vec::<String>::new());
     for word in text.split(' ').filter(|word| !word.is_empty()) {
@@ -226,7 +225,7 @@ pub fn cut(text: &str, most: usize) -> Vec<String> {
     lines
 }
 
-/// The same with words cut too, where nothing else fits.
+/// As [`cut`], but words are cut too if nothing else fits.
 pub fn cut_hard(text: &str, most: usize) -> Vec<String> {
     let most = most.max(1);
     let pieces = |line: String| -> Vec<String> {
@@ -237,8 +236,8 @@ pub fn cut_hard(text: &str, most: usize) -> Vec<String> {
     cut(text, most).into_iter().flat_map(pieces).collect()
 }
 
-/// A text with every line that is longer than `most` cut at blanks; what follows stands below the text of that line: behind
-/// its indentation and, of two columns, behind the first one.
+/// A text with every line longer than `most` cut at blanks; continuation lines start below the text of that line: after its indentation
+/// and, if there are two columns, after the first one.
 pub fn wrap_text(text: &str, most: usize) -> String {
     let mut whole = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
@@ -258,7 +257,7 @@ pub fn wrap_text(text: &str, most: usize) -> String {
     whole
 }
 
-/// Where the text of a line begins: behind its indentation, or behind the first column of two that blanks part.
+/// The column at which the text of a line begins: after its indentation, or after the first of two columns separated by blanks.
 fn hang(line: &str, most: usize) -> usize {
     let indent = line.chars().take_while(|c| *c == ' ').count();
     let letters: Vec<char> = line.chars().collect();

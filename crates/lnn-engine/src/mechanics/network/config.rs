@@ -20,8 +20,7 @@ pub enum Initialization {
     /// Normal, zero biases; as the code of Cranmer et al. (2020) has it: `2.2/sqrt(n)` for the first map, `0.58 i/sqrt(n)` for
     /// the `i`-th after it (`i` = 1, 2, ..), `sqrt(n)` for the output, `n` the larger side of the map.
     Cranmer,
-    /// The same as Hamzaogullari and Ozakin have it: `0.58 i/sqrt(n)` for the `i`-th map of all (`i` = 2, 3, ..), `n` the
-    /// `fan_in`.
+    /// As in Hamzaogullari and Ozakin: `0.58 i/sqrt(n)` for the `i`-th map of all (`i` = 2, 3, ..), with `n` the `fan_in`.
     CranmerPaper,
     /// As `Default`, the output layer scaled by 0.01, so that `L` starts as `alpha |v|^2` (Liu et al. 2021).
     NearZero,
@@ -73,11 +72,10 @@ pub struct Architecture {
     /// Layer before the first dense one; files without this key have none.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "InputLayer::is_none"))]
     pub input_layer: InputLayer,
-    /// Units of the Rayleigh dissipation `D(q, v)` beside `L`; without it the motion
-    /// keeps its energy.
+    /// Units of the Rayleigh dissipation `D(q, v)`; without it the motion conserves its energy.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<usize>,
-    /// Knowledge of the Lagrangian beforehand; files without this key have none.
+    /// Prior knowledge of the Lagrangian; files without this key have none.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Form::is_default"))]
     pub form: Form,
 }

@@ -7,7 +7,7 @@ use crate::tape::{Depth, Evaluation, MixedDirections, Recorded};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// A model of motion, recorded: a Lagrangian, perhaps a Rayleigh dissipation beside it, with one list of parameters.
+/// A recorded model of motion: a Lagrangian, possibly with a Rayleigh dissipation, with one list of parameters.
 #[derive(Clone, Debug)]
 pub struct Model<S> {
     lagrangian: Arc<Recorded<S>>,
@@ -17,13 +17,13 @@ pub struct Model<S> {
 }
 
 impl<S: Scalar> Model<S> {
-    /// A model of `lagrangian`, whose scales and parameters are also those of `dissipation`; `periodic` coordinates are angles
-    /// that [`Model::wrap`] reduces to `[0, 2 pi)`.
+    /// A model of `lagrangian`, which shares its scales and parameters with `dissipation`; `periodic` coordinates are angles that
+    /// [`Model::wrap`] reduces to `[0, 2 pi)`.
     pub fn new(lagrangian: Arc<Recorded<S>>, dissipation: Option<Arc<Recorded<S>>>, periodic: Vec<bool>) -> Self {
         let weights = lagrangian.parameters();
         Self { lagrangian, dissipation, periodic, weights }
     }
-    /// The same model with physical constants behind its first `weights` parameters: no weight decay draws them to zero.
+    /// This model with physical constants after its first `weights` parameters: weight decay does not pull them to zero.
     ///
     /// # Panics
     /// If there are fewer parameters.
@@ -109,7 +109,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Evaluates states `q`, `v`, `(batch, n)` in physical units, angles as they are; the dissipation's force only if `forces`.
+    /// Evaluates states `q`, `v`, `(batch, n)` in physical units, with angles not wrapped; the dissipation's force only if `forces`.
     pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth, forces: bool) {
         self.lagrangian.evaluate(parameters, q, v, depth);
         let Some(dissipation) = self.dissipation.as_mut().filter(|_| forces) else { return };
@@ -122,7 +122,7 @@ impl<S: Scalar> Dynamics<S> {
         self.power.extend(rows.map(|(gradient, v)| {
             let terms = gradient.iter().zip(v).zip(scale);
             let power = terms.fold(zero, |sum, ((&d, &v), &s)| sum + d * (v / s));
-            // Friction is against the velocity: what is below zero is rounding.
+            // Friction opposes the velocity, so negative values are rounding.
             if power < zero { zero } else { power }
         }));
     }
@@ -149,8 +149,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Adds the derivative of a sum of mixed coefficients to `gradient`, and of what accelerations owe to the dissipation: with
-    /// `s = -M^-1 u`, `t = a` and moving directions, `u da/dtheta`, and to `inputs` `u da/d(q/s)` and `u da/d(v/s)`.
+    /// Adds the derivative of a sum of mixed coefficients to `gradient`, and of the dissipation's contribution to accelerations: with `s =
+    /// -M^-1 u`, `t = a` and moving directions, `u da/dtheta`, and to `inputs` `u da/d(q/s)` and `u da/d(v/s)`.
     ///
     /// The states are those evaluated last, to [`Depth::Training`] and with forces; all their numbers are finite.
     pub fn add_gradient(

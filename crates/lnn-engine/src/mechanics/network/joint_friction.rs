@@ -6,8 +6,8 @@
 //! F (softplus(a) w^2/2 + softplus(b) k ln cosh(w/k) + softplus(c) u (1 - exp(-(w/u)^2)))
 //! ```
 //!
-//! of a viscous force, a dry one that is fully there beyond the speed `k = exp(knee)`, and, for [`JointFriction::Stribeck`], one that
-//! stands above these near the speed `u = exp(fall)` and falls off beyond. All three forces are against the velocity.
+//! of a viscous force, a dry one that saturates beyond the speed `k = exp(knee)`, and, for [`JointFriction::Stribeck`], an additional one
+//! near the speed `u = exp(fall)` that falls off beyond. All three forces oppose the velocity.
 
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -54,7 +54,7 @@ impl JointFriction {
         }
     }
 
-    /// The dissipation at scaled velocities, from the parameters; `size` is that of every coordinate.
+    /// The dissipation at scaled velocities, from the parameters; `size` is the size of each coordinate's friction.
     pub(super) fn dissipation<R: Real>(self, parameters: &[R], velocities: &[R], size: impl Fn(usize) -> f64) -> R {
         let n = velocities.len();
         let rows: Vec<&[R]> = parameters.chunks_exact(n).collect();

@@ -1,4 +1,4 @@
-//! Where the parameters of a network stand in its flat vector, a sum of branches, each a chain of layers; initial weights.
+//! Positions of the parameters of a network in its flat vector, for a sum of branches, each a chain of layers; initial weights.
 
 use crate::lagrangian::Description;
 use crate::network::{Activation, Architecture, Initialization, InputLayer};
@@ -32,7 +32,7 @@ pub struct Layer {
     pub outputs: usize,
     /// Offset of `W`.
     pub weight: usize,
-    /// Offset of `b`, `(outputs)`; the output layer has none (a constant in `L` moves nothing).
+    /// Offset of `b`, `(outputs)`; the output layer has none (a constant in `L` has no effect).
     pub bias: Option<usize>,
 }
 
@@ -71,8 +71,8 @@ impl Branch {
     }
 }
 
-/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector; behind them the dissipation,
-/// then what stands beside the network.
+/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector; then the dissipation, then the
+/// parameters of a known part.
 ///
 /// Every layer holds its weights, then its biases.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ pub struct Layout {
     pub position_features: usize,
     /// Input features: those of the coordinates, then one per velocity for a black box.
     pub features: usize,
-    /// Parameters of the dissipation, behind those of all branches.
+    /// Parameters of the dissipation, after those of all branches.
     pub dissipation: Option<DissipationLayout>,
     /// Parameters of the structure outside the network, such as `alpha` of a black box that learns it.
     pub constants: Range<usize>,
@@ -214,11 +214,11 @@ const FRICTION: f64 = -5.0;
 
 /// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
 ///
-/// Every branch is drawn by itself, with its own widths and gains; the gain of a linear layer is 1. The parameters of
-/// an input layer are not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
+/// Every branch is drawn separately, with its own widths and gains; the gain of a linear layer is 1. The parameters of an input layer are
+/// not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
 ///
-/// Those of a dissipation come after all others, which are the same without it: `gamma = -5`, `w = 0`, and `b` of length
-/// 1 in random directions.
+/// Those of a dissipation are drawn after all others, which are the same without it: `gamma = -5`, `w = 0`, and `b` of length 1 in random
+/// directions.
 ///
 /// A structure begins, unless near zero, with a tenth (a rectangle: three tenths) of these output weights and with output biases that are those of 1.7
 /// times the identity.
@@ -260,8 +260,8 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
     weights
 }
 
-/// Begins a structure with a mass matrix near 1.7 times the identity and next to no forces: a random metric would move by its
-/// curvature, at every velocity, which has to be unlearned first.
+/// Initializes a structure with a mass matrix near 1.7 times the identity and almost no forces: a random metric would have curvature forces
+/// at every velocity, which would have to be unlearned first.
 fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, weights: &mut [S]) {
     for (k, branch) in layout.branches.iter().enumerate() {
         let output = &branch.layers[branch.layers.len() - 1];
@@ -277,7 +277,7 @@ fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, w
 /// A vector of length 1, its direction uniform.
 fn draw_direction<S: Scalar>(rng: &mut impl Rng, direction: &mut [S]) {
     let normal: Vec<f64> = direction.iter().map(|_| StandardNormal.sample(rng)).collect();
-    // Never 0 but for a generator that gives nothing else.
+    // Never 0, unless the generator gives only zeros.
     let length = normal.iter().map(|x: &f64| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     for (x, normal) in direction.iter_mut().zip(normal) {
         *x = S::of_f64(normal / length);

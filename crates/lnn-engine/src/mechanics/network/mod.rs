@@ -1,5 +1,4 @@
-//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, and friction beside it, evaluated
-//! in batches.
+//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, with optional friction, evaluated in batches.
 //!
 //! ```
 //! use lnn::lagrangian::{EulerLagrange, Request, Terms};

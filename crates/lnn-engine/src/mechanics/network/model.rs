@@ -23,13 +23,13 @@ pub struct NetworkLagrangian<S> {
     architecture: Architecture,
     weights: Vec<S>,
     model: Model<S>,
-    /// Workspaces that no call holds at the moment.
+    /// Workspaces that no call uses at the moment.
     idle: Mutex<Vec<Workspace<S>>>,
     code: Code<S>,
 }
 
-/// What evaluates a network, by reference: it is compiled where networks are made, so that a crate that receives one from a training does
-/// not compile it again.
+/// The evaluation code of a network, by reference: it is compiled where networks are made, so that a crate that receives one from a
+/// training does not compile it again.
 #[derive(Clone, Copy, Debug)]
 struct Code<S> {
     terms: TermsOf<S>,
@@ -145,7 +145,7 @@ impl Architecture {
     pub(crate) fn outputs(&self) -> usize {
         self.form.outputs(self.coordinates, self.time_like.is_some())
     }
-    /// Name and initial values of the parameters beside the network.
+    /// Name and initial values of the parameters besides the network.
     pub(crate) fn own_constants(&self) -> Option<(&'static str, Vec<f64>)> {
         self.form.constants(self.coordinates, self.alpha)
     }
@@ -188,7 +188,7 @@ impl<S: Scalar> NetworkLagrangian<S> {
     pub fn weights(&self) -> &[S] {
         &self.weights
     }
-    /// The same network in another precision.
+    /// This network in another precision.
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
         NetworkLagrangian::of_valid(self.architecture.clone(), weights)
@@ -199,7 +199,7 @@ impl<S: Scalar> NetworkLagrangian<S> {
         &self.model
     }
 
-    /// That of the smallest network of the same form: widths change no zero.
+    /// The pattern of the smallest network of the same form: widths do not change zeros.
     fn find_pattern(&self) -> Option<Pattern> {
         let Architecture { hidden, activation, coordinates: n, .. } = &self.architecture;
         let width = 2 * activation.branches().len();
@@ -314,7 +314,7 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         !self.architecture.has_friction()
     }
 
-    /// From about 200,000 weights on: a single state then waits for them longer than threads take to meet.
+    /// True from about 200,000 weights on: a single state then waits for them longer than threads take to synchronise.
     fn prefers_batches(&self) -> bool {
         self.weights.len() >= 200_000
     }

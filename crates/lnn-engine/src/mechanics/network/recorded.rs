@@ -1,11 +1,11 @@
-//! The Lagrangian of a network, and its dissipation, over [`Real`]: evaluated as they stand on floats and forward numbers, recorded
-//! as blocks on the tape; its input features; a known Lagrangian beside the network.
+//! The Lagrangian of a network, and its dissipation, over [`Real`]: evaluated directly on floats and forward numbers, recorded as blocks on
+//! the tape; its input features; a known Lagrangian beside the network.
 //!
 //! Every coordinate gives the network one feature `q_i/s_i`, or two, `sin q_i` and `cos q_i`, when it is an embedded angle; every velocity
 //! gives `v_i/s_i`. Cyclic coordinates give none. Those of a [`Radial`] group come last, two features each.
 //!
-//! A known Lagrangian may have constants to be learned. A learned constant with a positive default `p0` of an allowed range that is not negative is `p0 e^theta`, any other one
-//! `p0 + theta`; `theta` is the parameter, 0 at the start.
+//! A known Lagrangian may have constants to be learned. A learned constant with a positive default `p0` and a nonnegative allowed range is
+//! `p0 e^theta`, any other one `p0 + theta`; `theta` is the parameter, 0 at the start.
 
 use crate::lagrangian::system::{Parameter, Range, System};
 use crate::lagrangian::{Description, Lagrangian};
@@ -21,7 +21,7 @@ impl Lagrangian for Architecture {
         self.coordinates
     }
 
-    /// `L` of states in physical units; `parameters` are the flat weights. Angles are taken as they are, not wrapped.
+    /// `L` of states in physical units; `parameters` are the flat weights. Angles are not wrapped.
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let layout = Layout::new(self);
         let (positions, velocities) = (self.position_features_of(q), self.scaled_velocities(v));
@@ -47,11 +47,11 @@ impl Lagrangian for Architecture {
 }
 
 impl Architecture {
-    /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, with the
-    /// [joint friction](super::JointFriction) and the known part's own beside it; 0 without friction. Friction is the generalized force `-dD/dv`.
+    /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, plus the [joint
+    /// friction](super::JointFriction) and the friction of the known part; 0 without friction. Friction is the generalized force `-dD/dv`.
     ///
-    /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per
-    /// unit of time. Angles are taken as they are, not wrapped.
+    /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per unit of time.
+    /// Angles are not wrapped.
     pub fn rayleigh_dissipation<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let layout = Layout::new(self);
         let (positions, velocities) = (self.position_features_of(q), self.scaled_velocities(v));
@@ -86,7 +86,7 @@ fn evaluate<R: Real>(layer: &Layer, parameters: &[R], x: &[R]) -> Vec<R> {
 }
 
 impl Architecture {
-    /// Input features made of coordinates: two per embedded angle and radial coordinate, one per other coordinate, none of cyclic
+    /// Number of input features from coordinates: two per embedded angle and radial coordinate, one per other coordinate, none for cyclic
     /// ones.
     pub(crate) fn position_features(&self) -> usize {
         let seen = (0..self.coordinates).filter(|i| !self.form.cyclic.contains(i));
@@ -166,7 +166,7 @@ impl Architecture {
         described.map_or_else(Vec::new, |system| self.constants(&system, parameters))
     }
 
-    /// The same by name, in double precision.
+    /// These values by name, in double precision.
     pub fn known_constants<S: Scalar>(&self, parameters: &[S]) -> BTreeMap<String, f64> {
         let names = self.form.known.iter().flat_map(|known| known.parameters.keys().cloned());
         names.zip(self.known_parameters(parameters).into_iter().map(Scalar::to_f64)).collect()

@@ -123,7 +123,7 @@ mod tests {
     use crate::random::RngStream;
     use crate::scalar::Dd;
 
-    /// The derivatives of a network with an angle, scales and friction, beside differences of its accelerations in double-double.
+    /// Compares the derivatives of a network with an angle, scales and friction with differences of its accelerations in double-double.
     #[test]
     fn a_network_is_linearized_exactly() {
         let architecture = Architecture {

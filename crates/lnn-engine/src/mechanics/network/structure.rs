@@ -1,4 +1,4 @@
-//! Structures: how a Lagrangian is made of a network's outputs.
+//! Structures: how a network's outputs form a Lagrangian.
 //!
 //! | structure | `L` | by construction |
 //! |---|---|---|
@@ -7,9 +7,8 @@
 //! | constant mass | `v.M v/2 + A(q).v - V(q)`, `M = F F^T` the same everywhere | `M` positive definite and constant, as in Cartesian coordinates |
 //! | metric | `g(q)(v, v)/2`, `g = F diag(1, .., 1, -1) F^T`, space first, time last; without a time `g = F F^T` | the signature of `g` |
 //!
-//! The factor `F` is a triangle or a rectangle, see [`Factor`]. With the time last a triangle is the 3 + 1 split: spatial metric
-//! positive definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; the network of every
-//! structure but the black box sees positions alone.
+//! The factor `F` is a triangle or a rectangle, see [`Factor`]. With the time last a triangle is the 3 + 1 split: spatial metric positive
+//! definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; except for the black box, the network takes only positions.
 
 use super::joint_friction::JointFriction;
 use crate::lagrangian::Description;
@@ -68,7 +67,7 @@ impl Structure {
         }
     }
 
-    /// `true` if one coordinate may be a time.
+    /// `true` if one of the coordinates can be a time.
     fn takes_a_time(self) -> bool {
         match self {
             Self::BlackBox | Self::Metric => true,
@@ -106,7 +105,7 @@ pub struct Form {
     /// Groups of coordinates that enter by direction and distance; files without this key have none.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub radial: Vec<Radial>,
-    /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
+    /// A known Lagrangian, in physical units, that is added; its constants marked `learn` are learned.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub known: Option<Box<Description>>,
     /// Friction of every coordinate individually; files without this key have none.
@@ -117,8 +116,8 @@ pub struct Form {
     pub sizes: Option<Sizes>,
 }
 
-/// Usual sizes of the parts of a model, in scaled coordinates, so that a network learns numbers near 1: in an arm gravity is far above
-/// inertia, and the inertia of the first joint far above that of the last one.
+/// Typical sizes of the parts of a model, in scaled coordinates, so that a network learns numbers near 1: in an arm, gravity far exceeds
+/// inertia, and the inertia of the first joint far exceeds that of the last one.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Sizes {
@@ -139,14 +138,14 @@ impl Sizes {
     }
 }
 
-/// Cartesian coordinates `x` around a centre, seen near and far alike: each enters as `(x_i/R) ln(R/u)` and as `(x_i/R) (u/R)`, `R` the
-/// distance from the centre. At the centre itself there is no feature.
+/// Cartesian coordinates `x` around a centre, resolved equally well near and far: each enters as `(x_i/R) ln(R/u)` and as `(x_i/R) (u/R)`,
+/// `R` the distance from the centre. At the centre itself there is no feature.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Radial {
     /// The coordinates.
     pub coordinates: Vec<usize>,
-    /// Distance `u`, in the unit of the coordinates: that of the nearest states serves well.
+    /// Distance `u`, in the unit of the coordinates: that of the nearest states works well.
     pub unit: f64,
 }
 
@@ -161,7 +160,7 @@ impl Form {
         *self == Self::default()
     }
 
-    /// Checks what the structure asks of the rest, for `n` coordinates.
+    /// Checks that the other settings fit the structure, for `n` coordinates.
     pub(super) fn check(&self, n: usize, time_like: Option<usize>) -> Result<(), String> {
         let (structure, name) = (self.structure, self.structure.name());
         if time_like.is_some() && !structure.takes_a_time() {
@@ -208,7 +207,7 @@ impl Form {
             Structure::BlackBox => self.learn_alpha.then(|| ("alpha", vec![alpha])),
             Structure::ConstantMass => {
                 let mut numbers = vec![0.0; self.factor.numbers(n, false)];
-                // Beside a known part a small mass, though none at all would have no gradient.
+                // Next to a known part the mass is small, but not zero, since it would then have no gradient.
                 let size = if self.known.is_some() { BESIDE_KNOWN } else { 1.0 };
                 self.factor.initial_biases(n, false).iter().for_each(|&(k, number)| numbers[k] = size * number);
                 Some(("mass", numbers))
@@ -217,7 +216,7 @@ impl Form {
         }
     }
 
-    /// `L` of a state, from a network that gives its outputs for input features.
+    /// `L` of a state, from a network that maps input features to outputs.
     pub(super) fn lagrangian<R: Real>(&self, network: impl Fn(&[R]) -> Vec<R>, state: LagrangianInputs<'_, R>) -> R {
         let LagrangianInputs { positions, velocities, constants, alpha, time_like } = state;
         let (n, factor) = (velocities.len(), self.factor);
@@ -269,7 +268,7 @@ pub(super) struct LagrangianInputs<'a, R> {
     pub velocities: &'a [R],
     /// The parameters outside the network.
     pub constants: &'a [R],
-    /// Factor of the added term of a black box that does not learn it.
+    /// Factor of the added term of a black box with an effective mass that is not learned.
     pub alpha: f64,
     /// The coordinate that is a time.
     pub time_like: Option<usize>,
@@ -283,12 +282,12 @@ pub enum Factor {
     /// A lower triangle with the diagonal `softplus(c_ii) + 10^-3`: as many squares as coordinates.
     #[default]
     Triangle,
-    /// A rectangle of numbers of any sign beside `10^-6` times the identity: three squares for every coordinate in space,
-    /// speeds in a space around it, smooth where the diagonal of a triangle has a root. A time has its own shift and lapse.
+    /// A rectangle of numbers of any sign plus `10^-6` times the identity: three squares for every spatial coordinate, the lengths of the
+    /// velocity in a space around it, smooth where the diagonal of a triangle has a root. A time has its own shift and lapse.
     Rectangle,
 }
 
-/// Least diagonal element of a triangular factor, and of a lapse; its square is the least eigenvalue beside a rectangle.
+/// Smallest diagonal element of a triangular factor, and of a lapse; its square is the smallest eigenvalue added to a rectangle.
 const LEAST: f64 = 1e-3;
 
 /// Rows of a rectangle for every coordinate in space: the speeds in a space with room around.
@@ -298,7 +297,7 @@ const ROWS: usize = 3;
 const DIAGONAL: f64 = 1.0;
 
 impl Factor {
-    /// `true` for what files without the key have.
+    /// `true` for the default of files without the key.
     fn is_triangle(&self) -> bool {
         *self == Self::Triangle
     }
@@ -400,7 +399,7 @@ mod tests {
         }
     }
 
-    /// `softplus(x) + 10^-3 = 1`: a unit triangle gives the Minkowski metric, whatever the place of the time.
+    /// `softplus(x) + 10^-3 = 1`: a unit triangle gives the Minkowski metric, whatever the position of the time.
     #[test]
     fn a_unit_triangle_gives_the_minkowski_metric() {
         let one = (0.999_f64).exp_m1().ln();

@@ -20,7 +20,7 @@ struct MotionEquations<'a, S> {
     force: Option<&'a dyn Force<S>>,
     options: &'a Options<S>,
     n: usize,
-    /// `true` if the accelerations depend on the time: by the model, or by a force from outside.
+    /// `true` if the accelerations depend on the time, through the model or through an external force.
     timed: bool,
     /// The model if they do not.
     accelerations: Accelerations<'a, S>,
@@ -40,7 +40,7 @@ impl<S: Scalar> MotionEquations<'_, S> {
         if self.backwards() { self.options.t0 - elapsed } else { self.options.t0 + elapsed }
     }
 
-    /// Derivative of `y = (q, v)` by the elapsed time.
+    /// Derivative of `y = (q, v)` with respect to the elapsed time.
     fn derivative(&mut self, piece: &Piece<S>, elapsed: S, y: &[S], dy: &mut [S]) -> Result<(), StepFailure> {
         let n = self.n;
         StepFailure::check(self.options.domain.as_ref(), y)?;
@@ -119,7 +119,7 @@ pub(super) fn run<S: Integrable>(
             delivered = k + 1;
             on.clear();
             on.extend_from_slice(y);
-            // Between two states it is off by the error of the interpolation.
+            // Between two states it deviates by the error of the interpolation.
             if let Some(manifold) = manifold {
                 let (q, v) = on.split_at_mut(n);
                 valid &= project(manifold, q, v).is_ok();

@@ -59,7 +59,7 @@ impl Between {
             }
             Self::Cubic => {
                 let first = (before as isize - 1).clamp(0, (last - 3).max(0));
-                // Samples at the same time are one node.
+                // Samples at the same time form one node.
                 let is_new = |k: &isize| *k == first || times[*k as usize] > times[*k as usize - 1];
                 let nodes = (first..=(first + 3).min(last)).filter(is_new);
                 let now = times[before] + x * (times[sample] - times[before]);

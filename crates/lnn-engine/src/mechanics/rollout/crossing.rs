@@ -13,7 +13,7 @@ use crate::scalar::{Real, Scalar};
 const PARTS: usize = 8;
 /// Share of a part over which a slope is measured.
 const NEAR: f64 = 1.0 / 256.0;
-/// Divisions by three of a part in which a number may have its extreme beyond zero.
+/// Trisections of a part in which a number may have an extreme beyond zero.
 const DIVISIONS: usize = 40;
 
 /// The state `(q, v)` at a share of a step, from 0 to 1.
@@ -69,9 +69,8 @@ pub(super) fn side<S: Scalar>(value: S) -> Option<bool> {
     }
 }
 
-/// Closes in on the place between `a` and `b` where `f`, above zero or zero at `a`, is below zero: by the method of Oliveira and Takahashi
-/// (2020), with hardly more evaluations than halving takes at worst and few where `f` is smooth. The width left is the tolerance, or
-/// one rounding.
+/// Finds the point between `a` and `b` where `f`, nonnegative at `a`, becomes negative, by the method of Oliveira and Takahashi (2020),
+/// with hardly more evaluations than bisection at worst and few if `f` is smooth. The remaining width is the tolerance, or one rounding.
 fn close_in<S: Scalar, E>(
     (mut a, mut b): (S, S),
     tolerance: S,
@@ -104,10 +103,10 @@ fn close_in<S: Scalar, E>(
 }
 
 impl<'a, S: Scalar> Watcher<'a, S> {
-    /// Of a motion that starts at `(q, v)`; nothing if the options have no events.
+    /// A watcher of a motion that starts at `(q, v)`; none if the options have no events.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] for impacts of a motion that runs backwards.
+    /// [`RolloutError::Invalid`] for impacts in a motion that runs backwards.
     pub(super) fn new(
         model: &'a dyn EulerLagrange<S>,
         (q, v): (&[S], &[S]),
@@ -226,7 +225,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         if above { value } else { -value }
     }
 
-    /// A place between two on the same side where the number is on the other side, if its slopes at both speak for one.
+    /// A point between two on the same side where the number is on the other side, if its slopes at both suggest one.
     fn beyond(
         &mut self,
         event: usize,
@@ -268,8 +267,8 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         close_in(between, tolerance, &mut f).unwrap_or(between)
     }
 
-    /// The same by states that the method itself computes, given the state at a share: first near where `dense` has found the crossing.
-    /// Nothing if there is none.
+    /// Refines a crossing with states that the method itself computes, given the share of the step: first near where `dense` has found it.
+    /// None if there is no crossing.
     ///
     /// # Errors
     /// Those of `exact`.
@@ -312,7 +311,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         Ok(Some(Found { between, ..found }))
     }
 
-    /// The share of a step at which the motion goes on after a crossing: where an impact happens it is still on its side.
+    /// The share of a step at which the motion continues after a crossing: at an impact, it is still on the near side.
     pub(super) fn share(&self, found: &Found<S>) -> S {
         if self.events[found.event].restitution.is_some() { found.between.0 } else { found.between.1 }
     }

@@ -1,9 +1,8 @@
 //! Many motions, integrated individually or in groups that are evaluated together.
 //!
-//! In a group the motions wait for each other, so that the states they all ask for are evaluated as one batch.
-//! Every motion keeps its own steps and error control. Each runs until it needs its model, and waits there for the others;
-//! the last to arrive evaluates all states at once, in the order of the motions. A wide network then reads its weights once
-//! per round instead of once per motion.
+//! In a group the motions wait for each other, so that all requested states are evaluated as one batch. Every motion keeps its own steps
+//! and error control. Each runs until it needs its model, and waits there for the others; the last to arrive evaluates all states at once,
+//! in the order of the motions. A wide network then reads its weights once per round instead of once per motion.
 
 use super::run::adaptive_or_fixed;
 use super::{Force, Integrable, Options, Rollout};
@@ -16,7 +15,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 /// Motions of a group; more gain nothing, since products of eight states at a time are as quick per state as any.
 const GROUP: usize = 8;
 
-/// Where a motion starts, and the force from outside that drives it, if there is one.
+/// The start of a motion, and the external force that drives it, if there is one.
 #[derive(Clone, Copy)]
 pub struct Start<'a, S: Scalar> {
     /// Coordinates, `(n)`.
@@ -59,9 +58,9 @@ pub fn rollout_each<S: Integrable>(
 
 /// Rolls out every start `(q, v)` like [`rollout_many`](super::rollout_many), groups of motions evaluated as one batch.
 ///
-/// The results keep the order of the starts and do not depend on `threads`, the number of groups at work at a time. They
-/// agree with single motions to rounding, not to the bit. Worth its threads for models that take long for one state and
-/// less per state for several, as [`EulerLagrange::prefers_batches`] says.
+/// The results keep the order of the starts and do not depend on `threads`, the number of groups at work at a time. They agree with single
+/// motions to rounding, not to the bit. It pays for models that are slow for one state and faster per state for several, as
+/// [`EulerLagrange::prefers_batches`] says.
 pub fn rollout_together<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[(Vec<S>, Vec<S>)],
@@ -89,7 +88,7 @@ fn roll_group<S: Integrable>(
     options: &Options<S>,
 ) -> Vec<Rollout<S>> {
     let group = Group::new(model, starts.len());
-    // Every member must exist before the first one may think that it is alone.
+    // Every member must exist before the first one could conclude that it is alone.
     let members: Vec<_> = (0..starts.len()).map(|index| group.member(index)).collect();
     std::thread::scope(|scope| {
         let running: Vec<_> = members
@@ -121,7 +120,7 @@ struct Round<S> {
     /// Rounds evaluated so far.
     number: u64,
     active: usize,
-    /// State that each member waits for; none waits any more once it is evaluated.
+    /// State that each member waits for; no member waits once it is evaluated.
     asked: Vec<Option<Asked<S>>>,
     /// Rows of each member in the last batch.
     rows: Vec<Range<usize>>,
@@ -130,7 +129,7 @@ struct Round<S> {
     terms: Terms<S>,
     /// Union of all requests.
     request: Request,
-    /// `true` unless the round failed for a reason that is not that of single states.
+    /// `true` unless the round failed for a reason that does not concern single states.
     has_row_failures: bool,
 }
 
@@ -187,7 +186,7 @@ impl<'a, S: Scalar> Group<'a, S> {
     }
 }
 
-/// One motion's view of the model: asks, waits for the others, and takes its rows.
+/// One motion's view of the model: it makes requests, waits for the others, and takes its rows.
 struct Member<'g, 'a, S: Scalar> {
     group: &'g Group<'a, S>,
     index: usize,
@@ -247,7 +246,7 @@ mod tests {
         (0..count).map(|k| (vec![0.3 * k as f64, 0.2], vec![0.1, -0.1 * k as f64])).collect()
     }
 
-    /// The same motions for every kind of method, to what rounding grows to, and the same bits on any number of threads.
+    /// The motions agree for every kind of method, up to the growth of rounding, and to the bit on any number of threads.
     #[test]
     fn motions_together_are_the_motions_alone() {
         let system = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();

@@ -6,8 +6,8 @@ use crate::lagrangian::MechanicsError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnderflowCause {
-    /// The error estimate asks for ever smaller steps: the motion blows up, is not smooth, or the tolerance is finer
-    /// than the rounding errors of the model.
+    /// The error estimate requires ever smaller steps: the motion blows up, is not smooth, or the tolerance is finer than the rounding
+    /// errors of the model.
     #[error("error test failed, largest |acceleration| {largest_acceleration:.3e}")]
     ErrorTest {
         /// Largest absolute acceleration at the last accepted state.
@@ -61,7 +61,7 @@ pub enum RolloutError {
     /// A start that the constraints do not allow.
     #[error("{distance:.3e} away from the constraints, which `{constraint}` misses most")]
     OffConstraints {
-        /// The constraint that is missed most.
+        /// The most violated constraint.
         constraint: String,
         /// Distance of the start in units of coordinates, or of velocities.
         distance: f64,
@@ -78,8 +78,8 @@ pub enum RolloutError {
         /// Which constraint, from 0.
         constraint: usize,
     },
-    /// A constraint vanishes with its gradient, or comes to depend on the others, on the way: a second branch begins there, and nothing
-    /// says which one the motion takes.
+    /// Along the motion a constraint vanishes with its gradient, or becomes dependent on the others: a second branch begins there, and the
+    /// equations do not determine which one the motion takes.
     #[error(
         "constraint {constraint} has a second branch at t = {at}, where its gradient vanishes or follows from those of the others"
     )]
@@ -132,7 +132,7 @@ pub enum RolloutError {
         state: Vec<f64>,
         /// Iterations made.
         iterations: usize,
-        /// Residual left, relative to the largest momentum.
+        /// Remaining residual, relative to the largest momentum.
         residual: f64,
     },
     /// The allowed number of steps is used up.

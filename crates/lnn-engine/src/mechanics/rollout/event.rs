@@ -1,4 +1,4 @@
-//! Events: zeros along a motion, and what happens there.
+//! Events: zeros along a motion, and their effects.
 
 use crate::lagrangian::GivenEvent;
 use crate::scalar::{Real, Scalar};
@@ -10,7 +10,7 @@ pub(super) trait When<S: Scalar>: Send + Sync {
     /// Its value.
     fn value(&self, t: S, q: &[S], v: &[S]) -> S;
 
-    /// Writes its derivatives by the coordinates, `(n)`, and returns the one by the time: here by differences of the sixth order, whose
+    /// Writes its derivatives by the coordinates, `(n)`, and returns the one by the time; by default by sixth-order differences, whose
     /// error is of the size of `epsilon^(6/7)`.
     fn slopes(&self, t: S, q: &[S], v: &[S], normal: &mut [S]) -> S {
         let mut q = q.to_vec();
@@ -59,12 +59,11 @@ impl<S: Scalar> When<S> for GivenEvent<S> {
     }
 }
 
-/// What a motion is watched for: the zeros of a number `when(t, q, v)`, each of which is recorded, may end the motion, or is an impact.
+/// An event to watch for in a motion: the zeros of a number `when(t, q, v)`. Each zero is recorded, and may end the motion or be an impact.
 ///
-/// Belongs to [`Options::events`](super::Options::events); what was found is in [`Rollout::events`](super::Rollout::events). Zeros are
-/// looked for within every step, by what the integrator knows between its ends, and are met to rounding. The value at the start is no
-/// event. Two zeros so close that the number does not change its sign between eight equidistant places of a step are found if its slope
-/// does.
+/// Belongs to [`Options::events`](super::Options::events); the zeros found are in [`Rollout::events`](super::Rollout::events). They are
+/// sought within every step, through the integrator's interpolation, and determined to rounding. The value at the start is not an event.
+/// Two zeros so close that the number does not change its sign between eight equidistant points of a step are found if its slope does.
 ///
 /// ```
 /// use lnn::lagrangian::{ExpressionLagrangian, Mechanics};
@@ -113,7 +112,7 @@ impl<S: Scalar> Event<S> {
         self.stop_after(1)
     }
 
-    /// The motion ends when the event has happened so many times.
+    /// The motion ends when the event has happened `times` times.
     #[must_use]
     pub fn stop_after(self, times: usize) -> Self {
         Self { last: Some(times.max(1)), ..self }
@@ -124,9 +123,10 @@ impl<S: Scalar> Event<S> {
         self.restitution.is_some()
     }
 
-    /// An impact on the surface `when(t, q) = 0`, which must not depend on velocities. With its normal `n = d when/dq` and the velocity
-    /// `u = n.v + d when/dt` across it, `v` becomes `v - (1 + e) u M^-1 n / (n.M^-1 n)` for the coefficient of restitution `e`, from 0 to
-    /// 1; of a surface at rest it takes the energy `(1 - e^2) u^2 / (2 n.M^-1 n)`. Under constraints, `M^-1` is the inverse along them.
+    /// An impact on the surface `when(t, q) = 0`, which must not depend on velocities. With its normal `n = d when/dq` and the velocity `u
+    /// = n.v + d when/dt` across it, `v` becomes `v - (1 + e) u M^-1 n / (n.M^-1 n)` for the coefficient of restitution `e`, from 0 to 1;
+    /// at a surface at rest the motion loses the energy `(1 - e^2) u^2 / (2 n.M^-1 n)`. Under constraints, `M^-1` is the inverse along
+    /// them.
     #[must_use]
     pub fn restitution(self, e: S) -> Self {
         Self { restitution: Some(Arc::new(move |_: S, _: &[S], _: &[S]| e)), ..self }
@@ -185,7 +185,7 @@ pub struct Occurrence<S> {
     pub q: Vec<S>,
     /// Velocities, after an impact, `(n)`.
     pub v: Vec<S>,
-    /// What an impact changed.
+    /// The changes by an impact.
     pub impact: Option<Impact<S>>,
 }
 
@@ -196,7 +196,7 @@ pub struct Impact<S> {
     pub v_before: Vec<S>,
     /// Energy `p.v - L` before it, in the unit of `L`.
     pub energy_before: S,
-    /// The same after it.
+    /// The energy after the impact.
     pub energy_after: S,
 }
 

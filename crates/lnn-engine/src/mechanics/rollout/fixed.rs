@@ -73,7 +73,7 @@ impl<S: Scalar> Stepper<S> {
 /// Progress of a roll-out.
 struct Position<'a, S> {
     state: PhasePoint<S>,
-    /// A velocity near that of the state.
+    /// A velocity close to that of the state.
     near: Vec<S>,
     /// Elapsed time of the sample or break before, and steps of size `h` since.
     since: S,
@@ -83,7 +83,7 @@ struct Position<'a, S> {
     regular: Option<Regularity<'a, S>>,
 }
 
-/// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
+/// Integrates from `(q, v)` to the end of the options, or as far as possible; arguments have been checked.
 pub(super) fn run<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -124,7 +124,7 @@ pub(super) fn run<S: Scalar>(
     (statistics, stop)
 }
 
-/// What receives counts, samples, nodes and events.
+/// Receivers of counts, samples, nodes and events.
 type AllReceivers<'r, 'a, 'w, S> =
     (&'r mut StepCounts, &'r mut Keep<'a, S>, Option<&'r mut Nodes<'a, S>>, Option<Watcher<'w, S>>);
 
@@ -188,7 +188,7 @@ fn advance<'a, S: Scalar>(
     None
 }
 
-/// What receives counts, nodes and events of steps.
+/// Receivers of counts, nodes and events of steps.
 type Counted<'r, 'n, 'w, S> = (&'r mut StepCounts, Option<&'r mut Nodes<'n, S>>, Option<&'r mut Watcher<'w, S>>);
 
 /// Steps over a distance in elapsed time within one piece, on from events; times closer than `blur` are one.
@@ -215,7 +215,7 @@ fn leg<'a, S: Scalar>(
 enum Stretch<S> {
     /// Over the whole distance.
     Whole,
-    /// Until an event at an elapsed time, from which the motion goes on.
+    /// Until an event at an elapsed time, from which the motion continues.
     Until(S),
     /// Until an event at a time and state that ends the motion.
     Ended(S, Vec<S>),
@@ -286,8 +286,8 @@ fn stretch<'a, S: Scalar>(
 /// An event, its share of the step and the state there.
 type Interruption<S> = (Found<S>, S, Vec<S>);
 
-/// The first event that interrupts the last step, made from `before`, with its share of the step and the state there, to which the motion is
-/// taken back. Those before it that do not interrupt it are marked.
+/// The first event that interrupts the last step, which began at `before`, with its share of the step and the state there, to which the
+/// motion is reset. Earlier events that do not interrupt it are marked.
 fn interruption<S: Scalar>(
     phase: &mut PhaseSpace<'_, S>,
     stepper: &mut Stepper<S>,
@@ -317,7 +317,7 @@ fn interruption<S: Scalar>(
     let time = |share: S| t + share * signed;
     let (mut from, one) = (zero, <S as Real>::one());
     while from < one {
-        // From the last state that is known.
+        // From the last known state.
         let rest = one - from;
         let mut dense = |share: S, state: &mut [S]| {
             for i in 0..n {
@@ -371,7 +371,7 @@ fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Re
 }
 
 impl<'a, S: Scalar> Position<'a, S> {
-    /// Lets an event happen at a time, an elapsed time and a state, and goes on from there.
+    /// Applies an event at a time, an elapsed time and a state, and continues from there.
     fn strike(
         &mut self,
         phase: &mut PhaseSpace<'a, S>,
@@ -415,7 +415,7 @@ impl<'a, S: Scalar> Position<'a, S> {
         if backwards { options.t0 - elapsed } else { options.t0 + elapsed }
     }
 
-    /// The error of a failure just ahead; the velocity of the state is the nearest known if it cannot be had.
+    /// The error of a failure just ahead; if the velocity of the state cannot be computed, the nearest known one is used.
     fn failed(
         &self,
         phase: &mut PhaseSpace<'_, S>,

@@ -23,7 +23,7 @@ pub struct FlowJacobian<S> {
     pub end: Vec<S>,
     /// `dy(T)/dy(0)`, `(2 n, 2 n)` row by row.
     pub by_start: Vec<S>,
-    /// `dy(T)/dF` by a generalized force that is constant in time, `(2 n, n)` row by row.
+    /// Derivatives of `y(T)` by a generalized force that is constant in time, `(2 n, n)` row by row.
     pub by_force: Vec<S>,
 }
 
@@ -32,14 +32,14 @@ pub struct FlowJacobian<S> {
 pub struct FlowGradient<S> {
     /// `y(T)`, `2 n` numbers.
     pub end: Vec<S>,
-    /// By the start, `2 n` numbers.
+    /// Derivatives by the start, `2 n` numbers.
     pub by_start: Vec<S>,
-    /// By the parameters, as in [`Gradient::by_parameters`](crate::lagrangian::Gradient::by_parameters).
+    /// Derivatives by the parameters, as in [`Gradient::by_parameters`](crate::lagrangian::Gradient::by_parameters).
     pub by_parameters: Vec<S>,
 }
 
-/// The map from the start of a motion to its end, by a fixed number of steps of Dormand and Prince's method of order 5, with derivatives that
-/// are those of the steps themselves: what a fit, a filter, or a controller needs.
+/// The map from the start of a motion to its end, by a fixed number of Dormand-Prince steps of order 5, with the exact derivatives of these
+/// steps, for a fit, a filter, or a controller.
 ///
 /// ```
 /// use lnn::lagrangian::build;
@@ -69,7 +69,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
     /// The end of the motion from `(q, v)`, under a generalized force that is constant in time if one is given.
     ///
     /// # Errors
-    /// Of a state that cannot be evaluated; another length of `q`, `v` or the force.
+    /// A state that cannot be evaluated; a wrong length of `q`, `v` or the force.
     pub fn end(&self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<Vec<S>, MechanicsError> {
         let mut y = self.start(q, v)?;
         let Some(force) = force else {
@@ -91,7 +91,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
     /// The end and all its derivatives by the start and by a force, which is 0 if not given.
     ///
     /// # Errors
-    /// As of [`Flow::end`].
+    /// Those of [`Flow::end`].
     pub fn jacobian(&self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<FlowJacobian<S>, MechanicsError> {
         let (n, zero, one) = (self.model.coordinates(), <S as Real>::zero(), <S as Real>::one());
         let mut y = self.start(q, v)?;
@@ -129,11 +129,11 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok(FlowJacobian { end: y, by_start: part(0..2 * n), by_force: part(2 * n..width) })
     }
 
-    /// The end and the derivatives of `w.y(T)`, `w` of `2 n` numbers, by the start and by all parameters: one sweep back over the states
-    /// of the steps, which are kept.
+    /// The end and the derivatives of `w.y(T)`, with `w` of `2 n` numbers, by the start and by all parameters: one backward sweep over the
+    /// stored states of the steps.
     ///
     /// # Errors
-    /// As of [`Flow::end`]; another length of `w`.
+    /// Those of [`Flow::end`]; a wrong length of `w`.
     pub fn gradient(&self, q: &[S], v: &[S], w: &[S]) -> Result<FlowGradient<S>, MechanicsError> {
         let (n, zero) = (self.model.coordinates(), <S as Real>::zero());
         if w.len() != 2 * n {
@@ -245,7 +245,7 @@ mod tests {
         configured.build().unwrap()
     }
 
-    /// Derivatives of the steps, beside differences of the same steps in double-double.
+    /// Compares derivatives of the steps with differences of the same steps in double-double.
     #[test]
     fn derivatives_are_those_of_the_steps() {
         let (q, v, w) = ([1.1, -0.4], [0.3, 0.8], [0.4, -1.0, 0.7, 0.2]);

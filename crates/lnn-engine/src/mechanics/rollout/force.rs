@@ -1,4 +1,4 @@
-//! Forces from outside: what drives a motion beside its own Lagrangian and friction.
+//! External forces, which drive a motion in addition to its own Lagrangian and friction.
 
 use super::pieces::{Ending, hand_over};
 use super::run::{adaptive_or_fixed, fixed};
@@ -9,16 +9,16 @@ use crate::scalar::{Real, Scalar};
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
-/// Generalized force `Q(t, q, v)` from outside, added to the right-hand side of `M a = g - c + Q`.
+/// External generalized force `Q(t, q, v)`, added to the right-hand side of `M a = g - c + Q`.
 ///
-/// Closures `Fn(t, q, v, &mut force)` are forces; [`SampledForce`] is one that was recorded.
+/// Closures `Fn(t, q, v, &mut force)` are forces; [`SampledForce`] is a recorded one.
 pub trait Force<S: Scalar>: Send + Sync {
     /// Writes `Q` at time `t` and state `(q, v)` into `force`; all three have `n` numbers. `Q_i` is conjugate to `q_i`: N
     /// for a length in m, N m for an angle in rad, in the unit of `L` per unit of the coordinate.
     fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]);
 
-    /// Times, ascending, at which the force is not smooth. Integrators end a step at each of them, so that their order
-    /// holds; the force may jump there: it is asked just before such a time by the step that ends, at it by the next.
+    /// Times, ascending, at which the force is not smooth. Integrators end a step at each of them, so that their order holds. The force may
+    /// jump there: the step that ends evaluates it just before such a time, the next step at it.
     fn breaks(&self) -> &[S] {
         &[]
     }
@@ -63,13 +63,13 @@ impl<S: Scalar> SampledForce<S> {
         Ok(Self { n, times, values, between: Between::default() })
     }
 
-    /// The same values, joined in another way.
+    /// The same values with another interpolation.
     #[must_use]
     pub fn between(self, between: Between) -> Self {
         Self { between, ..self }
     }
 
-    /// The same force at all times.
+    /// A constant force.
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] for no numbers or numbers that are not finite.
@@ -163,7 +163,7 @@ pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> 
     pieces
 }
 
-/// A model and a force `Q(t, q, v)` that acts on it from outside, beside its own friction: `M a = g - c - dD/dv + Q`.
+/// A model with an external force `Q(t, q, v)` in addition to its own friction: `M a = g - c - dD/dv + Q`.
 ///
 /// ```
 /// use lnn::lagrangian::configure;

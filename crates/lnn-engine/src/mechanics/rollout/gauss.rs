@@ -1,20 +1,18 @@
 //! Gauss collocation on Hamilton's equations: implicit midpoint (order 2), two stages (order 4), three (order 6).
 //!
-//! In `(q, p)` these methods are symplectic for every regular Lagrangian, separable or not: no drift by theory. On
-//! `(q, v)` they are only symmetric. Measured over T = 10,000 with order 4, h = 0.1 and 0.05, both are bounded: double
-//! pendulum 2.8e-4 and 1.4e-5 in either; a Lagrangian with magnetic terms 3.7e-6 and 2.4e-7 on `(q, v)`, 2.4e-6 and
-//! 1.5e-7 on `(q, p)`. The second is chosen for what is proven, and because a stage then needs `p` and `dL/dq` only, no
-//! acceleration. Nor does it need a Hamiltonian: with stage velocities `V_i` as
-//! the unknowns, `Q_i = q + h sum_j a_ij V_j`, and
+//! In `(q, p)` these methods are symplectic for every regular Lagrangian, separable or not, and have no drift in theory. On `(q, v)` they
+//! are only symmetric. Measured over T = 10,000 with order 4, h = 0.1 and 0.05, both are bounded: double pendulum 2.8e-4 and 1.4e-5 in
+//! either; a Lagrangian with magnetic terms 3.7e-6 and 2.4e-7 on `(q, v)`, 2.4e-6 and 1.5e-7 on `(q, p)`. The second is used because its
+//! behaviour is proven, and because a stage then needs only `p` and `dL/dq`, no acceleration. Nor does it need a Hamiltonian: with stage
+//! velocities `V_i` as the unknowns, `Q_i = q + h sum_j a_ij V_j`, and
 //!
 //! ```text
 //! dL/dv(Q_i, V_i) = p + h sum_j a_ij dL/dq(Q_j, V_j).
 //! ```
 //!
-//! Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3 and VI.4. The coefficients are
-//! used as `a_ij = m_ij b_j` with `m_ij + m_ji = 1` exactly in floating point, so that rounding them does not spoil
-//! symplecticity (Antonana, Makazaga and Murua 2017). Friction and forces from outside, `Q`, add to `dL/dq`: the order
-//! stays, and there is no symplectic form to keep.
+//! Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3 and VI.4. The coefficients are used as `a_ij = m_ij
+//! b_j` with `m_ij + m_ji = 1` exactly in floating point, so that rounding them does not spoil symplecticity (Antonana, Makazaga and Murua
+//! 2017). Friction and external forces, `Q`, add to `dL/dq`: the order stays, and there is no symplectic form to preserve.
 
 use super::StepFailure;
 use super::phase::{Defect, Derivatives, PhasePoint, PhaseSpace};
@@ -80,7 +78,7 @@ pub(super) fn lagrange<S: Scalar>(nodes: &[S], at: &[S]) -> Vec<S> {
     weights
 }
 
-/// The equations of one step, and what their last evaluation left.
+/// The equations of one step, and the results of their last evaluation.
 struct Stages<'a, S> {
     tableau: &'a Tableau<S>,
     state: &'a PhasePoint<S>,
@@ -169,7 +167,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
     }
 }
 
-/// Gauss collocation with what it keeps from step to step.
+/// Gauss collocation with the data that it keeps from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Gauss<S> {
     tableau: Tableau<S>,
@@ -220,7 +218,7 @@ impl<S: Scalar> Gauss<S> {
         }
     }
 
-    /// One step of size `h`; `velocity` is one near the start before and near the end after it.
+    /// One step of size `h`; `velocity` is close to the velocity at the start before the step and at the end after it.
     pub(super) fn step(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,

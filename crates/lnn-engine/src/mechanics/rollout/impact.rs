@@ -1,4 +1,4 @@
-//! What a motion does where an event happens: it is recorded, ends, or its velocities change by an impact.
+//! Effects of an event on a motion: it is recorded, ends the motion, or changes its velocities by an impact.
 
 use super::crossing::{Dense, Found, Watcher, side};
 use super::event::{Event, Impact, Occurrence, When};
@@ -17,7 +17,7 @@ pub(super) struct Flights<S> {
     /// Time of the last one, and the time between it and the one before.
     last: Option<S>,
     between: Option<S>,
-    /// Place of the first one of those that follow each other sooner than time resolves, and their number.
+    /// Index of the first of the events that follow each other faster than time resolves, and their number.
     since: Option<usize>,
     quick: usize,
 }
@@ -30,8 +30,8 @@ impl<S: Scalar> Watcher<'_, S> {
         restitution.is_some() || ends || self.happened.len() >= self.most
     }
 
-    /// The first event within a step that interrupts the motion, and its share of the step. Those before it are marked, their states brought to
-    /// the constraints.
+    /// The first event within a step that interrupts the motion, and its share of the step. Earlier ones are marked, with their states
+    /// projected onto the constraints.
     pub(super) fn interruption(
         &mut self,
         manifold: Option<&dyn Manifold<S>>,
@@ -55,17 +55,17 @@ impl<S: Scalar> Watcher<'_, S> {
         None
     }
 
-    /// Lets a crossing happen that does not interrupt the motion, at a state that is recorded as `shown`.
+    /// Applies a crossing that does not interrupt the motion, at a state that is recorded as `shown`.
     pub(super) fn mark(&mut self, found: Found<S>, t: S, [state, shown]: [&[S]; 2]) {
         self.record(found.event, t, shown, None);
         self.follow(t, state);
         self.goes_on(found, !found.above);
     }
 
-    /// Lets a crossing happen at a time and state `(q, v)`, whose velocities an impact changes.
+    /// Applies a crossing at a time and state `(q, v)`, whose velocities an impact changes.
     ///
     /// # Errors
-    /// [`RolloutError::Event`] of an impact that is not determined, or of events that accumulate; those of the model.
+    /// [`RolloutError::Event`] for an undetermined impact, or for events that accumulate; those of the model.
     pub(super) fn strike(&mut self, found: Found<S>, t: S, state: &mut [S]) -> Result<(), RolloutError> {
         let Found { event, above, .. } = found;
         if self.happened.len() >= self.most {
@@ -89,7 +89,7 @@ impl<S: Scalar> Watcher<'_, S> {
         self.next.clone_from(&self.sides);
     }
 
-    /// Takes over the sides of a state. An event that is to be caught keeps its own and is found at the start of the next step.
+    /// Updates the sides to those of a state. An event that is still to be found keeps its side and is found at the start of the next step.
     pub(super) fn follow(&mut self, t: S, state: &[S]) {
         let (q, v) = state.split_at(self.normal.len());
         for event in 0..self.events.len() {
@@ -170,12 +170,12 @@ impl<S: Scalar> Watcher<'_, S> {
         Ok((energy, terms.acceleration.clone()))
     }
 
-    /// Says when the impacts of an event accumulate, if they do; those that time does not resolve are forgotten then.
+    /// Reports when the impacts of an event accumulate, if they do; impacts that time does not resolve are then discarded.
     fn accumulates(&mut self, event: usize, t: S) -> Option<String> {
         let Flights { last, between, since, quick } = &mut self.flights[event];
         let now = t - last.replace(t)?;
         let ratio = between.replace(now).filter(|before| *before > now).map(|before| now / before);
-        // Beside a surface, distances grow with the square of time.
+        // Near a surface, distances grow with the square of time.
         if now > Real::sqrt(S::epsilon()) * S::max(t.abs(), self.dt) {
             (*since, *quick) = (None, 0);
             return None;

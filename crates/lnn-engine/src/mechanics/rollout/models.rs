@@ -5,7 +5,7 @@ use crate::scalar::{Real, Scalar};
 
 type Force = fn(&[f64], &[f64], &mut [f64]) -> Result<f64, MechanicsError>;
 
-/// A system with a diagonal, constant mass matrix 1 given by its potential, acceleration and what may fail.
+/// A system with the constant mass matrix 1, given by its potential, acceleration and possible failures.
 pub(crate) struct Toy {
     n: usize,
     /// `(q, v) -> (acceleration, potential)`.

@@ -1,6 +1,6 @@
 //! Adapter to `ode_solvers`: the only file that names it.
 //!
-//! Its traps, and what is done about them:
+//! Its pitfalls, and their remedies:
 //! - A right-hand side cannot fail: the first error of an attempt is latched and `NaN` returned. An attempted step with
 //!   a failed stage is then rejected and tried shorter; the error ends the integration only once steps underflow.
 //! - Its dense output extrapolates the last sample, panics or hangs for some intervals, and is lost for failures: only
@@ -30,7 +30,7 @@ pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 /// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
 pub(super) type StepNodes<'a, S> = dyn FnMut(S, S, &[S]) + 'a;
 
-/// Looks through a step for events, by its elapsed time, size and dense output; says at which share of it the first one happens.
+/// Scans a step for events, given its elapsed time, size and dense output; returns the share of it at which the first one happens.
 pub(super) type Scan<'a, S> = dyn FnMut(S, S, &mut Dense<'_, S>) -> Option<S> + 'a;
 
 /// The receivers of an integration's results.
@@ -40,7 +40,7 @@ pub(super) type Receivers<'a, 'f, S> =
 /// Parts of a step that have three nodes of Gauss each.
 const PANELS: usize = 2;
 
-/// Brings the state at the end of a step of some length to where it belongs and says how far that is, in units of the tolerance.
+/// Projects the state at the end of a step of some length onto its manifold, and returns the distance in units of the tolerance.
 pub(super) type Project<'a, S, E> = dyn FnMut(S, &mut [S]) -> Result<S, E> + 'a;
 
 /// The methods offered here.
@@ -71,7 +71,7 @@ pub struct Integration<'a, S> {
 pub enum EarlyEnd<E> {
     /// The right-hand side fails ahead, however short the step.
     Failed(E),
-    /// The error estimate asks for steps that do not advance the time.
+    /// The error estimate requires steps that do not advance the time.
     Underflow,
     /// No attempts left.
     TooManySteps,
@@ -95,7 +95,7 @@ pub struct Ran<S, E> {
 /// ([`rollout_fixed`](super::rollout_fixed)).
 pub trait Integrable: Integrates {}
 
-/// What is compiled in this crate, once for each of these number types.
+/// Code that is compiled in this crate, once for each of these number types.
 pub trait Integrates: Scalar {
     /// A motion from its start, sample by sample.
     fn roll_out(
@@ -239,7 +239,7 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         }
     }
 
-    /// Rows of `recent`: what one accepted step calls.
+    /// Rows of `recent`: the calls of one accepted step.
     fn ring(&self) -> usize {
         stages(self.task.method) + closing_calls(self.task.method)
     }
@@ -303,8 +303,8 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         self.stopped || projected.is_some_and(|(drift, moved)| self.leaves(x, h, drift, moved))
     }
 
-    /// Goes on from the projection of a state that has drifted by more than the tolerance; `true` stops the solver, which does not know of
-    /// it.
+    /// Continues from the projection of a state that has drifted by more than the tolerance; `true` stops the solver, which does not know
+    /// about it.
     fn leaves(&mut self, x: S, h: S, drift: S, moved: Vec<S>) -> bool {
         if drift <= <S as Real>::one() || self.next >= self.task.samples.len() {
             return false;
@@ -319,7 +319,7 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         true
     }
 
-    /// Ends the step that the interpolant stands for where an event happens within it, if one does.
+    /// Ends the interpolant's step at an event within it, if there is one.
     fn ends_at_event(&mut self, h: S) -> bool {
         let (Some(scan), interpolant) = (&mut self.scan, &self.interpolant) else { return false };
         let Some(share) = scan(self.elapsed, h, &mut |share, state| interpolant.evaluate(share, state)) else {
@@ -337,7 +337,7 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
         true
     }
 
-    /// Hands over the nodes of a quadrature within the first share of the step that the interpolant stands for.
+    /// Passes on the nodes of a quadrature within the first share of the interpolant's step.
     fn visit_nodes(&mut self, h: S, whole: S) {
         let Some(nodes) = &mut self.nodes else { return };
         let part = S::ratio(1, PANELS as i32);

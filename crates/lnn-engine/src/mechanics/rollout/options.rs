@@ -92,7 +92,7 @@ impl<S: Scalar> Domain<S> {
         })
     }
 
-    /// Bounded component of `(q, v)` nearest to a bound, relative to its width, with the bounds.
+    /// The bounded component of `(q, v)` closest to a bound, relative to its width, with the bounds.
     pub(super) fn tightest(&self, state: &[S]) -> Option<(usize, S, S)> {
         let mut best: Option<(S, (usize, S, S))> = None;
         for (index, (bounds, &x)) in self.bounds.iter().zip(state).enumerate() {
@@ -136,8 +136,8 @@ pub struct Options<S> {
     pub rtol: S,
     /// Absolute tolerance in the unit of each component.
     pub atol: S,
-    /// Longest step of the structure-preserving methods: each distance of samples is cut into equal steps not above
-    /// it. `None`: one step per sample. Adaptive methods choose their own.
+    /// Longest step of the structure-preserving methods: the interval between samples is divided into equal steps no longer than it.
+    /// `None`: one step per sample. Adaptive methods choose their own.
     pub step: Option<S>,
     /// Attempts allowed.
     pub max_steps: usize,

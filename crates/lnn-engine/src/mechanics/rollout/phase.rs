@@ -1,5 +1,5 @@
-//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq + Q` as functions of `(q, v)`, and the way back from `p` to `v`;
-//! `Q` is friction, zero for a model that conserves its energy, and a force from outside, if one acts.
+//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq + Q` as functions of `(q, v)`, and the inverse from `p` to `v`; `Q` is friction,
+//! zero for a model that conserves its energy, and an external force, if one acts.
 
 use super::force::Piece;
 use super::{Force, StepFailure};
@@ -10,7 +10,7 @@ use crate::scalar::{Real, Scalar};
 /// Newton steps from `p` to `v`.
 const MAX_SWEEPS: usize = 50;
 
-/// A model, the buffers of its evaluation, and what was evaluated.
+/// A model, the buffers of its evaluation, and the results.
 pub(super) struct PhaseSpace<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     /// Number of coordinates.
@@ -23,7 +23,7 @@ pub(super) struct PhaseSpace<'a, S> {
     pub(super) iterations: usize,
     points: Vec<S>,
     external: Vec<S>,
-    /// `true` if forces beside those of `L` act.
+    /// `true` if there are forces that are not in `L`.
     damped: bool,
     /// `true` if the model depends on the time.
     timed: bool,
@@ -63,7 +63,7 @@ impl<S: Scalar> Defect<S> {
         Self { relative: S::infinity(), overall: S::infinity() }
     }
 
-    /// Of residuals `(rows, n)`, the terms of component `i` being as large as `size(i)`.
+    /// Defect of residuals `(rows, n)`, where the terms of component `i` are as large as `size(i)`.
     pub(super) fn of(n: usize, residual: &[S], size: impl Fn(usize) -> S) -> Self {
         let zero = <S as Real>::zero();
         let most = (0..n).map(&size).fold(zero, |most, size| S::max(most, size));
@@ -148,7 +148,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         self.piece.map_or(t, |piece| piece.time(t))
     }
 
-    /// Adds the force from outside to that of the model; `after` as of [`PhaseSpace::time`].
+    /// Adds the external force to that of the model; for `after` see [`PhaseSpace::time`].
     fn add_external(&mut self, q: &[S], v: &[S], after: &[S]) -> Result<(), StepFailure> {
         let Some(force) = self.force.filter(|_| self.piece.is_some()) else { return Ok(()) };
         let (n, zero) = (self.n, <S as Real>::zero());
@@ -165,7 +165,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         Ok(())
     }
 
-    /// Evaluates states; `after` says how far behind the start of the step they lie, see [`PhaseSpace::time`].
+    /// Evaluates states; `after` is their time since the start of the step, see [`PhaseSpace::time`].
     fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), StepFailure> {
         if q.iter().chain(v).any(|x| !x.is_finite()) {
             return Err(StepFailure::State);
@@ -223,9 +223,9 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         Ok(self.terms.momentum.clone())
     }
 
-    /// `M` as the model gives it, derivatives along `q`, and of `Q` along `v`, by forward differences over `sqrt(eps)`:
-    /// enough for an iteration matrix. The differences are one batch of `n + 1` states, `2n + 1` with friction or a force
-    /// from outside, `after` the start of the step.
+    /// `M` as the model gives it; its derivatives along `q`, and those of `Q` along `v`, by forward differences over `sqrt(eps)`, which
+    /// suffice for an iteration matrix. The differences are one batch of `n + 1` states, or `2n + 1` with friction or an external force, at
+    /// the time `after` since the start of the step.
     pub(super) fn derivatives(
         &mut self,
         q: &[S],
@@ -258,7 +258,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             matrix.clear();
             matrix.resize(n * n, zero);
             for j in 0..n {
-                // The shift as it was rounded.
+                // The shift after rounding.
                 let width = points[(j + 1) * n + j] - q[j];
                 for i in 0..n {
                     if outcome.is_ok() {
@@ -376,10 +376,10 @@ pub(super) fn singular(error: LinalgError) -> StepFailure {
     })
 }
 
-/// A vector that is updated by small increments; what an update rounds away is added to the next one.
+/// A vector that is updated by small increments; the rounding error of an update is added to the next one.
 ///
-/// The value is `high + low` (Kahan 1965, Moller 1965): rounding errors of the updates do not accumulate, so that what
-/// is left in a long run are the errors of the increments themselves, a factor `h` smaller.
+/// The value is `high + low` (Kahan 1965, Moller 1965): rounding errors of the updates do not accumulate, so that only the errors of the
+/// increments themselves remain in a long run, a factor `h` smaller.
 #[derive(Clone, Debug)]
 pub(super) struct Compensated<S> {
     /// Rounded value.

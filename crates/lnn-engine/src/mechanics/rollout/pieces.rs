@@ -14,25 +14,24 @@ use std::ops::ControlFlow;
 /// End of a roll-out in pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending<S> {
-    /// Samples handed over, all valid, whatever `stop` says.
+    /// Number of samples handed over, all valid, whatever `stop` says.
     pub samples: usize,
     /// Work done.
     pub statistics: StepCounts,
-    /// Why it ended before `t_end`; nothing where an event that is to end it did.
+    /// Why it ended before `t_end`; none if an event ended it as requested.
     pub stop: Option<RolloutError>,
     /// The events that happened, in the order of time.
     pub events: Vec<Occurrence<S>>,
-    /// Where the energy went, of a motion with friction, impacts or a force if options ask for energies. Work and friction are integrated beside the
-    /// motion, step by step, whatever the distance of the samples.
+    /// The energy balance of a motion with friction, impacts or a force, if the options request energies. Work and friction are integrated
+    /// along the motion, step by step, whatever the spacing of the samples.
     pub balance: Option<EnergyBalance<S>>,
 }
 
-/// [`rollout`](super::rollout) with the samples handed to `take` in pieces of at most 256, in order, with the energies if
-/// options ask for them.
+/// [`rollout`](super::rollout) with the samples handed to `take` in pieces of at most 256, in order, with the energies if the options
+/// request them.
 ///
-/// The pieces one behind the other are the trajectory of [`rollout`](super::rollout), bit for bit; memory does not grow with
-/// their number. When `take` breaks off, the motion ends with [`RolloutError::Stopped`]. A motion that is refused hands
-/// over nothing.
+/// The concatenated pieces are the trajectory of [`rollout`](super::rollout), bit for bit; memory does not grow with their number. When
+/// `take` breaks, the motion ends with [`RolloutError::Stopped`]. A refused motion hands over nothing.
 pub fn rollout_in_pieces<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -43,7 +42,7 @@ pub fn rollout_in_pieces<S: Integrable>(
     hand_over(model, None, (q, v), options, take)
 }
 
-/// The same, perhaps under a force from outside.
+/// As [`rollout_in_pieces`], possibly under an external force.
 pub(super) fn hand_over<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -186,13 +185,12 @@ impl<S: Scalar> EnergyBalance<S> {
 }
 
 impl<S: Scalar> Trajectory<S> {
-    /// Energy balance of the motion by `model`; under a force from outside it is
-    /// [`Driven::energy_balance`](super::Driven::energy_balance).
+    /// Energy balance of the motion by `model`; with an external force use [`Driven::energy_balance`](super::Driven::energy_balance).
     ///
-    /// Where a motion is integrated anew, [`rollout_in_pieces`] has the balance of its steps. Here, of any samples, the power is integrated
-    /// through the polynomials of degree 5 through neighbouring samples, at the distances they
-    /// have: the error is of order 6 in the distance of samples, as far as the power is smooth. The work of a force is
-    /// integrated from the force itself along states so interpolated, between its breaks.
+    /// When a motion is integrated, [`rollout_in_pieces`] gives the balance of its steps. Here the samples are arbitrary, and the power is
+    /// integrated through polynomials of degree 5 through neighbouring samples, at their actual spacing: the error is of order 6 in the
+    /// spacing if the power is smooth. The work of a force is integrated from the force itself along states interpolated in this way,
+    /// between its breaks.
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] if there is no sample, or a sample at which the model cannot be evaluated.
@@ -201,7 +199,7 @@ impl<S: Scalar> Trajectory<S> {
     }
 }
 
-/// First of the samples whose polynomial stands for the interval before sample `k`, of `window` samples among `count`.
+/// Index of the first of `window` samples, among `count`, whose polynomial covers the interval before sample `k`.
 fn stencil(k: usize, count: usize, window: usize) -> usize {
     k.saturating_sub(SAMPLES / 2).min(count - window)
 }
@@ -241,7 +239,7 @@ fn work<S: Scalar>(trajectory: &Trajectory<S>, force: &dyn Force<S>) -> S {
     sum
 }
 
-/// Of ascending breaks those that may lie in the interval between two times.
+/// The breaks, in ascending order, that may lie in the interval between two times.
 fn near<S: Scalar>(breaks: &[S], a: S, b: S) -> &[S] {
     let (low, high) = (S::min(a, b), S::max(a, b));
     let first = breaks.partition_point(|t| *t < low);

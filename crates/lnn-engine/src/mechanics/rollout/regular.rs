@@ -1,5 +1,5 @@
-//! Constraints along a motion: where a row vanishes or comes to depend on the others, a second branch begins, and nothing says which of
-//! the two the motion takes.
+//! Constraints along a motion: where a row vanishes or becomes dependent on the others, a second branch begins, and the equations do not
+//! determine which of the two the motion takes.
 
 use super::StepFailure;
 use super::dense::cubic;
@@ -8,17 +8,16 @@ use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 
-/// The smallest singular value of the rows over the largest that it had, below which it counts as 0. Where it passes through 0 the minimum
-/// is met to the rounding of the search, far below; a motion that keeps away from its branches by a thousandth has one way to go.
+/// The smallest singular value of the rows, over the largest value that it had, below which it counts as 0. Where it passes through 0, the
+/// search finds a minimum far below this; a motion that stays away from its branches by a thousandth is unique.
 const BRANCH: f64 = 1e-3;
 /// A step is looked into if a row turns by more than this cosine, or the singular value is below this share of the largest.
 const LOOKED_INTO: (f64, f64) = (0.9, 0.3);
-/// Parts of a step between which rows are compared: adaptive methods take steps in which wheels turn around.
+/// Parts of a step between which rows are compared: adaptive methods take steps in which wheels make whole turns.
 const PARTS: usize = 8;
-/// Halvings of an interval around the smallest singular value: of one that is to be known to rounding, and of one that others are compared
-/// with.
+/// Halvings of an interval around the smallest singular value: for a value needed to rounding, and for one used in comparisons.
 const HALVINGS: (usize, usize) = (52, 12);
-/// Places of a step that are examined first, and divisions of the interval around the least of them.
+/// Points of a step that are examined first, and divisions of the interval around the smallest of them.
 const PLACES: usize = 16;
 const DIVISIONS: usize = 40;
 
@@ -34,10 +33,10 @@ pub(super) struct Regularity<'a, S> {
     q: Vec<S>,
     v: Vec<S>,
     matrix: Vec<S>,
-    /// Where the rows begin in the matrix, and where the last one ends.
+    /// Offsets of the rows in the matrix, and the end of the last one.
     starts: Vec<usize>,
     rows: ManifoldRows<S>,
-    /// Programs that know the pattern of the rows, whose matrix then holds what is not zero.
+    /// Programs that use the pattern of the rows; the matrix then holds only the nonzero elements.
     sparse: Option<Sparse<S>>,
 }
 
@@ -81,11 +80,11 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         known
     }
 
-    /// The rows: all of their elements, or those that are not zero.
+    /// The rows: all of their elements, or only the nonzero ones.
     fn matrix_at(&mut self, q: &[S]) -> Vec<S> {
         if let Some(sparse) = &mut self.sparse {
             let mut matrix = vec![S::nan(); self.starts.last().copied().unwrap_or(0)];
-            // Of fields of these sizes it cannot fail.
+            // Fields of these sizes cannot fail.
             let _ = sparse.elements.evaluate(1, &[q, &self.v], &[], &mut [&mut matrix]);
             return matrix;
         }
@@ -100,13 +99,13 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         }
     }
 
-    /// One over the sizes.
+    /// Reciprocals of the sizes.
     fn units(&self) -> Vec<S> {
         let zero = <S as Real>::zero();
         self.sizes.iter().map(|&size| if size > zero { size.recip() } else { zero }).collect()
     }
 
-    /// `true` if the smallest singular value of the rows over their sizes is above a positive number, by the pattern.
+    /// `true` if the smallest singular value of the rows over their sizes exceeds a positive number, by the pattern.
     fn is_above(&mut self, value: S, q: &[S]) -> bool {
         let units = self.units();
         let Some(Sparse { shifted, pivots, .. }) = &mut self.sparse else { return false };
@@ -115,7 +114,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         done.is_ok() && pivots.iter().all(|&pivot| pivot > <S as Real>::zero())
     }
 
-    /// The smallest singular value of the rows over their sizes, if it is above a number, by so many halvings; `NaN` of rows that are not
+    /// The smallest singular value of the rows over their sizes, if it exceeds a number, by this many halvings; `NaN` for rows that are not
     /// finite.
     fn halved(&mut self, (above, halvings): (S, usize), q: &[S]) -> S {
         let matrix = self.matrix_at(q);
@@ -180,7 +179,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         }
         turned |= turns(&last, &matrix);
         let floor = S::of_f64(LOOKED_INTO.1) * self.largest;
-        // By the pattern it is enough to know whether the value is above others.
+        // With the pattern it suffices to know whether the value exceeds others.
         let (is_low, value) = if self.sparse.is_none() {
             let value = self.least(q);
             (value < floor, value)

@@ -16,7 +16,7 @@ pub struct Rollout<S> {
     pub trajectory: Trajectory<S>,
     /// Work done.
     pub statistics: StepCounts,
-    /// Why it ended before `t_end`; nothing where an event that is to end it did.
+    /// Why it ended before `t_end`; none if an event ended it as requested.
     pub stop: Option<RolloutError>,
     /// The events that happened, in the order of time.
     pub events: Vec<Occurrence<S>>,
@@ -77,12 +77,12 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
     adaptive_or_fixed(model, None, q, v, options)
 }
 
-/// [`rollout`] by the structure-preserving methods alone, in every precision: [`crate::scalar::Dd`] as well.
+/// [`rollout`] by the structure-preserving methods only, in every precision, including [`crate::scalar::Dd`].
 pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
     fixed(model, None, q, v, options)
 }
 
-/// By any method, perhaps under a force from outside.
+/// Integrates by any method, possibly under an external force.
 pub(super) fn adaptive_or_fixed<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -93,7 +93,7 @@ pub(super) fn adaptive_or_fixed<S: Integrable>(
     collected(model, options, |keep, events| S::roll_out(model, force, (q, v), options, (keep, None, events)))
 }
 
-/// By the structure-preserving methods, perhaps under a force from outside.
+/// Integrates by the structure-preserving methods, possibly under an external force.
 pub(super) fn fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -104,7 +104,7 @@ pub(super) fn fixed<S: Scalar>(
     collected(model, options, |keep, events| integrate_fixed(model, force, (q, v), options, (keep, None, events)))
 }
 
-/// The samples of a motion as a trajectory, with the energies if options ask for them.
+/// The samples of a motion as a trajectory, with the energies if the options request them.
 fn collected<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     options: &Options<S>,
@@ -122,7 +122,7 @@ fn collected<S: Scalar>(
     Rollout { trajectory, statistics, stop, events }
 }
 
-/// The motion by any method, every sample and, if requested, every node handed over and none kept.
+/// Integrates by any method and passes on every sample and, if requested, every node, without storing them.
 pub(super) fn integrate<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -144,7 +144,7 @@ pub(super) fn integrate<S: Integrable>(
     }
 }
 
-/// The motion by the structure-preserving methods, every sample handed over and none kept.
+/// Integrates by the structure-preserving methods and passes on every sample, without storing them.
 fn integrate_fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -173,13 +173,13 @@ fn integrate_fixed<S: Scalar>(
     fixed::run(model, force, &mut stepper, (&q, &v), options, receivers)
 }
 
-/// A start nearer to the constraints than this share of its size is brought to them.
+/// A start closer to the constraints than this share of its size is projected onto them.
 const NEAR: f64 = 1e-3;
 
-/// The start on the constraints of the model.
+/// The start, projected onto the constraints of the model.
 ///
 /// # Errors
-/// [`RolloutError::OffConstraints`] of one that is not near to them.
+/// [`RolloutError::OffConstraints`] for a start that is not close to them.
 fn allowed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Result<(Vec<S>, Vec<S>), RolloutError> {
     let (mut on_q, mut on_v) = (q.to_vec(), v.to_vec());
     let Some(manifold) = model.manifold() else { return Ok((on_q, on_v)) };
@@ -218,7 +218,7 @@ fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<
     options.check(n)
 }
 
-/// Refuses an absolute tolerance that stands alone and is finer than the scalar can keep of the start.
+/// Rejects a purely absolute tolerance that is finer than the scalar can resolve at the start.
 fn reachable<S: Scalar>(q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
     let zero = S::of_f64(0.0);
     let size = q.iter().chain(v).fold(zero, |size, x| S::max(size, x.abs()));
@@ -249,7 +249,7 @@ pub(super) enum StepFailure {
         iterations: usize,
         residual: f64,
     },
-    /// No state of the constraints is near.
+    /// No state on the constraints is close.
     OffConstraints,
     /// The rows of the constraints are not independent so long after the last state.
     Branch {
@@ -277,10 +277,10 @@ impl StepFailure {
 /// Receives the time, coordinates and velocities of every sample in order, and says whether to continue.
 pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
-/// Receives time, weight, coordinates and velocities at the nodes of a quadrature over time along a motion, beside the samples.
+/// Receives time, weight, coordinates and velocities at the nodes of a quadrature over time along a motion, in addition to the samples.
 pub(super) type Nodes<'a, S> = dyn FnMut(S, S, &[S], &[S]) + 'a;
 
-/// What receives the samples, the nodes if requested, and the events.
+/// Receivers of the samples, the nodes if requested, and the events.
 pub(super) type Receivers<'r, 'a, S> = (&'r mut Keep<'a, S>, Option<&'r mut Nodes<'a, S>>, &'r mut Vec<Occurrence<S>>);
 
 /// The error of a motion that a step ended.

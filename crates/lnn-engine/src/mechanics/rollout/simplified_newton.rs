@@ -1,4 +1,4 @@
-//! Newton's method with a matrix that is kept as long as it serves, iterated to the rounding floor.
+//! Newton's method with a matrix that is kept as long as it converges, iterated to the rounding floor.
 
 use super::StepFailure;
 use super::phase::{Defect, PhaseSpace, singular};
@@ -16,13 +16,13 @@ pub(super) trait Equations<S: Scalar> {
     ) -> Result<Defect<S>, StepFailure>;
     /// An approximation of `dF/dx` at `x`, row-major.
     fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure>;
-    /// The change of unknown `i` that stands for roundings of what the equations are made of, the coordinates among them: of the force of a
-    /// stiff spring nothing else is known.
+    /// The change of unknown `i` caused by rounding of the equations' inputs, including the coordinates; the force of a stiff spring is not
+    /// known more precisely.
     fn rounding(&self, n: usize, x: &[S], i: usize) -> S;
 }
 
-/// Corrections up to so many roundings of the unknowns are roundings. A stiff spring between two masses has corrections of up to three:
-/// its force is the rounding of either place times its constant.
+/// Corrections up to this many roundings of the unknowns count as rounding. A stiff spring between two masses has corrections of up to
+/// three: its force is uncertain by the rounding of either position times its constant.
 const ROUNDINGS: f64 = 16.0;
 
 /// The change of velocities that are unknown at `x` which the roundings of them and of coordinates `q`, over a step `h`, explain.
@@ -70,8 +70,8 @@ impl<S: Scalar> SimplifiedNewton<S> {
 
     /// Solves from the guess in `x`; on success the last call of [`Equations::residual`] was at the solution.
     ///
-    /// The iteration ends where it no longer halves the residual and this is, or asks for, rounding, not at a tolerance: a tolerance leaves
-    /// errors of one sign, which drift (Hairer, McLachlan and Razakarivony 2008).
+    /// The iteration ends when it no longer halves the residual and the residual, or its correction, is at rounding level. It does not end
+    /// at a tolerance, which would leave errors of one sign that drift (Hairer, McLachlan and Razakarivony 2008).
     ///
     /// # Errors
     /// Those of the equations; [`StepFailure::NotConverged`]; a singular matrix.
@@ -113,13 +113,13 @@ impl<S: Scalar> SimplifiedNewton<S> {
         Ok(())
     }
 
-    /// The change of unknown `i` that the residual asks for.
+    /// The correction of unknown `i` for the residual.
     fn correction(&self, i: usize) -> S {
         let row = &self.inverse[i * self.residual.len()..][..self.residual.len()];
         row.iter().zip(&self.residual).fold(<S as Real>::zero(), |sum, (&a, &r)| a.mul_add(r, sum))
     }
 
-    /// `true` if the residual, however large beside terms that cancel, asks for no more than roundings of the unknowns.
+    /// `true` if the residual, however large relative to cancelling terms, only requires corrections within the rounding of the unknowns.
     fn is_settled(&self, n: usize, equations: &impl Equations<S>, x: &[S]) -> bool {
         (0..x.len()).all(|i| self.correction(i).abs() <= S::of_f64(ROUNDINGS) * equations.rounding(n, x, i))
     }

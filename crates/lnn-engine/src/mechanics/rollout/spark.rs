@@ -1,7 +1,7 @@
-//! Gauss collocation under constraints: multipliers at Lobatto's nodes, so that the motion stays on `phi(q) = 0`.
+//! Gauss collocation under constraints: multipliers at the Lobatto nodes keep the motion on `phi(q) = 0`.
 //!
-//! With stage velocities `V_i`, `Q_i = q + h sum_j a_ij V_j` at the nodes of Gauss and `R_k = q + h sum_j c_kj V_j` at those of Lobatto,
-//! `k = 0..s`, of which the first is the start of the step and the last its end,
+//! With stage velocities `V_i`, `Q_i = q + h sum_j a_ij V_j` at the nodes of Gauss and `R_k = q + h sum_j c_kj V_j` at those of Lobatto, `k
+//! = 0..s`, where the first is the start of the step and the last its end,
 //!
 //! ```text
 //! dL/dv(Q_i, V_i) = p + h sum_j a_ij dL/dq(Q_j, V_j) + sum_k d_ik A(R_k)^T lambda_k,    phi(R_k) = 0 for k >= 1,
@@ -9,8 +9,8 @@
 //!
 //! `d_ik = w_k (1 - c_ki / b_i)` with Lobatto's weights `w`, and the last impulse brings the new momentum to `A v = 0`. The methods are
 //! symplectic on the manifold and of order `2 s`; one stage is RATTLE for the midpoint discrete Lagrangian: Newton's equations with the
-//! impulses of the constraints at the ends of the step. Rows that are linear in the velocities, `A(q) v = b(q)`, which know no symplectic
-//! form, hold at the nodes of Gauss with multipliers there, and at the end of the step.
+//! impulses of the constraints at the ends of the step. Rows that are linear in the velocities, `A(q) v = b(q)`, which have no symplectic
+//! form, hold at the Gauss nodes with multipliers there, and at the end of the step.
 //!
 //! Source: Jay, Specialized partitioned additive Runge-Kutta methods for systems of overdetermined DAEs with holonomic constraints (2007),
 //! the (s, s)-Gauss-Lobatto SPARK methods; Andersen, Rattle (1983).
@@ -62,7 +62,7 @@ impl<S: Scalar> Lobatto<S> {
     }
 }
 
-/// The equations of one step, and what their last evaluation left.
+/// The equations of one step, and the results of their last evaluation.
 struct Stages<'a, S: Scalar> {
     tableau: &'a Tableau<S>,
     lobatto: &'a Lobatto<S>,
@@ -191,7 +191,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         let size = |k: usize| p0.high[k].abs() + most(found, k) + h.abs() * most(forces, k) + most(&wanted, k);
         let of_momenta = Defect::of(n, &residual[..s * n], size);
         residual[s * n..].copy_from_slice(&defects);
-        // Velocities are what the equations of constraints are made of.
+        // The equations of constraints consist of velocities.
         let speed = v.iter().fold(zero, |most, v| S::max(most, v.abs()));
         let of_rows = Defect::of(defects.len().max(1), &defects, |i| sizes.get(i).map_or(zero, |&size| size + speed));
         self.buffers.push = push;
@@ -199,7 +199,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         Ok(of_momenta.worst(of_rows))
     }
 
-    /// By forward differences: enough for an iteration matrix.
+    /// By forward differences, which suffice for an iteration matrix.
     fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let (size, n, s) = (x.len(), phase.n, self.tableau.nodes.len());
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
@@ -228,7 +228,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
     }
 }
 
-/// The integrator with what it keeps from step to step.
+/// The integrator with the data that it keeps from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Spark<S> {
     tableau: Tableau<S>,
@@ -265,7 +265,7 @@ impl<S: Scalar> Spark<S> {
         }
     }
 
-    /// One step of size `h`; `velocity` is one near the start before and that of the end after it.
+    /// One step of size `h`; `velocity` is close to the velocity at the start before the step, and is that of the end after it.
     pub(super) fn step(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,

@@ -291,7 +291,7 @@ fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
         let single = Options::<f32> { method, rtol: 1e-7, ..Options::new(1.0, 0.1) };
         let refusal = rollout(&PENDULUM, &[1.0_f32], &[2.0], &single).stop.unwrap().to_string();
         assert!(refusal.ends_with("than f32 can keep, the least is 1e-6"), "{refusal}");
-        // What stays at 0 has no error, whatever the absolute tolerance.
+        // A coordinate that stays at 0 has no error, whatever the absolute tolerance.
         let still = Options { method, atol: 0.0, ..Options::new(1.0, 0.1) };
         let done = rollout(&PENDULUM, &[0.0], &[0.0], &still);
         assert!(done.is_complete() && done.trajectory.q.iter().all(|q| *q == 0.0), "{:?}", done.stop);

@@ -192,7 +192,7 @@ impl<S: Copy> Times<S> for Vec<S> {
 pub(super) struct Samples<S> {
     t0: S,
     t_end: S,
-    /// `abs(dt)`, and the same with the direction of time.
+    /// `abs(dt)`, and `dt` with the direction of time.
     step: S,
     signed: S,
     /// Samples before the last.
@@ -237,7 +237,7 @@ impl<S: Scalar> Samples<S> {
     }
 }
 
-/// Samples `first..after` in time elapsed since `start`, and, if it is not one of them, the end of their stretch.
+/// Samples `first..after` in time elapsed since `start`, and the end of their stretch if it is not one of them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part<S> {
     pub(super) all: Samples<S>,
@@ -325,7 +325,7 @@ mod tests {
         let single = super::tests::times(Options::<f32>::new(100.0, 0.1));
         assert_eq!(single.len(), 1001);
         assert_eq!(*single.last().unwrap(), 100.0);
-        // The last sample is the end, whatever the rounding of the quotient, and none lies beyond it.
+        // The last sample is at the end, whatever the rounding of the quotient, and none is later.
         let many = Samples::new(&Options::<f32>::new(200_000.0, 1.0));
         assert_eq!((many.len(), many.get(200_000), many.get(200_001)), (200_001, Some(200_000.0), None));
     }

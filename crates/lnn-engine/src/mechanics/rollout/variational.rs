@@ -7,10 +7,10 @@
 //! p0 = -D1 L_d(q0, q1) = dL/dv - h/2 dL/dq,    p1 = D2 L_d(q0, q1) = dL/dv + h/2 dL/dq.
 //! ```
 //!
-//! The discrete action knows no friction: models that lose energy are refused. A force from outside acts by half a step
-//! times its value in the middle at either end, `dL/dq + Q` in place of `dL/dq` (the discrete Lagrange-d'Alembert
-//! principle, 3.2.1 there). Order 2, symplectic. In exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations;
-//! the derivation needs no Hamiltonian, and the two check each other.
+//! The discrete action has no friction: models that lose energy are refused. An external force acts at either end by half a step times its
+//! value in the middle, `dL/dq + Q` in place of `dL/dq` (the discrete Lagrange-d'Alembert principle, 3.2.1 there). Order 2, symplectic. In
+//! exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations; the derivation needs no Hamiltonian, and the
+//! two check each other.
 //!
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
 
@@ -78,7 +78,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
     }
 }
 
-/// The integrator with what it keeps from step to step.
+/// The integrator with the data that it keeps from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Variational<S> {
     chord: SimplifiedNewton<S>,
@@ -111,7 +111,7 @@ impl<S: Scalar> Variational<S> {
         }
     }
 
-    /// One step of size `h`; `velocity` is one near the start before and near the end after it.
+    /// One step of size `h`; `velocity` is close to the velocity at the start before the step and at the end after it.
     pub(super) fn step(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,

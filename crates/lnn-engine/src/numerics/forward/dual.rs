@@ -152,7 +152,7 @@ impl<T: Real> HyperDual<T> {
             st: da * a.st + db * b.st + bent + dab * (a.s * b.t + b.s * a.t) + dbb * (b.s * b.t),
         }
     }
-    /// The same operation on every component.
+    /// Applies an operation to every component.
     #[inline(always)]
     fn each(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
         Self {

@@ -60,7 +60,7 @@ impl<T: Real, const N: usize, const F: usize> Jet<T, N, F> {
         }
         rows
     }
-    /// A number from the rule of first derivatives, given the operands' in one variable, and from that of the lower triangle,
+    /// A number from a rule for first derivatives, given the operands' derivatives in one variable, and a rule for the lower triangle,
     /// given two indices and the gradient of the result.
     #[inline(always)]
     fn build(
@@ -123,7 +123,7 @@ impl<T: Real, const N: usize, const F: usize> Jet<T, N, F> {
             },
         )
     }
-    /// The same operation on every component.
+    /// Applies an operation to every component.
     #[inline(always)]
     fn each(&self, other: &Self, f: impl Fn(T, T) -> T + Copy) -> Self {
         let value = f(self.value, other.value);

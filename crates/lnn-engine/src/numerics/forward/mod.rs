@@ -1,8 +1,8 @@
 //! Forward numbers: values with directional derivatives.
 //!
-//! [`Dual`] carries one tangent, [`HyperDual`] one mixed second-order Taylor coefficient, [`Jet2`] the gradient and the
-//! Hessian in `N` variables, [`Jet`] a gradient in more variables than its Hessian. They are [`Real`](crate::scalar::Real) over any `Real`: over floats, over each other and
-//! over tape variables. Only the chain, product and quotient rules stand here; elementary derivatives come from the
+//! [`Dual`] carries one tangent, [`HyperDual`] one mixed second-order Taylor coefficient, [`Jet2`] the gradient and the Hessian in `N`
+//! variables, [`Jet`] a gradient in more variables than its Hessian. They are [`Real`](crate::scalar::Real) over any `Real`: over floats,
+//! over each other and over tape variables. Only the chain, product and quotient rules are here; elementary derivatives come from the
 //! [table of operations](crate::ops).
 //!
 //! ```

@@ -98,7 +98,7 @@ impl<S: Scalar> Workspace<S> {
     pub(super) fn failures_mut(&mut self) -> &mut Vec<(usize, Failure)> {
         &mut self.failures
     }
-    /// The three parts a solver works with at the same time.
+    /// The three parts that a solver uses at the same time.
     pub(super) fn parts(&mut self) -> (&mut Buffer<S>, &mut Retry<S>, &mut Vec<(usize, Failure)>) {
         (&mut self.block, &mut self.second, &mut self.failures)
     }
@@ -130,7 +130,7 @@ pub(super) fn across<S: Copy, const W: usize>(rows: &[&[S]; W], e: usize) -> Lan
     lane
 }
 
-/// A choice that is never compiled to a branch: lanes that branch do not become vector instructions.
+/// A choice that never compiles to a branch: branching lanes do not become vector instructions.
 #[inline(always)]
 pub(super) fn select<S>(condition: bool, chosen: S, otherwise: S) -> S {
     core::hint::select_unpredictable(condition, chosen, otherwise)
@@ -140,7 +140,7 @@ pub(super) fn select<S>(condition: bool, chosen: S, otherwise: S) -> S {
 #[repr(align(64))]
 pub(super) struct Aligned<T>(pub T);
 
-/// `true` if loops of known length gain something: with wider numbers the arithmetic is what takes the time.
+/// `true` if loops of known length pay: for wider numbers the arithmetic dominates.
 pub(crate) const fn constant_sizes<S>() -> bool {
     size_of::<S>() <= size_of::<f64>()
 }

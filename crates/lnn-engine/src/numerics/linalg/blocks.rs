@@ -1,4 +1,4 @@
-//! Eigenvalues of matrices whose coordinates fall into groups that no element joins: those of the groups' blocks.
+//! Eigenvalues of matrices whose coordinates split into uncoupled groups: those of the groups' blocks.
 
 use super::batch::Buffer;
 use super::components;
@@ -6,14 +6,14 @@ use super::eigen::whole;
 use crate::scalar::{Real, Scalar, are_finite};
 use alloc::vec::Vec;
 
-/// Size from which the search for blocks takes little beside what a full matrix takes.
+/// Size from which the search for blocks is cheap compared with a full matrix.
 const SIZE: usize = 16;
 
-/// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of a batch, of every matrix by its blocks; whether all is known to
-/// be finite. Eigenvectors are zero outside of their block.
+/// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of a batch, of every matrix by its blocks; `true` if all is
+/// known to be finite. Eigenvectors are zero outside their block.
 ///
-/// A matrix is divided by its own zeros alone, so that it gives the same bits wherever it stands in a batch. Neighbours that are divided alike go
-/// together.
+/// The split of a matrix depends only on its own zeros, so that it gives the same bits at any position in a batch. Neighbours with the same
+/// split are processed together.
 pub(super) fn by_blocks<S: Scalar>(
     n: usize,
     matrices: &[S],
@@ -60,7 +60,7 @@ fn groups<S: Scalar>(n: usize, matrix: &[S]) -> Vec<Vec<usize>> {
     components(n, pairs.filter(|&(i, j)| is_element(i, j)))
 }
 
-/// Decomposes matrices of the same groups, block by block.
+/// Decomposes matrices with the same groups, block by block.
 fn apart<S: Scalar>(
     n: usize,
     groups: &[Vec<usize>],
@@ -98,7 +98,7 @@ fn apart<S: Scalar>(
     finite
 }
 
-/// Brings eigenvalues into ascending order, those that are equal in the order of their blocks, and their eigenvectors with them.
+/// Sorts eigenvalues in ascending order, equal ones in the order of their blocks, and their eigenvectors with them.
 fn sort<S: Scalar>(values: &mut [S], vectors: &mut [S]) {
     let (n, found, directions) = (values.len(), values.to_vec(), vectors.to_vec());
     let mut order: Vec<usize> = (0..n).collect();

@@ -1,4 +1,4 @@
-//! Products, elimination, eigenvalues and singular values by faer: what is large, in `f32` and `f64`, one matrix after the other.
+//! Products, elimination, eigenvalues and singular values by faer, for large matrices in `f32` and `f64`, one after the other.
 
 use super::singular::Singular;
 use super::solve::{is_harmless, suspicious};
@@ -30,7 +30,7 @@ pub(super) fn product<T: ComplexField>(
     matmul(target, accum, view(a), view(b), alpha, Par::Seq);
 }
 
-/// Factors of one matrix, and what solving with them needs.
+/// Factors of one matrix, and the buffers for solving with them.
 struct Elimination<F> {
     n: usize,
     m: usize,

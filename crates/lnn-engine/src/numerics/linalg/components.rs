@@ -1,16 +1,16 @@
-//! Connected components of what acts on each other.
+//! Connected components of an interaction graph.
 
 use alloc::vec::Vec;
 
-/// Indices below `n` in groups that no pair joins, `(first, second)` being joined; ascending, by their first member.
+/// Indices below `n` in connected groups, where `(first, second)` joins two; ascending, by their first member.
 ///
-/// Coordinates of a Lagrangian that is a sum over such groups do not act on each other, and every group has a common factor of its own that
-/// motion leaves free.
+/// If a Lagrangian is a sum over such groups, coordinates of different groups do not act on each other, and motion leaves a factor for each
+/// group open.
 pub fn components(n: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Vec<Vec<usize>> {
     let mut label: Vec<usize> = (0..n).collect();
     for (a, b) in pairs {
         let (low, high) = (label[a].min(label[b]), label[a].max(label[b]));
-        // Most pairs of a full matrix join what is one group already.
+        // Most pairs of a full matrix join members of the same group.
         if low < high {
             label.iter_mut().filter(|label| **label == high).for_each(|label| *label = low);
         }

@@ -27,9 +27,9 @@ pub(super) fn condition_2<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
 /// `true` if a finite symmetric matrix has a condition number above `1/eps`, as given and scaled to rows of size 1
 /// (Bunch 1971).
 ///
-/// The scaling is by powers of two on both sides: a choice of units cannot make a matrix singular. It may spoil a
-/// well-conditioned indefinite matrix, therefore both are asked. Eigenvalues are computed only where the Frobenius
-/// norms of matrix and inverse, whose product bounds the condition number, do not settle it.
+/// The scaling is by powers of two on both sides: a choice of units cannot make a matrix singular. It may spoil a well-conditioned
+/// indefinite matrix, so both are tested. Eigenvalues are computed only where the Frobenius norms of matrix and inverse, whose product
+/// bounds the condition number, do not settle it.
 pub(super) fn is_singular<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense<S>) -> bool {
     scratch.load(matrix);
     if scratch.bounded(n) {

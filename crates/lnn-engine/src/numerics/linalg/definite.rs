@@ -1,7 +1,7 @@
 //! Positive definite matrices, `M = L D L^T`: elimination without a search for pivots, in half the work.
 //!
 //! A matrix whose pivots are not all positive, or so small that digits are lost, is refused and left to the elimination with pivots. Every
-//! element goes through the same steps in lanes and alone, so that a matrix gives the same bits wherever it stands in a batch.
+//! element goes through the same steps in lanes and alone, so that a matrix gives the same bits at any position in a batch.
 
 use super::Workspace;
 use super::batch::{LANES, Lane};
@@ -20,7 +20,7 @@ const BLOCK: usize = 4;
 const CHUNK: usize = 8;
 
 impl<S: Scalar> Systems<'_, S> {
-    /// Solves all that are safely positive definite; the rows that are left, `None` if it is not worth trying.
+    /// Solves all matrices that are safely positive definite; returns the remaining rows, `None` if it is not worth trying.
     pub(super) fn solve_definite(&self, solutions: &mut [S], workspace: &mut Workspace<S>) -> Option<Vec<usize>> {
         let n = self.n;
         let right = self.right.filter(|_| self.m == 1 && n >= SIZE)?;
@@ -47,7 +47,8 @@ impl<S: Scalar> Systems<'_, S> {
         Some(refused)
     }
 
-    /// Inverts all that are safely positive definite, one after the other; the rows that are left, `None` if it is not worth trying.
+    /// Inverts all matrices that are safely positive definite, one after the other; returns the remaining rows, `None` if it is not worth
+    /// trying.
     pub(super) fn invert_definite(&self, inverses: &mut [S], workspace: &mut Workspace<S>) -> Option<Vec<usize>> {
         let n = self.n;
         if n < SIZE {
@@ -67,7 +68,7 @@ impl<S: Scalar> Systems<'_, S> {
         Some(refused.collect())
     }
 
-    /// Whole blocks of `W` rows, and a last one that is at least half full; the rows that were treated.
+    /// Whole blocks of `W` rows, and a last one that is at least half full; returns the number of rows treated.
     fn definite_blocks<const W: usize>(
         &self,
         batch: usize,
@@ -133,7 +134,7 @@ fn side_by_side<S: Scalar, const W: usize>(n: usize, system: &mut [Lane<S, W>]) 
             pivot_row[n][l] *= inverse[l];
         }
     }
-    // The factors stand in the lower triangle, those of a line side by side.
+    // The factors are in the lower triangle, with those of a line side by side.
     for k in (1..n).rev() {
         let found = system[k * width + n];
         for i in 0..k {
@@ -146,7 +147,7 @@ fn side_by_side<S: Scalar, const W: usize>(n: usize, system: &mut [Lane<S, W>]) 
     pivots
 }
 
-/// Chunks of so many numbers.
+/// Number of chunks for `numbers` numbers.
 fn chunks(numbers: usize) -> usize {
     numbers.div_ceil(CHUNK)
 }
@@ -178,9 +179,9 @@ fn load<S: Scalar>(n: usize, matrix: &[S], system: &mut [[S; CHUNK]], stride: us
     bound
 }
 
-/// Eliminates below the diagonal of `[M | B]`, `n` lines of `stride` chunks, step by step as [`side_by_side`] does, along the lines. Of the
-/// line of a pivot `k` there are `end(k)` chunks. Keeps the factors, row by row, and the inverse pivots on their diagonal. Gives the smallest pivot, 0 where
-/// it ended at one that is not positive, and the largest.
+/// Eliminates below the diagonal of `[M | B]`, `n` lines of `stride` chunks, step by step as [`side_by_side`] does, along the lines. The
+/// line of pivot `k` has `end(k)` chunks. Keeps the factors, row by row, with the inverse pivots on their diagonal. Returns the smallest
+/// pivot, 0 if it ended at one that is not positive, and the largest.
 #[inline(always)]
 fn eliminate<S: Scalar>(
     n: usize,
@@ -219,7 +220,7 @@ fn eliminate<S: Scalar>(
         if smallest == zero {
             break;
         }
-        // Rows are left only below a full block.
+        // Rows remain only below a full block.
         if last < n {
             let (above, below) = system.split_at_mut(last * stride);
             let above = &above[first * stride..];
@@ -305,7 +306,7 @@ fn invert_alone<S: Scalar>(
         system[i * stride + middle + i / CHUNK][i % CHUNK] = <S as Real>::one();
     }
     let (smallest, growth) = eliminate(n, system, stride, |k| middle + k / CHUNK + 1, factors);
-    // The right half holds the lower triangle of L^-1.
+    // The right half contains the lower triangle of L^-1.
     let (diagonal, weights) = factors.split_at_mut(n * n);
     for i in 0..n {
         for k in i..n {

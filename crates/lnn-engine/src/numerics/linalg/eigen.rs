@@ -1,4 +1,4 @@
-//! Batched symmetric eigendecomposition by cyclic Jacobi on lanes, which loses nothing on graded or clustered spectra.
+//! Batched symmetric eigendecomposition by cyclic Jacobi on lanes, accurate for graded and clustered spectra.
 //!
 //! Rotations by the smaller angle, in the form of Rutishauser (1966), in rounds of `n/2` that do not touch each other
 //! (Brent and Luk 1985): their angles do not wait for one another. An off-diagonal element is dropped once it is below
@@ -74,7 +74,7 @@ fn run<S: Scalar>(
     workspace.outcome()
 }
 
-/// Every matrix as a whole, by lanes or, where it is large, by the routine of its scalar; whether all is known to be finite.
+/// Treats every matrix as a whole, by lanes or, if it is large, by the routine of its scalar; `true` if all is known to be finite.
 pub(super) fn whole<S: Scalar>(
     n: usize,
     matrices: &[S],
@@ -96,7 +96,7 @@ pub(super) fn whole<S: Scalar>(
     }
 }
 
-/// In blocks of `W`, a single matrix at the end alone; whether all is finite.
+/// In blocks of `W`, with a single matrix at the end alone; `true` if all is finite.
 fn split<S: Scalar, const W: usize>(
     n: usize,
     matrices: &[S],
@@ -118,8 +118,8 @@ const SWEEPS: usize = 40;
 /// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of the matrices `start..end` of a
 /// batch in blocks of `W`; the upper triangle is read.
 ///
-/// The result is `true` if all is finite; the eigenvalues of a matrix that is not are `NaN`. It is `None`, and nothing is
-/// done, where the CPU does not serve so many lanes (see [`in_lanes`]).
+/// The result is `true` if all is finite; the eigenvalues of a matrix that is not are `NaN`. It is `None`, and nothing is done, if the CPU
+/// does not support this many lanes (see [`in_lanes`]).
 pub(super) fn decompose<S: Scalar, const W: usize>(
     n: usize,
     matrices: &[S],

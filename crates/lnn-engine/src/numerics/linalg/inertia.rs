@@ -42,10 +42,9 @@ pub fn is_positive_definite<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]
 /// Inertia of one symmetric `(n, n)` matrix from the pivots of `P M P^T = L D L^T` with complete pivoting, blocks of
 /// 1x1 and 2x2 (Bunch and Parlett 1971).
 ///
-/// Signs are right for every eigenvalue larger than rounding, zero diagonals, tiny pivots and coordinates in units of
-/// very different size included: rows and columns are scaled to largest elements near 1 first, which leaves the inertia
-/// (Sylvester). A remainder below `2 n eps` of that counts as zero. Reads the lower triangle; `scratch` holds `n^2`
-/// numbers.
+/// Signs are right for every eigenvalue larger than rounding, even with zero diagonals, tiny pivots and coordinates in very different
+/// units: rows and columns are first scaled to largest elements near 1, which preserves the inertia (Sylvester). A remainder below `2 n
+/// eps` of that counts as zero. Reads the lower triangle; `scratch` holds `n^2` numbers.
 ///
 /// # Errors
 /// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN`.
@@ -66,7 +65,7 @@ pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<I
         found.zero = n;
         return Ok(found);
     }
-    // Near 1: products of pivots neither overflow nor vanish.
+    // Scaled near 1, so that products of pivots neither overflow nor vanish.
     let exponent = largest.ilogb();
     a.iter_mut().for_each(|x| *x = x.ldexp(-exponent));
     balance(n, a);
@@ -227,8 +226,8 @@ impl<S: Scalar> Scaled<S> {
 
 /// Determinants of the leading `k` by `k` blocks, `k = 1..=n`, of one symmetric matrix, pushed to `minors`.
 ///
-/// Signs are exact wherever the determinant is beyond rounding. Cost `O(n^3)` for a positive definite matrix, whose
-/// pivots need no exchanges; from the first pivot that is not comfortably positive, one pivoted factorisation per block.
+/// Signs are exact if the determinant exceeds rounding. Cost `O(n^3)` for a positive definite matrix, whose pivots need no exchanges; from
+/// the first pivot that is not comfortably positive, one pivoted factorisation per block.
 ///
 /// # Errors
 /// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN`.

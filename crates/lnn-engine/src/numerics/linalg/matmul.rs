@@ -51,7 +51,7 @@ pub(super) struct Rows<'a, S> {
 }
 
 impl<'a, S> Rows<'a, S> {
-    /// `R` rows of so many numbers, from `first` on.
+    /// `R` rows of `length` numbers, from `first` on.
     #[inline(always)]
     fn rows<const R: usize>(&self, first: usize, length: usize) -> [&'a [S]; R] {
         let mut rows: [&[S]; R] = [&[]; R];
@@ -115,7 +115,7 @@ impl<S: Scalar> SmallBatch<'_, S> {
 impl<S: Scalar> WithSimd for SmallBatch<'_, S> {
     type Output = ();
 
-    // As many columns at once as keep some eight sums in registers.
+    // As many columns at a time as keep about eight sums in registers.
     #[inline(always)]
     fn with_simd<V: Simd>(mut self, simd: V) {
         let rows = self.shape.0;
@@ -202,7 +202,7 @@ mod tests {
         }
     }
 
-    /// Sizes beyond those that dot products have when there is faer.
+    /// Sizes beyond those for which dot products are used with faer.
     fn check_plain<S: Scalar>() {
         for n in [3, 40, 70] {
             let (m, k) = (n + 1, n + 2);

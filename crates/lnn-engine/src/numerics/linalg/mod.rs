@@ -1,10 +1,9 @@
 //! Batched small dense linear algebra: solve, minimum-norm solution, symmetric eigen, inertia, minors; products.
 //!
-//! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of
-//! `LANES` matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
-//! bits wherever it stands in a batch. A [`Workspace`] is reused; nothing else allocates for matrices up to the size
-//! from which faer, with the feature of this name, takes over: 47 for systems of one right-hand side and 40 for inverses, unless they are positive
-//! definite, and 33 for eigenvalues.
+//! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of `LANES` matrices side by
+//! side, every lane through the same branch-free steps, so that a matrix gives the same bits at any position in a batch. A [`Workspace`] is
+//! reused; nothing else allocates for matrices below the size at which faer, with the feature of this name, takes over: 47 for systems of
+//! one right-hand side and 40 for inverses, unless they are positive definite, and 33 for eigenvalues.
 //!
 //! ```
 //! use lnn::linalg::{LinalgError, Workspace, eigenvalues, solve};

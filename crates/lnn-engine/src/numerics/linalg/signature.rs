@@ -1,7 +1,7 @@
 //! Value and gradient of the penalties of single mass matrices.
 //!
-//! A gradient by the elements of `M` is given as `G = sum_k gamma_k u_k u_k^T`: each term is one symmetric jet of the
-//! adjoint identity. A matrix of the right signature has no term and costs no spectrum: its pivots tell.
+//! A gradient by the elements of `M` is given as `G = sum_k gamma_k u_k u_k^T`: each term is one symmetric jet of the adjoint identity. A
+//! matrix of the right signature has no term and needs no spectrum: its pivots show it.
 
 use crate::linalg::{LinalgError, Scaled, Workspace, adjugate, eigh, inertia, is_positive_definite, leading_minors};
 use crate::scalar::{Real, Scalar};
@@ -131,7 +131,7 @@ pub fn eigenvalue_violation<S: Scalar>(
     Ok(())
 }
 
-/// `true` if `M`, `(n, n)`, has one negative eigenvalue and no other that is not positive; `false` also where rounding leaves it open.
+/// `true` if `M`, `(n, n)`, has one negative eigenvalue and otherwise positive ones; `false` if rounding leaves it open.
 pub fn has_one_negative<S: Scalar>(n: usize, matrix: &[S], buffers: &mut SignatureBuffers<S>) -> bool {
     buffers.gradient.resize(n * n, <S as Real>::zero());
     inertia(n, matrix, &mut buffers.gradient).is_ok_and(|found| found.negative == 1 && found.zero == 0)
@@ -233,8 +233,8 @@ pub fn sylvester_violation<S: Scalar>(
     Ok(())
 }
 
-/// Adds the violations of the leading minors of `buffers.block` to the value and leaves their gradient, by the block's
-/// elements, in `buffers.gradient`.
+/// Adds the violations of the leading minors of `buffers.block` to the value, and stores their gradient, by the block's elements, in
+/// `buffers.gradient`.
 fn minor_violations<S: Scalar, I: Iterator<Item = S>>(
     m: usize,
     scales: impl Fn() -> I,

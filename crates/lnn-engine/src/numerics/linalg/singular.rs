@@ -22,15 +22,14 @@ pub struct MinimumNorm<S> {
     pub outside: S,
 }
 
-/// The shortest `x` among those that bring `M x` closest to `b`, `M` symmetric, of any rank and signature.
+/// The smallest `x` among those that bring `M x` closest to `b`, for symmetric `M` of any rank and signature.
 ///
-/// `x = sum of u_k (u_k . b) / w_k` over the eigenvalues with `|w_k| > n eps max |w|`; the others count as zero. Their
-/// directions are those in which nothing is determined, such as gauge directions or redundant coordinates; `x` has no
-/// component along them, and what `b` has is returned as [`MinimumNorm::outside`]. For a regular matrix this is what
-/// [`solve`](fn@super::solve) gives, at a higher price.
+/// `x = sum of u_k (u_k . b) / w_k` over the eigenvalues with `|w_k| > n eps max |w|`; the others count as zero. Their directions are
+/// undetermined, such as gauge directions or redundant coordinates; `x` has no component along them, and the component of `b` is returned
+/// as [`MinimumNorm::outside`]. For a regular matrix the result is that of [`solve`](fn@super::solve), at a higher cost.
 ///
-/// `matrix` is `(n, n)`, `rhs` is `(n)`. Which eigenvalues vanish depends on the units of the coordinates: give them
-/// alike sizes. A common factor of all elements, as long as they are normal numbers, changes nothing but exponents.
+/// `matrix` is `(n, n)`, `rhs` is `(n)`. Which eigenvalues vanish depends on the units of the coordinates: give them similar sizes. A
+/// common factor of all elements, as long as they are normal numbers, changes nothing but exponents.
 ///
 /// # Errors
 /// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN` in the arguments or a solution
@@ -49,7 +48,7 @@ pub fn minimum_norm<S: Scalar>(
         return Err(LinalgError::NotFinite { row: 0 });
     }
     let zero = <S as Real>::zero();
-    // Near 1: neither products nor quotients leave the range on the way.
+    // Scaled near 1, so that neither products nor quotients leave the range on the way.
     let (matrix, of_matrix) = near_one(matrix);
     let (rhs, of_rhs) = near_one(rhs);
     let (mut values, mut vectors) = (vec![zero; n], vec![zero; n * n]);
@@ -92,8 +91,8 @@ pub struct Singular {
     pub vectors: Vec<Vec<f64>>,
 }
 
-/// Decomposes a matrix that is given by its columns, at least as many rows as columns; `None` if it is not finite or no decomposition
-/// is found. Small singular values are exact to roundings of the largest.
+/// Decomposes a matrix given by its columns, with at least as many rows as columns; `None` if it is not finite or no decomposition is
+/// found. Small singular values are exact to roundings of the largest.
 pub fn singular(columns: &[Vec<f64>]) -> Option<Singular> {
     let (n, m) = (columns.len(), columns.first().map_or(0, Vec::len));
     if n == 0 {
@@ -208,7 +207,7 @@ mod tests {
                 }
             }
             assert!(found.values[0] < rounding * largest && found.values[n - 1] > 1.0);
-            // Where values are apart, vectors are the same but for the sign.
+            // Where values are separate, vectors agree up to the sign.
             assert!(dot(&found.vectors[n - 1], &faer.vectors[n - 1]).abs() > 1.0 - rounding);
         }
         assert_eq!(by_rotations(2, 2, &[0.0; 4]).unwrap().values, [0.0; 2]);

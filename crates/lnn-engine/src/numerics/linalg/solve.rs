@@ -1,4 +1,4 @@
-//! Batched solution of symmetric, possibly indefinite systems: one elimination for all rows, a second look at those that need it.
+//! Batched solution of symmetric, possibly indefinite systems: one elimination for all rows, and a closer examination of rows that need it.
 
 use super::batch::{Aligned, LANES, Lane, Retry, with_size};
 use super::{Failure, LinalgError, Workspace, condition, elimination, expect_length};
@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 
 /// Solves `M_b x_b = r_b` for a batch of square matrices.
 ///
-/// Gaussian elimination with partial pivoting, on lanes or, for matrices of 47 rows and more of `f32` and `f64` with the feature `faer`, faer's; one step of
-/// iterative refinement where a pivot is small or elements grow. `matrices` is `(batch, n, n)`, `rhs` and `solution` are
+/// Gaussian elimination with partial pivoting, on lanes, or faer's for `f32` and `f64` matrices of 47 rows and more with the feature
+/// `faer`; one step of iterative refinement if a pivot is small or elements grow. `matrices` is `(batch, n, n)`, `rhs` and `solution` are
 /// `(batch, n)`.
 ///
 /// # Errors
@@ -84,7 +84,7 @@ pub(super) struct Systems<'a, S> {
 
 /// Below this ratio of smallest pivot to largest element a solution is refined.
 pub(crate) const SMALL_PIVOT: f64 = 1.0 / 1024.0;
-/// Above this ratio of the largest element of the triangular factor to that of the matrix as well.
+/// Also above this ratio of the largest element of the triangular factor to that of the matrix.
 const GROWTH: f64 = 4.0;
 
 /// Below this ratio of smallest pivot to largest element a matrix may be singular.
@@ -93,7 +93,7 @@ pub(super) fn suspicious<S: Scalar>(n: usize) -> S {
 }
 
 impl<'a, S: Scalar> Systems<'a, S> {
-    /// Of one right-hand side each.
+    /// Systems of one right-hand side each.
     fn of(n: usize, matrices: &'a [S], rhs: &'a [S], solution: &[S]) -> Result<Self, LinalgError> {
         let batch = rhs.len() / n.max(1);
         expect_length("right-hand sides", batch * n, rhs.len())?;
@@ -129,7 +129,7 @@ impl<'a, S: Scalar> Systems<'a, S> {
         workspace.failures_mut().iter_mut().for_each(|(failed, _)| *failed = refused[*failed]);
     }
 
-    /// The same, failures added to those that are known.
+    /// As `solve` with pivots, adding failures to the known ones.
     fn solve_pivoted(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
         if self.solve_large(solutions, workspace) {
             return;
@@ -142,14 +142,14 @@ impl<'a, S: Scalar> Systems<'a, S> {
         }
     }
 
-    /// In blocks of `W`, a single row at the end alone.
+    /// In blocks of `W`, with a single row at the end alone.
     fn split<const W: usize>(&self, batch: usize, solutions: &mut [S], workspace: &mut Workspace<S>) {
         let together = batch - usize::from(batch % W == 1);
         let done = if self.blocks::<W>(0, together, solutions, workspace) { together } else { 0 };
         self.blocks::<1>(done, batch, solutions, workspace);
     }
 
-    /// The rows `start..end` in blocks of `W`; `false`, with nothing done, where the CPU does not serve so many lanes.
+    /// The rows `start..end` in blocks of `W`; `false`, with nothing done, if the CPU does not support this many lanes.
     fn blocks<const W: usize>(
         &self,
         start: usize,
@@ -266,7 +266,7 @@ fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>,
     due
 }
 
-/// `true` if a solution needs no correction, by the smallest pivot and the largest elements of triangular factor and matrix.
+/// `true` if a solution needs no correction, judged by the smallest pivot and the largest elements of the triangular factor and the matrix.
 #[inline(always)]
 pub(super) fn is_harmless<S: Scalar>(smallest: S, growth: S, largest: S) -> bool {
     (smallest > S::of_f64(SMALL_PIVOT) * largest) & (growth <= S::of_f64(GROWTH) * largest)
@@ -347,7 +347,7 @@ fn write_rows<S: Scalar, const W: usize>(count: usize, (n, m): (usize, usize), s
     }
 }
 
-/// The same for the last block of a batch, which need not be full.
+/// Writes the last block of a batch, which need not be full.
 #[cold]
 #[inline(never)]
 fn write_last_rows<S: Scalar, const W: usize>((n, m): (usize, usize), system: &[Lane<S, W>], rows: &mut [S]) {

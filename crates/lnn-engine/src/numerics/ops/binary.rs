@@ -73,8 +73,7 @@ table! {
     Mul mul(a, b, y, da, db) = (b, a), (R::zero(), R::one(), R::zero());
     /// `a / b`.
     Div div(a, b, y, da, db) = { let r = b.recip(); (r, -(y * r)) }, (R::zero(), -(da * da), -(db * da + db * da));
-    /// `a^b`, `a > 0`. At `a < 0` only integer `b` have a value, and derivatives along `b` keep its sign:
-    /// `ln |a|` stands for `ln a`.
+    /// `a^b`, `a > 0`. At `a < 0` only integer `b` have a value, and derivatives along `b` keep its sign: `ln |a|` replaces `ln a`.
     Powf powf(a, b, y, da, db) = (b * a.powf(b - R::one()), y * log(a)), {
         let (one, log) = (R::one(), log(a));
         (

@@ -7,15 +7,15 @@ use core::fmt::{Debug, Display, Formatter};
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use num_traits::{Float, FloatConst};
 
-/// A number of any type `F` that implements `num_traits::Float`; the one number of the engine that is not ours.
+/// A number of any type `F` that implements `num_traits::Float`; the only number type of the engine that is not its own.
 ///
-/// Besides `Float` are needed `FloatConst` (the circle constant), `Debug`, `Display` (text that `Num::from_str_radix` reads
-/// back), `Send`, `Sync` and `'static`; numbers and constants enter by `NumCast::from(f64)` and leave by
-/// `ToPrimitive::to_f64`, and `Float::integer_decode` gives the exponent. Comparisons are those of IEEE 754 whatever `F` says
-/// of `NaN`: it is neither equal to, nor above or below, any number.
+/// Besides `Float` it needs `FloatConst` (the circle constant), `Debug`, `Display` (text that `Num::from_str_radix` reads back), `Send`,
+/// `Sync` and `'static`; numbers and constants enter by `NumCast::from(f64)` and leave by `ToPrimitive::to_f64`, and
+/// `Float::integer_decode` gives the exponent. Comparisons are those of IEEE 754, whatever `F` does with `NaN`: it is neither equal to, nor
+/// above or below, any number.
 ///
-/// Functions that `Float` lacks (`erfc` and what rests on it) are computed in double-double numbers, to the precision of `F` if
-/// that is no finer. Loops over an `AnyFloat` have no vector instructions of their own: measure `f32` and `f64` by themselves.
+/// Functions that `Float` lacks (`erfc` and functions based on it) are computed in double-double numbers, to the precision of `F` if that
+/// is no finer. Loops over an `AnyFloat` have no vector instructions of their own: measure `f32` and `f64` by themselves.
 #[derive(Clone, Copy)]
 pub struct AnyFloat<F>(pub F);
 
@@ -93,7 +93,7 @@ impl<F: Float> num_traits::One for AnyFloat<F> {
     }
 }
 
-/// Demands of the engine on a number that is not its own.
+/// Requirements of the engine for a foreign number type.
 pub trait Foreign: Float + FloatConst + Debug + Display + Send + Sync + 'static {}
 impl<F: Float + FloatConst + Debug + Display + Send + Sync + 'static> Foreign for F {}
 

@@ -1,7 +1,7 @@
 //! Run-time CPU dispatch; loops over slices side by side, as far as the shortest reaches, and over columns of row-major tables.
 //!
-//! They are inlined wherever they stand. Of the standard library's adaptors parts are functions of their own, which without
-//! optimisation across codegen units are called once a number.
+//! They are always inlined. Parts of the standard library's adaptors are separate functions, which without optimisation across codegen
+//! units are called once for every number.
 
 use super::{Real, Scalar};
 pub(crate) use pulp::{Simd, WithSimd};
@@ -29,10 +29,10 @@ pub(crate) fn in_vectors<K: WithSimd>(kernel: K) -> K::Output {
     pulp::Arch::new().dispatch(kernel)
 }
 
-/// Runs a large kernel on `W` numbers side by side, as [`vectorized`] does, in no more copies than are ever used: a single
-/// lane gains nothing from AVX-512, and a CPU without vector instructions nothing from several lanes.
+/// Runs a large kernel on `W` numbers side by side, as [`vectorized`] does, compiled only for combinations that are useful: a single lane
+/// gains nothing from AVX-512, and a CPU without vector instructions gains nothing from several lanes.
 ///
-/// Those it refuses: the result is `None`, and the caller goes one lane at a time.
+/// For others the result is `None`, and the caller uses one lane at a time.
 #[inline(always)]
 pub(crate) fn in_lanes<const W: usize, R>(kernel: impl FnOnce() -> R) -> Option<R> {
     #[cfg(target_arch = "x86_64")]
@@ -133,7 +133,7 @@ impl<T> Column<T> {
 #[inline(always)]
 pub(crate) fn update_column<S: Copy>(rows: usize, out: Column<&mut [S]>, x: Column<&[S]>, f: impl Fn(&mut S, S)) {
     let Some(last) = rows.checked_sub(1) else { return };
-    // Of numbers side by side this is all there is to check.
+    // For numbers side by side this is the only check.
     assert!(out.first + last * out.step < out.numbers.len() && x.first + last * x.step < x.numbers.len());
     for k in 0..rows {
         f(&mut out.numbers[out.first + k * out.step], x.numbers[x.first + k * x.step]);

@@ -1,4 +1,4 @@
-//! Views of matrices, and what is computed of them by a routine of each scalar.
+//! Views of matrices, and operations on them by a routine of each scalar.
 
 use super::float::{AnyFloat, Foreign};
 use super::{Dd, Real, Scalar, update};
@@ -49,7 +49,7 @@ impl<'a, S> MatRef<'a, S> {
     pub fn t(self) -> Self {
         Self { transposed: !self.transposed, ..self }
     }
-    /// The rows `from..to` as seen.
+    /// The rows `from..to` of this view.
     ///
     /// # Panics
     /// If there are fewer.
@@ -91,10 +91,10 @@ impl<'a, S> MatMut<'a, S> {
     }
 }
 
-/// Products, and solutions of large systems, of one scalar.
+/// Products and solutions of large systems, for one scalar.
 ///
-/// Those of `f32` and `f64` are faer's, where it is a feature, in functions that this crate compiles. Code that is generic over the scalar calls them,
-/// so that a crate with a Lagrangian of its own does not compile faer again.
+/// With the feature `faer`, those of `f32` and `f64` are faer's, in functions that this crate compiles. Generic code calls them, so that a
+/// crate with a Lagrangian of its own does not compile faer again.
 pub trait Matrices: Sized {
     /// `C = alpha A B`, or `C += alpha A B` if `accumulate`; the shapes fit.
     fn product(c: MatMut<'_, Self>, accumulate: bool, alpha: Self, a: MatRef<'_, Self>, b: MatRef<'_, Self>)
@@ -104,8 +104,8 @@ pub trait Matrices: Sized {
         product_by_loops(c, accumulate, alpha, a, b);
     }
 
-    /// Solves symmetric systems `A X = B` into `solutions`, `(batch, n, m)`, the identity for `B` if there is no right-hand side; the rows
-    /// whose matrices must be examined. `None` if this scalar has no routine.
+    /// Solves symmetric systems `A X = B` into `solutions`, `(batch, n, m)`, with the identity for `B` if there is no right-hand side;
+    /// returns the rows whose matrices must be examined. `None` if this scalar has no routine.
     fn eliminate(
         _n: usize,
         _m: usize,

@@ -1,8 +1,7 @@
 //! Numbers: [`Real`] is what model code may call, [`Scalar`] is an innermost floating-point number.
 //!
-//! Everything above this room is generic over [`Scalar`] (`f32`, `f64`, [`Dd`], and any [`num_traits::Float`] as
-//! [`AnyFloat`]). A Lagrangian is written over [`Real`], which forward numbers and tape variables implement too; nothing in
-//! a model may name a float type.
+//! Everything above this module is generic over [`Scalar`] (`f32`, `f64`, [`Dd`], and any [`num_traits::Float`] as [`AnyFloat`]). A
+//! Lagrangian is written over [`Real`], which forward numbers and tape variables implement too; nothing in a model may name a float type.
 //!
 //! ```
 //! use lnn::scalar::{Dd, Real, Scalar};
@@ -79,21 +78,20 @@ pub trait Real:
     /// On a tape that records a replayable program this is a data-dependent read and refused (see `tape`).
     fn primal(self) -> Self::Scalar;
 
-    /// Exactly 0 with all its derivatives: what a sum may leave out and a product may answer with.
+    /// Exactly 0 with all its derivatives, so that a sum may leave it out and a product with it is zero.
     #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.primal() == Self::Scalar::of_f64(0.0)
     }
 
-    /// `false` for a number known to be infinite or `NaN`. `true` of one whose value stands for many, on a tape that records a program for
-    /// instance: its products with exact zeros are left out anyway.
+    /// `false` for a number known to be infinite or `NaN`. `true` for a number that represents many values, such as one on a tape that
+    /// records a program: its products with exact zeros are left out anyway.
     #[inline(always)]
     fn may_be_finite(self) -> bool {
         true
     }
 
-    /// `self * weight`, where a weight that is exactly 0 answers for itself: an infinite derivative along a direction in which nothing
-    /// changes is none.
+    /// `self * weight`, where a weight of exactly 0 gives 0: an infinite derivative along a direction without change does not count.
     #[inline(always)]
     fn along(self, weight: Self) -> Self {
         if weight.is_exact_zero() { weight } else { self * weight }
@@ -177,8 +175,8 @@ pub trait Real:
     fn abs(self) -> Self;
     /// `self^exponent` for an integer exponent.
     fn powi(self, exponent: i32) -> Self;
-    /// `self^exponent`, `self > 0`; at `self < 0` only integer exponents have a value, and derivatives along the exponent
-    /// keep its sign: `ln |self|` stands for `ln self`.
+    /// `self^exponent`, `self > 0`; at `self < 0` only integer exponents have a value, and derivatives along the exponent keep its sign:
+    /// `ln |self|` replaces `ln self`.
     fn powf(self, exponent: Self) -> Self;
     /// Angle of the point `(x, self)` in radians.
     fn atan2(self, x: Self) -> Self;

@@ -10,7 +10,7 @@ use pulp::Simd;
 pub struct Sum<S> {
     /// Rounded sum.
     total: S,
-    /// Rest that rounding left, at most half a unit in the last place of `total`.
+    /// Remainder after rounding, at most half a unit in the last place of `total`.
     rest: S,
 }
 
@@ -51,11 +51,11 @@ impl<S: Scalar> Extend<S> for Sum<S> {
 pub trait Dots: Copy {
     /// Dot products of every row `a` with every row `b`, all of one length: those of `b[o]` in element `o`.
     ///
-    /// Sums run in as many parts as a vector has lanes, which errs less than one running sum.
+    /// Sums run in as many parts as a vector has lanes, which has smaller errors than one running sum.
     fn dots<V: Simd, const R: usize, const O: usize>(simd: V, a: [&[Self]; R], b: [&[Self]; O]) -> [[Self; R]; O];
 }
 
-// Loops over indices, not closures: those would not inherit the instruction set.
+// Loops over indices, not closures, which would not inherit the instruction set.
 macro_rules! dots_in_vectors {
     ($number:ty, $vector:ident, $split:ident, $splat:ident, $load:ident, $multiply_add:ident, $sum:ident) => {
         impl Dots for $number {
@@ -119,7 +119,7 @@ macro_rules! dots_in_vectors {
 dots_in_vectors!(f32, f32s, as_simd_f32s, splat_f32s, partial_load_f32s, mul_add_e_f32s, reduce_sum_f32s);
 dots_in_vectors!(f64, f64s, as_simd_f64s, splat_f64s, partial_load_f64s, mul_add_e_f64s, reduce_sum_f64s);
 
-/// The same by loops, for numbers without vectors: four partial sums.
+/// Dot products by loops, for numbers without vectors: four partial sums.
 macro_rules! dots_in_loops {
     ($zero:expr) => {
         #[inline(always)]

@@ -1,7 +1,7 @@
 //! Errors of recorded functions against nested forward numbers in double-double, which have 32 digits.
 //!
-//! `R` is an error in units of the rounding unit times the condition: how far one relative rounding of every operand moves an answer, or
-//! the answer itself where that is larger. `cargo test --lib tape::accuracy -- --nocapture` prints the largest `R`.
+//! `R` is an error in units of the rounding unit times the condition: the change of a result by one relative rounding of every operand, or
+//! the result itself if that is larger. `cargo test --lib tape::accuracy -- --nocapture` prints the largest `R`.
 
 use super::Function;
 use crate::forward::HyperDual;

@@ -27,7 +27,7 @@ impl<T: Real> Node<T> {
     fn new(arguments: u64, da: T, db: T) -> Self {
         Self { arguments: Cell::new(arguments), da: Cell::new(da), db: Cell::new(db) }
     }
-    /// The nodes that it depends on.
+    /// The nodes of its arguments.
     #[inline(always)]
     fn arguments(&self) -> (usize, usize) {
         let both = self.arguments.get();
@@ -58,8 +58,8 @@ pub struct Tape<T> {
 /// Room of a new tape, in nodes.
 const FIRST_ROOM: u32 = 128;
 
-/// Sweeps nodes, the last one first: the weight of each goes to its arguments, which precede it. `values` are the
-/// adjoints up to the last node; answers with those before the first one.
+/// Sweeps nodes, the last one first: the weight of each goes to its arguments, which precede it. `values` are the adjoints up to the last
+/// node; returns those before the first one.
 ///
 /// Arguments were mostly recorded just before, so the next weight is handed on in a register where it was just
 /// computed: a number read back from memory right after it was written would cost more than everything else here.
@@ -213,8 +213,8 @@ impl<T: Real> Tape<T> {
         sweep(&self.room[1..room.min(last + 1)], before);
         Ok(())
     }
-    /// Forgets everything recorded and any error, and keeps the memory: what was recorded once is recorded again
-    /// without allocating. No variable can outlive it.
+    /// Discards the recording and any error, and keeps the memory: the next recording of the same size does not allocate. No variable can
+    /// outlive it.
     pub fn reset(&mut self) {
         let count = self.count.replace(1);
         self.peak = self.peak.max(count as usize - 1);
@@ -240,7 +240,7 @@ impl<T: Real> Adjoints<T> {
     pub fn new() -> Self {
         Self { values: Vec::new() }
     }
-    /// Derivative of the last sweep's output by `variable`; 0 for constants and for what was recorded later.
+    /// Derivative of the last sweep's output by `variable`; 0 for constants and for variables that were recorded later.
     ///
     /// Independent variables and results of operations on two variables have one. A result `f(x)` of one variable is
     /// not recorded (its derivative is carried along with the number), so only `x` has: `NaN`, unless `f' = 1`.

@@ -11,13 +11,12 @@ pub const ROWS: u32 = 1 << 20;
 /// Numbers of tangents at most while second derivatives are recorded, 32 bytes each.
 pub const TANGENTS: usize = 3_000_000;
 
-/// A function `f: R^n -> R` that was recorded once: values, gradients, Hessians and their products with vectors, of single points and of
+/// A function `f: R^n -> R` that was recorded once: values, gradients, Hessians and their products with vectors, for single points and
 /// batches.
 ///
-/// The derivatives are programs too, recorded on first use from the rules of each operation. What is zero does not occur in them, what is
-/// constant takes no time: the Hessian of a function whose terms join few numbers each costs as much as it has entries. Points are
-/// `(batch, n)`. After the first call of a kind nothing is allocated. A clone shares the recording and has buffers of its own, one for each
-/// thread.
+/// The derivatives are programs too, recorded on first use from the rules of each operation. They contain no zeros, and constants take no
+/// time: if each term of a function joins few numbers, its Hessian costs as much as it has entries. Points are `(batch, n)`. After the
+/// first call of a kind nothing is allocated. A clone shares the recording and has buffers of its own, one for each thread.
 ///
 /// ```
 /// use lnn::scalar::Real;
@@ -71,7 +70,7 @@ impl<S: Scalar> Function<S> {
     /// Records `f(x, parameters)` of `n` numbers and parameters, which are the same for all points of a batch and have these values.
     ///
     /// # Errors
-    /// As of [`Function::record`].
+    /// Those of [`Function::record`].
     pub fn with_parameters<F>(n: usize, parameters: Vec<S>, f: F) -> Result<Self, TapeError>
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Tracer<'t, S>,
@@ -99,7 +98,7 @@ impl<S: Scalar> Function<S> {
         &self.parameters
     }
 
-    /// Gives the parameters other values.
+    /// Sets new values of the parameters.
     ///
     /// # Errors
     /// [`TapeError::Shape`].
@@ -184,7 +183,7 @@ impl<S: Scalar> Function<S> {
         outcome
     }
 
-    /// Row and column of every entry of the lower triangle of the Hessian that is not zero whatever `x` is, row by row.
+    /// Row and column of every entry of the lower triangle of the Hessian that is not identically zero, row by row.
     ///
     /// # Errors
     /// [`TapeError::Full`].
@@ -192,8 +191,8 @@ impl<S: Scalar> Function<S> {
         Ok(&self.by_pattern()?.places)
     }
 
-    /// Values, `(batch)`, gradients, `(batch, n)`, and the entries of the Hessians in the order of the [pattern](Self::pattern),
-    /// `(batch, entries)`: the same bits as of [`Function::hessians`].
+    /// Values, `(batch)`, gradients, `(batch, n)`, and the entries of the Hessians in the order of the [pattern](Self::pattern), `(batch,
+    /// entries)`: bit for bit those of [`Function::hessians`].
     ///
     /// # Errors
     /// [`TapeError::Shape`], [`TapeError::Full`].
@@ -268,7 +267,7 @@ fn every_direction<R: Real>(n: usize) -> Directions<R> {
     }
 }
 
-/// A program of derivatives of a function with so many inputs.
+/// A program of derivatives of a function with this many inputs.
 fn recorded<S: Scalar, F>(inputs: usize, value: &Program<S>, f: F) -> Result<Program<S>, TapeError>
 where
     F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Option<Vec<Tracer<'t, S>>>,

@@ -14,12 +14,11 @@
 //!   an [`Evaluation`] evaluates all terms of a Lagrangian: `p`, `g`, `M`, `c`, and gradients of losses of the
 //!   accelerations by parameters and state.
 //!
-//! Memory of a [`Tape`] over numbers of `s` bytes: `8 + 2 s` bytes per node (24 for `f64`), of which there is one per
-//! variable and one per operation on two variables; functions of one variable, constant factors and constant summands
-//! need none. The sweep holds `s` bytes per node besides, in [`Adjoints`]. A reset keeps the memory and costs nothing per
-//! node (the one after a recording that outgrew the room allocates room for it); the next sweep clears one adjoint per
-//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row and
-//! lane of one chunk of 64 states, of 8 for large programs and of one for a single state.
+//! Memory of a [`Tape`] over numbers of `s` bytes: `8 + 2 s` bytes per node (24 for `f64`), of which there is one per variable and one per
+//! operation on two variables; functions of one variable, constant factors and constant summands need none. In addition the sweep holds `s`
+//! bytes per node, in [`Adjoints`]. A reset keeps the memory and costs nothing per node (after a recording that outgrew the memory, it
+//! allocates more); the next sweep clears one adjoint per node recorded, not per node held. A [`Replay`] holds `s` bytes per row and lane
+//! of one chunk of 64 states, of 8 for large programs and of one for a single state.
 //!
 //! In all of them constants are never recorded and variables of two recordings never mix silently. On the [`Tape`] a zero
 //! adjoint times an infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`; a [`Recorded`]
@@ -70,18 +69,18 @@ use alloc::vec::Vec;
 
 /// Why a recording or a sweep gave no result.
 ///
-/// Operators cannot fail, so the first error is kept by the tape, the number becomes `NaN`, and the call that asks
-/// for a result returns the error.
+/// Operators cannot fail, so the tape keeps the first error, the number becomes `NaN`, and the call that requests a result returns the
+/// error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TapeError {
     /// An operation joined variables of two tapes.
     MixedTapes,
-    /// A program that is to be replayed read a value while it was recorded.
+    /// A program for replay read a value while it was recorded.
     DataDependentBranch,
     /// The tape is full.
     Full {
-        /// Nodes it may hold.
+        /// Largest number of nodes.
         limit: u32,
     },
     /// A result was requested from a tape for a variable that it did not record.
@@ -179,7 +178,7 @@ pub fn derivative<T: Real>(f: &impl ScalarFunction, x: &[T], direction: &[T]) ->
 /// Forward mode (`n` passes) where `n <= m`, reverse mode (one recording, `m` sweeps) otherwise.
 ///
 /// # Errors
-/// The tape's: see [`TapeError`].
+/// Those of the tape: see [`TapeError`].
 pub fn jacobian<T: Real>(f: &impl VectorFunction, x: &[T]) -> Result<(Vec<T>, Vec<T>), TapeError> {
     let (n, m) = (x.len(), f.outputs());
     let mut matrix = vec![T::zero(); m * n];

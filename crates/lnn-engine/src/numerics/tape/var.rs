@@ -10,14 +10,14 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number on a [`Tape`], or a constant.
 ///
-/// A function of one variable is not recorded: the number carries its derivative by the last recorded node along, so
-/// chains of such functions (negation, constant factors and summands, sines, powers) cost a product and no memory.
+/// A function of one variable is not recorded: the number carries its derivative by the last recorded node, so chains of such functions
+/// (negation, constant factors and summands, sines, powers) cost a product and no memory.
 #[derive(Clone, Copy)]
 pub struct Var<'t, T> {
     value: T,
     /// Derivative of the value by the node `id`.
     slope: T,
-    /// Node; 0 for constants. As wide as its neighbours, so that copies never load what was stored in parts.
+    /// Node; 0 for constants. As wide as its neighbours, so that copies never load data that was stored in parts.
     id: usize,
     tape: Option<&'t Tape<T>>,
 }
@@ -117,7 +117,7 @@ fn chained<T: Real>(partial: T, slope: T) -> T {
     if partial.is_exact_zero() { T::zero() } else { product }
 }
 
-/// Two tapes met: both report it.
+/// Numbers of two tapes were combined: both tapes report it.
 #[cold]
 #[inline(never)]
 fn mixed<T: Real>(first: &Tape<T>, second: &Tape<T>) {

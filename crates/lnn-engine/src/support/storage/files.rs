@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{fs, io};
 
-/// Operations of a file system. [`Disk`] is the real one; tests put one that fails in its place.
+/// Operations of a file system. [`Disk`] is the real one; tests use a failing one instead.
 pub trait Files: Send + Sync {
     /// Creates a file for writing; one that exists is refused.
     ///
@@ -24,7 +24,7 @@ pub trait Files: Send + Sync {
     /// # Errors
     /// The system's.
     fn sync(&self, file: &File) -> io::Result<()>;
-    /// Gives a file another name, taking the place of what had that name.
+    /// Renames a file, replacing any file of that name.
     ///
     /// # Errors
     /// The system's.
@@ -194,10 +194,10 @@ pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
 
 /// Writes `bytes` to `path` so that a reader sees the old content or the new, never part of either.
 ///
-/// The bytes go to a temporary file in the same directory, reach the disk, and take the name by a rename, which reaches
-/// the disk with the directory. A link is followed; what is not a regular file (`/dev/stdout`, a pipe) is written in
-/// place. On failure the temporary file is removed and the old content stays; only where the last operation fails, that
-/// of the directory, is the new content in place, and a power failure could still undo it.
+/// The bytes go to a temporary file in the same directory, reach the disk, and take the name by a rename, which reaches the disk with the
+/// directory. A link is followed; a target that is not a regular file (`/dev/stdout`, a pipe) is written in place. On failure the temporary
+/// file is removed and the old content stays. Only if the last operation fails, that of the directory, is the new content in place, and a
+/// power failure could still undo it.
 ///
 /// # Errors
 /// The error of the file system; a directory as target is refused.
@@ -205,10 +205,10 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole(&Disk, path, bytes)
 }
 
-/// As [`write_atomically`], but a file that holds something is never replaced, not even one that another writer puts there meanwhile.
+/// As [`write_atomically`], but a file with content is never replaced, not even one that another writer creates meanwhile.
 ///
 /// # Errors
-/// [`io::ErrorKind::AlreadyExists`] for a file that holds something; else as of [`write_atomically`].
+/// [`io::ErrorKind::AlreadyExists`] for a file with content; otherwise those of [`write_atomically`].
 pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if fs::symlink_metadata(path).is_ok() {
         let full = fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() > 0);
@@ -223,19 +223,19 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     }
 }
 
-/// [`write_atomically`] by the operations of `files`.
+/// [`write_atomically`] through the operations of `files`.
 ///
 /// # Errors
-/// As there.
+/// Those of [`write_atomically`].
 pub fn write_whole(files: &dyn Files, path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = AtomicWriter::create(files, path)?;
     file.append(bytes)?;
     file.finish()
 }
 
-/// A file written piece by piece; readers see the old content until [`AtomicWriter::finish`], as of [`write_atomically`].
+/// A file written piece by piece; readers see the old content until [`AtomicWriter::finish`], as with [`write_atomically`].
 ///
-/// Dropped before that, it leaves nothing behind, but for what was already written in place to a pipe or device.
+/// Dropped before that, it leaves nothing behind, except for data already written in place to a pipe or device.
 pub struct AtomicWriter<'a> {
     files: &'a dyn Files,
     file: File,
@@ -288,7 +288,7 @@ impl<'a> AtomicWriter<'a> {
     /// Gives the file its name.
     ///
     /// # Errors
-    /// As of [`write_atomically`].
+    /// Those of [`write_atomically`].
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()?;
         match self.temporary {
@@ -307,12 +307,12 @@ impl<'a> AtomicWriter<'a> {
     }
 }
 
-/// Test of writing: [`write_atomically`] could write to `path` now, found out before the work whose result it will be.
+/// Tests whether [`write_atomically`] could write to `path`, before the work on the content begins.
 ///
-/// A temporary file is created beside the target and removed again.
+/// A temporary file is created next to the target and removed again.
 ///
 /// # Errors
-/// As there.
+/// Those of [`write_atomically`].
 pub fn check_target(path: &Path) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(data) if data.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
@@ -324,12 +324,12 @@ pub fn check_target(path: &Path) -> io::Result<()> {
 
 /// Writes `bytes` to `newest` and keeps its old content as `previous`, until the next call.
 ///
-/// The new content is read back before anything is given up. If anything fails, or the program dies at any time, `newest` or
-/// `previous` holds the old content or the new, whole. A content of `newest` that is known to be damaged must not take
-/// the place of `previous`: then `keep` is false.
+/// The new content is read back before anything is removed. If anything fails, or the program dies at any time, `newest` or `previous`
+/// contains the complete old or new content. If the content of `newest` is known to be damaged, it must not replace `previous`: then `keep`
+/// is false.
 ///
 /// # Errors
-/// The error of the file system, or `InvalidData` if the bytes read back are others.
+/// The error of the file system, or `InvalidData` if the bytes read back differ.
 pub fn replace(files: &dyn Files, newest: &Path, previous: &Path, bytes: &[u8], keep: bool) -> io::Result<()> {
     let temporary = TemporaryFile::write(files, newest, bytes)?;
     temporary.verify(bytes)?;
@@ -339,7 +339,7 @@ pub fn replace(files: &dyn Files, newest: &Path, previous: &Path, bytes: &[u8], 
     temporary.take_name()
 }
 
-/// A temporary file beside its target; removed unless it takes the target's name.
+/// A temporary file next to its target; removed unless it takes the target's name.
 struct TemporaryFile<'a> {
     files: &'a dyn Files,
     target: PathBuf,
@@ -369,7 +369,7 @@ impl<'a> TemporaryFile<'a> {
         Ok(temporary)
     }
 
-    /// Gives the file the permissions of the target, if that exists, and brings it to the disk.
+    /// Gives the file the permissions of the target, if that exists, and flushes it to the disk.
     fn complete(&self, file: &File) -> io::Result<()> {
         if let Ok(old) = fs::metadata(&self.target) {
             file.set_permissions(old.permissions())?;
@@ -411,7 +411,7 @@ impl Drop for TemporaryFile<'_> {
 /// End of the name of a temporary file.
 const TEMPORARY: &str = ".tmp";
 
-/// A number that no other call in this process gives.
+/// A number that is unique in this process.
 pub(in crate::support::storage) fn serial() -> usize {
     static COUNTER: AtomicUsize = AtomicUsize::new(0);
     COUNTER.fetch_add(1, Ordering::Relaxed)
@@ -426,9 +426,9 @@ fn temporary_name(name: &OsStr) -> OsString {
     temporary
 }
 
-/// Removes the temporary files that writers killed in the middle left in a directory.
+/// Removes temporary files of killed writers from a directory.
 ///
-/// Those of processes that still run stay; where the system does not tell which processes run (in `/proc`), all stay.
+/// Files of running processes stay; if the system does not list running processes (in `/proc`), all stay.
 pub fn remove_leftovers(files: &dyn Files, directory: &Path) {
     let processes = Path::new("/proc");
     if !processes.join("self").exists() {
@@ -524,7 +524,7 @@ mod tests {
     fn only_temporary_files_of_dead_processes_are_removed() {
         let directory = tempfile::tempdir().unwrap();
         let name = |name: &str| directory.path().join(name);
-        // No process has this number: it is above the largest that Linux gives.
+        // No process has this number: it exceeds the largest that Linux assigns.
         let dead = name(".model.safetensors.4194999.0.tmp");
         let living = name(&format!(".a.{}.7.tmp", std::process::id()));
         let others = [living, name("a.4194999.0.tmp"), name(".4194999.0.tmp"), name(".a.b.0.tmp"), name("tmp")];

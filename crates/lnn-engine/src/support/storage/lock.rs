@@ -5,7 +5,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Name of the file that is locked; its text names the process.
+/// Name of the locked file; its text names the process.
 const LOCK: &str = ".lnn.lock";
 
 /// Longest text of a lock file that is read, in bytes.
@@ -35,8 +35,8 @@ fn is_held(path: &Path) -> bool {
 #[cfg(windows)]
 const SHARING_VIOLATION: i32 = 32;
 
-/// As elsewhere, but the open file is the lock: others may read it, and can neither write nor remove it. A lock of Windows would keep its text
-/// from all who ask for the holder.
+/// As on other systems, but opening the file is the lock: others may read it, but neither write nor remove it. A Windows lock would hide
+/// its text from processes that look for the holder.
 #[cfg(windows)]
 fn lock(path: &Path) -> io::Result<Option<File>> {
     use std::os::windows::fs::OpenOptionsExt;
@@ -67,7 +67,7 @@ pub struct DirectoryLock {
 pub enum Acquired {
     /// The lock; if a process died with it, that process.
     Lock(DirectoryLock, Option<LockOwner>),
-    /// Another process holds the lock; which, if its file says so.
+    /// Another process holds the lock; which one, if its file says so.
     Held(Option<LockOwner>),
 }
 
@@ -86,7 +86,7 @@ impl DirectoryLock {
             io::Seek::rewind(&mut file)?;
             file.write_all(own.as_bytes())?;
             file.flush()?;
-            // A holder that removed the file between opening and locking left a lock on a file without a name.
+            // A holder that removed the file between opening and locking left a lock on an unnamed file.
             match File::open(&path).map(|mut named| text(&mut named)) {
                 Ok(named) if named == own => {
                     return Ok(Acquired::Lock(Self { path, file: Some(file) }, before));
@@ -109,16 +109,16 @@ impl DirectoryLock {
 
 impl Drop for DirectoryLock {
     fn drop(&mut self) {
-        // Windows removes no file that is open so; elsewhere another process could lock the file before it is removed.
+        // Windows does not remove a file that is opened in this way; elsewhere another process could lock the file before it is removed.
         if cfg!(windows) {
             drop(self.file.take());
         }
-        // A file left behind does no harm: the lock is what counts.
+        // A file left behind does no harm: only the lock counts.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// The beginning of a file, as far as it is text.
+/// The beginning of a file, up to the first byte that is not text.
 fn text(file: &mut File) -> String {
     let mut text = String::new();
     // An unreadable file does not identify the holder; only the lock itself counts.
@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(DirectoryLock::holder(directory.path()), Some(Some(owner)));
         drop(lock);
         assert_eq!(DirectoryLock::holder(directory.path()), None);
-        // A process that died left its file without a lock.
+        // A dead process left its file without a lock.
         fs::write(directory.path().join(LOCK), "process 1\nhost far\n").unwrap();
         let Acquired::Lock(_lock, Some(before)) = DirectoryLock::acquire(directory.path()).unwrap() else { panic!() };
         assert_eq!(before.to_string(), "process 1 on far");

@@ -1,10 +1,10 @@
-//! Memory that the machine has left, and threads: as many as were requested, or as many as the system starts.
+//! Available memory of the machine, and threads: as many as were requested, or as many as the system starts.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, scope};
 
-/// Bytes that can be taken without the machine beginning to swap, where the system tells (`MemAvailable` of Linux).
+/// Bytes that can be allocated before the machine begins to swap, if the system states it (`MemAvailable` on Linux).
 pub fn available_memory() -> Option<u64> {
     parse(&std::fs::read_to_string("/proc/meminfo").ok()?)
 }
@@ -30,7 +30,7 @@ fn abreast(threads: usize, work: impl Fn() + Sync) {
     });
 }
 
-/// `work` on every item, by so many threads; the results keep the order of the items.
+/// `work` on every item, on this many threads; the results keep the order of the items.
 pub fn in_order<T: Sync, R: Send>(items: &[T], threads: usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(items.len()));

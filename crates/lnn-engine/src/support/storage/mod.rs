@@ -1,4 +1,4 @@
-//! Files read within limits and written whole or not at all; locks of directories; memory and threads that the machine gives.
+//! Files read within limits and written whole or not at all; locks of directories; available memory and threads.
 
 #[cfg(feature = "model-files")]
 pub mod container;

@@ -1,9 +1,8 @@
 //! Model files: a network with everything needed to rebuild it, in one safetensors file.
 //!
-//! `docs/model-format.md` describes every tensor and every key, and how `L` follows from them. The metadata have the one key `lnn`, a
-//! JSON object with the fields of [`Header`] and `checksum`: eight hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to
-//! the comma before `"checksum"`, followed by the bytes of the tensors. A changed bit anywhere is refused. The same model gives the
-//! same bytes.
+//! `docs/model-format.md` describes every tensor and every key, and how `L` follows from them. The metadata have the one key `lnn`, a JSON
+//! object with the fields of [`Header`] and `checksum`: eight hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to the comma
+//! before `"checksum"`, followed by the bytes of the tensors. Any changed bit is detected and refused. The same model gives the same bytes.
 
 pub use crate::storage::container::StoredPrecision;
 
@@ -80,7 +79,7 @@ impl<S: Scalar> ModelFile<S> {
     /// Weights are converted to `S`: widening is exact, `f64` weights read as `f32` are rounded to nearest.
     ///
     /// # Errors
-    /// [`ModelFileError`] for anything but a whole, undamaged model file of this format.
+    /// [`ModelFileError`] for anything but an intact model file of this format.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelFileError> {
         let (header, file) = unpack::<Header>(&MODEL, bytes)?;
         header.validate()?;
@@ -101,15 +100,15 @@ impl<S: Scalar> ModelFile<S> {
     /// Writes the file whole or not at all: a temporary file in the same directory, synchronised, then renamed.
     ///
     /// # Errors
-    /// As [`ModelFile::to_bytes`], and [`ModelFileError::Write`].
+    /// Those of [`ModelFile::to_bytes`], and [`ModelFileError::Write`].
     pub fn save(&self, path: &Path) -> Result<(), ModelFileError> {
         self.save_to(&Disk, path)
     }
 
-    /// [`ModelFile::save`] by the operations of `files`.
+    /// [`ModelFile::save`] through the operations of `files`.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`ModelFile::save`].
     #[doc(hidden)]
     pub fn save_to(&self, files: &dyn Files, path: &Path) -> Result<(), ModelFileError> {
         write_whole(files, path, &self.to_bytes()?).map_err(ModelFileError::Write)
@@ -187,7 +186,7 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
 /// Format that this version writes and reads.
 pub const FORMAT: u32 = 1;
 
-/// Most coordinates of a model: the memory of an evaluation grows with their square, that of a file does not.
+/// Largest number of coordinates of a model: the memory of an evaluation grows with its square, that of a file does not.
 pub const MAX_COORDINATES: usize = 256;
 
 /// Largest width of a hidden layer.
@@ -203,20 +202,20 @@ pub struct Header {
     pub crate_version: String,
     /// Shape of the network, scales and periodic coordinates.
     pub architecture: Architecture,
-    /// Name of the system it learned: one of the catalogue, or any text for a system that was only recorded.
+    /// Name of the system that it learned: one of the catalogue, or any text for a recorded system.
     pub system: String,
     /// The system itself, if it is described by a file; it has this name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<Description>,
-    /// Values of all parameters of that system, in their units; empty for one that was only recorded.
+    /// Values of all parameters of that system, in their units; empty for a recorded system.
     pub parameters: BTreeMap<String, f64>,
     /// Names of the components of a state: coordinates, then velocities.
     pub columns: Vec<String>,
-    /// Names of the columns of the known external forces it was learned with, one per coordinate; empty if there were none.
+    /// Names of the columns of the known external forces in the training data, one per coordinate; empty if there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<String>,
-    /// Formulas that vanish along the motion, by name, over coordinates and velocities: constraints that were found in the motion it was
-    /// learned from, or given with it. Empty if there were none, and where the constraints are those of the description.
+    /// Formulas that vanish along the motion, by name, over coordinates and velocities: constraints found in the training motion, or given
+    /// with it. Empty if there were none, and if the constraints are those of the description.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constraints: BTreeMap<String, String>,
     /// Number type of the weights.
@@ -266,7 +265,7 @@ impl Header {
         require(self.validation_loss.is_finite(), "validation_loss: expected a finite number")
     }
 
-    /// The formulas that hold the motion, if they are not those of a description.
+    /// The formulas of the constraints, if these do not come from a description.
     fn formulas(&self) -> Result<Option<FormulaConstraints>, ContainerError> {
         if self.constraints.is_empty() {
             return Ok(None);
@@ -276,12 +275,12 @@ impl Header {
         compiled.map(Some).map_err(|error| ContainerError::Header(error.to_string()))
     }
 
-    /// `true` if constraints hold the motion.
+    /// `true` if the motion has constraints.
     pub fn is_constrained(&self) -> bool {
         !self.held_by().is_empty()
     }
 
-    /// The constraints that hold the motion, formulas by name; those of a description have its parameters and definitions in them.
+    /// The constraints of the motion, formulas by name; those of a description have its parameters and definitions inserted.
     pub fn held_by(&self) -> &BTreeMap<String, String> {
         match &self.description {
             Some(description) if self.constraints.is_empty() => &description.constraints,
@@ -289,7 +288,7 @@ impl Header {
         }
     }
 
-    /// The motion of the model: that of its network, under the constraints that it was learned under.
+    /// The motion of the model: that of its network, under the constraints of its training.
     ///
     /// # Errors
     /// [`ContainerError::Header`] for constraints that contradict each other or leave no motion, or a network of other coordinates.
@@ -306,7 +305,7 @@ impl Header {
         }
     }
 
-    /// The described system whose constraints hold the motion.
+    /// The described system whose constraints apply to the motion.
     fn holding<S: Scalar>(&self) -> Result<Option<SystemInstance<S>>, ContainerError> {
         let described = self.description.as_ref().filter(|description| !description.constraints.is_empty());
         let Some(description) = described else { return Ok(None) };
@@ -314,8 +313,8 @@ impl Header {
         configure_values(Cow::Owned(system), &self.parameters).map(Some).map_err(wrong)
     }
 
-    /// The constraints that hold the motion as functions of states, with the values of their parameters; none if it is free. Those of
-    /// a description may follow from each other.
+    /// The constraints of the motion as functions of states, with the values of their parameters; none if it is free. Those of a
+    /// description may depend on each other.
     ///
     /// # Errors
     /// [`ContainerError::Header`] for formulas or parameters that do not fit.

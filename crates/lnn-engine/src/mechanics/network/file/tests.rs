@@ -375,7 +375,7 @@ proptest! {
 fn names_of_forces_are_kept_and_counted() {
     let plain = header(vec![4], true, StoredPrecision::F64);
     let text = |header: &Header| serde_json::to_string(header).unwrap();
-    // A file without forces reads and writes as ever.
+    // A file without forces reads and writes as before.
     assert!(!text(&plain).contains("forces"));
     assert_eq!(serde_json::from_str::<Header>(&text(&plain)).unwrap(), plain);
     let driven = Header { forces: vec!["tau1".to_string(), "tau2".to_string()], ..plain.clone() };

@@ -16,7 +16,7 @@ fn constant<S: Scalar>(value: f64) -> S {
 fn signed<S: Scalar>(magnitude: S, x: S) -> S {
     if x < S::of_f64(0.0) { -magnitude } else { magnitude }
 }
-/// `max(x, 0)`; what happens to `NaN` is left to the other terms.
+/// `max(x, 0)`; the other terms propagate `NaN`.
 #[inline(always)]
 fn positive_part<S: Scalar>(x: S) -> S {
     if x > S::of_f64(0.0) { x } else { S::of_f64(0.0) }

@@ -6,8 +6,8 @@ use crate::ops::Unary;
 use crate::scalar::{Real, Scalar, vectorized};
 use formula::Jet;
 
-/// Builds the enum and all that belongs to an activation from rows `Name "name" formula (operation);`: the name in configurations and
-/// files, the closed forms of [`formula`], and the row of the table of operations that it is.
+/// Builds the enum and all functions of activations from rows `Name "name" formula (operation);`: the name in configurations and files, the
+/// closed forms of [`formula`], and the corresponding row of the table of operations.
 macro_rules! table {
     ($($(#[$($doc:tt)*])* $name:ident $text:literal $formula:ident ($($operation:tt)*);)*) => {
         /// Elementwise function that ends a layer.

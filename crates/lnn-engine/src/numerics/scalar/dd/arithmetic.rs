@@ -26,7 +26,7 @@ impl Dd {
         let second = high - first;
         Self { high, low: (a - first) + (b - second) }
     }
-    /// The same number with its leading part rounded to nearest.
+    /// Normalises the number: its leading part is rounded to nearest.
     #[inline(always)]
     fn normal(self) -> Self {
         Self::fast_sum(self.high, self.low)
@@ -62,7 +62,7 @@ impl Dd {
 }
 
 impl Dd {
-    /// A pair that an algorithm made; `plain` is the answer of `f64` where that has none.
+    /// The result of an algorithm, or `plain`, the result of `f64`, if it is not finite.
     #[inline(always)]
     fn finite_or(self, plain: f64) -> Self {
         if self.high.is_finite() && self.low.is_finite() { self } else { Self::leading(plain) }
@@ -189,7 +189,7 @@ impl Num for Dd {
     }
 }
 
-/// A text that is not a decimal number.
+/// Text that is not a decimal number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnreadableNumber;
 
@@ -225,7 +225,7 @@ impl FromPrimitive for Dd {
     /// Exact below `2^106`, then rounded.
     fn from_i128(value: i128) -> Option<Self> {
         let high = value as f64;
-        // The rest is small: the leading part is the nearest `f64` (one step down where it left the integer type).
+        // The remainder is small: the leading part is the nearest `f64` (one step down if it exceeded the integer type).
         let rest = value.wrapping_sub(if high >= 2.0_f64.powi(127) { i128::MIN } else { high as i128 });
         Some(Self::new(high, rest as f64))
     }

@@ -223,7 +223,7 @@ impl Dd {
     }
 }
 
-/// `x^2` as a double-double number and what it leaves.
+/// `x^2` as a double-double number, and the remainder.
 fn exact_square(x: Dd) -> (Dd, f64) {
     let (high, low) = (x.high(), x.low());
     let square = high * high;

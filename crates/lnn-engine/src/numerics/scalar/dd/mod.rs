@@ -33,7 +33,7 @@ impl Dd {
     pub(crate) fn high(self) -> f64 {
         self.high
     }
-    /// Trailing part: what the leading part leaves.
+    /// Trailing part: the remainder after the leading part.
     #[inline]
     pub(crate) fn low(self) -> f64 {
         self.low

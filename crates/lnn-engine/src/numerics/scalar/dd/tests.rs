@@ -1,4 +1,4 @@
-//! The reference values of the elementary functions are those at the nearest double-double number to a decimal, from `mpmath` with 4000 bits.
+//! Reference values of the elementary functions at the double-double number nearest to a decimal, from `mpmath` with 4000 bits.
 #![allow(clippy::approx_constant, clippy::excessive_precision, clippy::inconsistent_digit_grouping)]
 
 use super::Dd;
@@ -28,7 +28,7 @@ fn call<R: Real>(name: &str, x: R) -> R {
     }
 }
 
-/// Relative error of at most `1e-30`, plus what the trailing part loses where it is subnormal.
+/// Relative error of at most `1e-30`, plus the loss of the trailing part if it is subnormal.
 fn check(name: &str, x: Dd, value: &str) {
     let exact = Dd::parse(value).unwrap();
     let found = call(name, x);
@@ -62,7 +62,7 @@ fn no_argument_panics() {
         }
         assert!(call(name, Dd::nan()).is_nan());
     }
-    // Where the exponential's reduction rounds to either side.
+    // Arguments where the exponential's reduction rounds to either side.
     for k in -2000..2000 {
         let x = std::f64::consts::LN_2 / 256.0 * f64::from(2 * k + 1);
         assert!((call("exp", Dd::of_f64(x)).to_f64() / x.exp() - 1.0).abs() < 1e-14);
@@ -162,7 +162,7 @@ fn reads_exactly() {
     for wrong in ["", " 1", "1 ", "1,0", "0x1", "1e", ".", "--1", "1e5.0"] {
         assert_eq!(Dd::parse(wrong), None, "{wrong}");
     }
-    // Digits beyond those kept still decide.
+    // Digits beyond the kept ones still decide.
     let long = format!("1{}1e-3000", "0".repeat(3000));
     assert_eq!(Dd::parse(&long), Some(Dd::of_f64(10.0)));
     let zeros = format!("0.{}1e5001", "0".repeat(5000));
@@ -382,7 +382,7 @@ const VALUES: &[(&str, f64, &str)] = &[
     ("sqrt", 123.456, "1.111107555549866662275144388949240981499e+1"),
 ];
 
-/// The same with two parts: `(function, high, low, value)`.
+/// Values for arguments in two parts: `(function, high, low, value)`.
 #[rustfmt::skip]
 const VALUES_IN_TWO_PARTS: &[(&str, f64, f64, &str)] = &[
     ("sin", 3.141592653589793, 1.2246467991473532e-16, "-2.994769809718339554641594267875450189973e-33"),

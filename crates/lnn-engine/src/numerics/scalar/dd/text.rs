@@ -19,8 +19,7 @@ fn binary(x: f64) -> (u64, i32) {
     }
 }
 
-/// Reads the grammar of Rust's `f64`: the leading part is the nearest `f64`, the trailing one the nearest `f64` to the
-/// exact rest.
+/// Reads the grammar of Rust's `f64`: the leading part is the nearest `f64`, the trailing one the `f64` nearest to the exact remainder.
 pub(super) fn parse(text: &str) -> Option<Dd> {
     let high: f64 = text.parse().ok()?;
     if high == 0.0 || !high.is_finite() {
@@ -259,7 +258,7 @@ impl Natural {
         if numerator.is_zero() {
             return 0.0;
         }
-        // Scaled so that the quotient has 63 or 64 bits; the last one also tells of everything below.
+        // Scaled so that the quotient has 63 or 64 bits; the last bit also reflects everything below.
         let shift = 64 - (numerator.bits() - denominator.bits());
         let lift = |x: &Self, by: i64| x.shifted_left(by.max(0) as u32);
         let (mut rest, mut divisor) = (lift(numerator, shift), lift(denominator, -shift));

@@ -1,6 +1,6 @@
 //! Circular functions and their inverses.
 //!
-//! Angles of any size are taken as quarter turns and a rest (M. H. Payne and R. N. Hanek, SIGNUM Newsletter 18, 1983).
+//! Angles of any size are reduced to quarter turns and a remainder (M. H. Payne and R. N. Hanek, SIGNUM Newsletter 18, 1983).
 //!
 //! `x 2/pi mod 4` is computed as an integer with 382 binary places: the bits of `2/pi` that make whole turns with the last
 //! bit of `x` are skipped. Cancellation near multiples of `pi/2` eats at most some 130 places of a double-double number.
@@ -206,7 +206,7 @@ fn quarter_turns(x: Dd) -> (u8, Dd) {
     }
     let signed = |part: f64| if part < 0.0 { negated(turns(part)) } else { turns(part) };
     let sum = add(signed(x.high), signed(x.low));
-    // Round to the nearest quarter; the rest is a signed fraction.
+    // Round to the nearest quarter; the remainder is a signed fraction.
     let mut half = [0; WORDS];
     half[0] = 1 << 61;
     let quarter = (add(sum, half)[0] >> 62) as u8;

@@ -5,10 +5,9 @@ mod pieces;
 use super::{Real, Scalar, update, vectorized};
 use crate::scalar::Dd;
 
-/// `e^y` in pieces, so that a product with it is rounded once even where it underflows.
+/// `e^y` in pieces, so that a product with it is rounded only once even if it underflows.
 ///
-/// `e^y = mantissa * first * second`: multiply what belongs together with `mantissa` first, then call
-/// [`Exponential::scale`].
+/// `e^y = mantissa * first * second`: first multiply the other factors with `mantissa`, then call [`Exponential::scale`].
 #[derive(Clone, Copy, Debug)]
 pub struct Exponential<S> {
     /// The part of moderate size.

@@ -46,7 +46,7 @@ macro_rules! impl_pieces {
             fn lane_exp(self) -> Exponential<Self> {
                 const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;
                 const BIAS: $bits = (<$float>::MAX_EXP - 1) as $bits;
-                // Adding it rounds to an integer, which then stands in the lowest bits.
+                // Adding it rounds to an integer, which is then in the lowest bits.
                 const MAGIC: $float = 1.5 * ((1 as $bits) << FRACTION) as $float;
                 const OFFSET: $bits = 1 << 11;
                 let y = if self < -$limit { -$limit } else { self };
@@ -119,7 +119,7 @@ macro_rules! impl_pieces {
                 let shifted = self.mul_add(core::$float::consts::FRAC_2_PI, MAGIC);
                 let n = shifted - MAGIC;
                 let r = n.mul_add(-$quarter_high, self);
-                // r is exact; z and what is lost of the difference r - p, rounding of the product included.
+                // r is exact; z contains the error of the difference r - p, including the rounding of the product.
                 let p = n * $quarter_middle;
                 let z = r - p;
                 let back = z - r;

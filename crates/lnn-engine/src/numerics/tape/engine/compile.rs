@@ -92,7 +92,7 @@ impl<S: Scalar> Recorded<S> {
     }
 }
 
-/// Decides what reaches the output linearly and whose adjoints need no zeros.
+/// Determines which values reach the output linearly, and which adjoints need no zeros.
 fn mark<S: Scalar>(operations: &[Operation<S>], values: &mut [Value], output: usize) {
     let mut readers = vec![0usize; values.len()];
     values.iter_mut().for_each(|value| value.is_output = false);
@@ -195,7 +195,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         });
         match &operation {
             Operation::Input(input) if kind == Dependence::Velocity => velocities.push(input.index - self.n),
-            // Nothing moves what a condition depends on.
+            // No direction changes the argument of a condition.
             Operation::Select(op) => {
                 velocities = op.branches.iter().flat_map(|&x| self.values[x].velocities.clone()).collect();
             }
@@ -214,7 +214,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
 
     /// The value of one unit that a row is.
     fn number(&mut self, row: u32) -> usize {
-        // Operands precede what reads them.
+        // Operands precede their readers.
         let Some((value, unit)) = self.place[row as usize] else { return 0 };
         if self.values[value].units == 1 {
             return value;
@@ -350,7 +350,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         self.push(Operation::Combination(Combination::new((a, factor), b)), 1, kind)
     }
 
-    /// The value that holds these rows in this order, made of them if there is none.
+    /// The value that contains these rows in this order, created if there is none.
     fn vector(&mut self, rows: &[u32]) -> usize {
         let places: Vec<(usize, usize)> = rows.iter().filter_map(|&row| self.place[row as usize]).collect();
         let (value, _) = places[0];

@@ -198,9 +198,8 @@ impl<S: Scalar> Evaluation<S> {
     /// Adds to `gradient` the derivative of the sum over the states of `L_st` by every parameter, and to `inputs`, both
     /// `(batch, n)`, those by the scaled states `q/s`, `v/s` with `s`, `t` held fixed.
     ///
-    /// With `s = -M^-1 u`, `t = a` and moving directions these are `u da/dtheta`, `u da/dq` and `u da/dv` of the
-    /// accelerations `a = M^-1 (g - c)`. The states are those evaluated last, to [`Depth::Training`], with these parameters;
-    /// every number of theirs must be finite.
+    /// With `s = -M^-1 u`, `t = a` and moving directions these are `u da/dtheta`, `u da/dq` and `u da/dv` of the accelerations `a = M^-1 (g
+    /// - c)`. The states are those evaluated last, to [`Depth::Training`], with these parameters; all their numbers must be finite.
     pub fn add_gradient(
         &mut self,
         parameters: &[S],
@@ -284,6 +283,6 @@ pub enum Depth {
     MassMatrix,
     /// `c`: `n + 3` passes.
     Motion,
-    /// As `Motion`, keeping what gradients of losses need.
+    /// As `Motion`, keeping the data for gradients of losses.
     Training,
 }

@@ -5,7 +5,7 @@ use crate::ops::{Activation, Binary, Unary};
 use crate::scalar::{Real, Scalar, exp_lanes, sin_cos_lanes, update, update2, update3, vectorized};
 use alloc::vec::Vec;
 
-/// Runs a loop over `count` numbers for the widest vector instructions, as it is where that is not worth a call.
+/// Runs a loop over `count` numbers with the widest vector instructions, or directly if a call does not pay.
 #[inline(always)]
 fn dispatched(count: usize, kernel: impl FnOnce()) {
     if count < 8 { kernel() } else { vectorized(kernel) }

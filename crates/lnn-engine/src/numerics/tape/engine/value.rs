@@ -1,9 +1,9 @@
 //! Values of a recorded Lagrangian: vectors of numbers per state, and the channels each of them carries.
 //!
-//! A value of `units` numbers on a chunk of `lanes` states is a stack of planes `(lanes, units)`, one plane per channel: the
-//! value itself, then its derivatives along directions of the inputs. What a value cannot have it does not carry: nothing
-//! moves a constant, no velocity moves what depends on positions alone, and the tangents are not needed of what reaches `L`
-//! by linear operations only.
+//! A value of `units` numbers on a chunk of `lanes` states is a stack of planes `(lanes, units)`, one plane per channel: the value itself,
+//! then its derivatives along directions of the inputs. A value carries only channels that it can have: a constant has no derivatives, a
+//! value that depends on positions alone has none along velocities, and a value that reaches `L` by linear operations only needs no
+//! tangents.
 
 use super::Depth;
 use alloc::vec::Vec;
@@ -27,7 +27,7 @@ pub(super) struct Value {
     pub kind: Dependence,
     /// The velocities it depends on, ascending.
     pub velocities: Vec<usize>,
-    /// It reaches `L` by operations that are linear in what moves.
+    /// It reaches `L` by operations that are linear in the varying values.
     pub is_output: bool,
     /// It depends on parameters.
     pub trainable: bool,
@@ -35,7 +35,7 @@ pub(super) struct Value {
     pub in_place: bool,
 }
 
-/// Channels of mixed sweeps that a value carries, in this order; its adjoints lie the same way.
+/// Channels of mixed sweeps that a value carries, in this order; its adjoints have the same layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mixed {
     /// The value, for products that take all channels at once.
@@ -52,7 +52,7 @@ pub(super) struct Mixed {
 /// Which directions a mixed sweep has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
-    /// None but the one of `x_st`: a first derivative.
+    /// Only that of `x_st`: a first derivative.
     First,
     /// Both.
     Second,
@@ -96,7 +96,7 @@ pub(super) struct Layout {
     pub total: usize,
     /// Directions of the channels from the first tangent on.
     directions: Vec<Vec<usize>>,
-    /// Channel of every value and direction, 0 where there is none.
+    /// Channel of every value and direction, 0 if there is none.
     channels: Vec<usize>,
     width: usize,
 }
@@ -113,7 +113,7 @@ impl Layout {
         let units = values.iter().map(|value| value.units).collect();
         Self { starts, units, counts, total, directions: Vec::new(), channels: Vec::new(), width: 0 }
     }
-    /// Of the forward sweep.
+    /// Channels of the forward sweep.
     pub fn forward(values: &[Value], depth: Depth, n: usize) -> Self {
         let directions: Vec<Vec<usize>> = values.iter().map(|value| value.directions(depth)).collect();
         let mut channels = vec![0; values.len() * (n + 1)];
@@ -147,7 +147,7 @@ pub(super) struct Store<'a, S> {
     pub numbers: &'a mut [S],
 }
 
-/// The same, to read.
+/// Stored values, for reading.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a, S> {
     pub layout: &'a Layout,
@@ -187,7 +187,7 @@ impl<S> Store<'_, S> {
         let (before, rest) = self.numbers.split_at_mut(range.start);
         (View { layout: self.layout, lanes: self.lanes, numbers: before }, &mut rest[..range.end - range.start])
     }
-    /// The planes of a value, and what was computed before it, to be added to.
+    /// The planes of a value, for adding to, and everything computed before it.
     #[inline]
     pub fn reverse(&mut self, value: usize) -> (Store<'_, S>, &[S]) {
         let range = self.layout.range(value, self.lanes);

@@ -1,10 +1,9 @@
 //! Programs: recorded once, replayed over the lanes of a batch.
 //!
-//! A row is one expression for some states side by side; rows that depend on parameters and constants alone are
-//! uniform and computed once for the batch. The interpreter visits one run of like operations at a time for one chunk of lanes:
-//! [`LANES`] of a small program, fewer of a large one whose rows would leave the caches, one of a single state. Its cost
-//! per operation is shared by the lanes and by the run, and the loops are SIMD. The chunks do not depend on the number of
-//! threads: the same batch gives the same bytes.
+//! A row is one expression for several states side by side; rows that depend on parameters and constants alone are uniform and computed
+//! once for the batch. The interpreter visits one run of like operations at a time for one chunk of lanes: [`LANES`] of a small program,
+//! fewer of a large one whose rows would leave the caches, one of a single state. Its cost per operation is shared by the lanes and by the
+//! run, and the loops are SIMD. The chunks do not depend on the number of threads: the same batch gives the same bytes.
 
 mod recorder;
 mod replay;
@@ -27,7 +26,7 @@ use crate::scalar::Scalar;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// Lanes of a chunk, of programs whose rows then stay in the nearest caches.
+/// Lanes of a chunk, for programs whose rows then stay in the nearest caches.
 pub const LANES: usize = 64;
 /// Lanes of the chunks of larger programs, and of few states.
 pub(super) const FEW_LANES: usize = 8;
@@ -45,13 +44,13 @@ pub struct Program<S> {
     lane_rows: usize,
     uniform: Vec<Run>,
     lanes: Vec<Run>,
-    /// Rows that the operations read, or what they name: an input, a parameter, a constant.
+    /// Operands: the rows that operations read, or the index of an input, a parameter or a constant.
     operands: Vec<u32>,
     constants: Vec<S>,
     outputs: Vec<u32>,
     inputs: usize,
     parameters: usize,
-    /// Of a small program: its operations for a single state.
+    /// For a small program, its operations for a single state.
     single: Option<Single<S>>,
 }
 
@@ -71,10 +70,10 @@ impl<S: Scalar> Program<S> {
         Self::record_within(PARAMETER, (inputs, parameters), |x, p| Some(f(x, p)))
     }
 
-    /// [`Program::record`], of at most `limit` rows; `None` of a function that gave up.
+    /// As [`Program::record`], with at most `limit` rows; `None` for a function that gave up.
     ///
     /// # Errors
-    /// As of [`Program::record`]; [`TapeError::Full`].
+    /// Those of [`Program::record`]; [`TapeError::Full`].
     pub fn record_within<F>(limit: u32, (inputs, parameters): (usize, usize), f: F) -> Result<Self, TapeError>
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Option<Vec<Tracer<'t, S>>>,
@@ -185,7 +184,7 @@ impl Listing {
     /// Records `f(inputs, parameters)`.
     ///
     /// # Errors
-    /// As of [`Program::record`](Program::record).
+    /// Those of [`Program::record`](Program::record).
     pub fn record<S: Scalar, F>(inputs: usize, parameters: usize, f: F) -> Result<Self, TapeError>
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Tracer<'t, S>,

@@ -25,7 +25,7 @@ pub(in crate::numerics::tape) enum Node<S> {
     Binary(Binary, u32, u32),
     /// Recordable branch.
     Select(u32, u32, u32),
-    /// `W x + b` on rows: as many rows as there are outputs.
+    /// `W x + b` on rows, one row per output.
     Dense(Dense),
 }
 
@@ -105,7 +105,7 @@ impl<S: Scalar> Recorder<S> {
     pub(in crate::numerics::tape) fn new(blocks: bool) -> Self {
         Self::within(PARAMETER, blocks)
     }
-    /// Of so many rows at most.
+    /// A recorder of at most `limit` rows.
     pub(in crate::numerics::tape) fn within(limit: u32, blocks: bool) -> Self {
         let graph =
             Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: SmallKeyMap::default() };
@@ -168,7 +168,7 @@ impl<S: Scalar> Recorder<S> {
     pub(in crate::numerics::tape) fn tracer(&self, row: u32) -> Tracer<'_, S> {
         Tracer::recorded(self, row)
     }
-    /// The row that holds a number; constants get one.
+    /// The row of a number; constants get one.
     pub(in crate::numerics::tape) fn row_of(&self, number: Tracer<'_, S>) -> u32 {
         match number.recorder() {
             None => self.row(Node::Constant(number.constant_value())),
@@ -184,7 +184,7 @@ impl<S: Scalar> Recorder<S> {
             }
         }
     }
-    /// Where a stretch of parameters starts, if that is what the numbers are.
+    /// The start of a stretch of parameters, if the numbers are one.
     fn stretch(&self, numbers: &[Tracer<'_, S>]) -> Option<usize> {
         let place = |number: &Tracer<'_, S>| {
             let own = number.recorder().is_some_and(|recorder| core::ptr::eq(recorder, self));
@@ -230,7 +230,7 @@ impl<S: Scalar> Recorder<S> {
             _ => None,
         })
     }
-    /// What there is to know of the operation that fills a row.
+    /// Looks up the operation that fills a row.
     fn looked_up<T>(&self, row: u32, look: impl FnOnce(&Graph<S>, &Node<S>) -> Option<T>) -> Option<T> {
         if row & PARAMETER != 0 {
             return None;

@@ -13,13 +13,13 @@ use crate::tape::{TapeError, check_length};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// Bytes of the rows of a chunk at most, for [`LANES`] lanes: those of larger programs leave the second cache.
+/// Largest size in bytes of the rows of a chunk of [`LANES`] lanes: larger programs would leave the second cache.
 const CHUNK: usize = 1 << 19;
 
 /// Fields up to this width are written column by column.
 const NARROW: usize = 16;
 
-/// From so many functions of a single state on vectors are worth a call.
+/// From this many functions of a single state on, vectors are worth a call.
 const TOGETHER: usize = 4;
 
 /// Buffers for replaying a [`Program`]: the rows of one chunk of lanes, so that repeated replays allocate nothing. A clone starts
@@ -135,8 +135,8 @@ impl<S: Scalar> Replay<S> {
     }
 }
 
-/// Writes rows of the program as columns of a wide field, few lanes at a time: each is read once, and what is written to a state stands side by
-/// side.
+/// Writes rows of the program as columns of a wide field, a few lanes at a time: each row is read once, and the results of a state are
+/// contiguous.
 #[inline(never)]
 fn write_rows<S: Scalar, const W: usize>(rows: &[Row<S, W>], wanted: &[u32], field: &mut [S]) {
     let width = wanted.len();
@@ -151,7 +151,7 @@ fn write_rows<S: Scalar, const W: usize>(rows: &[Row<S, W>], wanted: &[u32], fie
     }
 }
 
-/// What the states of a batch are made of.
+/// The inputs of a batch of states.
 struct Batch<'a, S> {
     /// Lane inputs: fields `(lanes, width)` side by side.
     inputs: &'a [&'a [S]],
@@ -311,7 +311,7 @@ fn zip<S: Scalar, const W: usize>(run: &Run, operands: &[u32], rows: &mut [Row<S
     }
 }
 
-/// A function that is a call for a whole row; of single states for a whole run.
+/// A function that is a call: for a whole row, or for single states for a whole run.
 #[inline(never)]
 fn functions<S: Scalar, const W: usize>(f: Unary, operands: &[u32], out: usize, rows: &mut [Row<S, W>]) {
     if const { W == 1 } && operands.len() >= TOGETHER {
@@ -386,7 +386,7 @@ pub(super) struct Step<'a> {
     pub kind: Kind,
     /// First row that it fills.
     pub out: usize,
-    /// Rows that it reads, or what it names.
+    /// The rows that it reads, or the index that it names.
     pub operands: &'a [u32],
 }
 

@@ -7,10 +7,10 @@ use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// From so many operations on a run takes none that reads another one of it.
+/// A run of at least this many operations contains none that reads another one of it.
 const UNCHAINED: usize = 6;
 
-/// What an operation does, its operands apart.
+/// The kind of an operation, without its operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Lane input.
@@ -58,7 +58,7 @@ impl Kind {
     pub fn rows(self) -> usize {
         if self == Self::SinCos { 2 } else { 1 }
     }
-    /// `true` if the operations of a run are computed one after the other, so that one may read what another one fills. Functions are
+    /// `true` if the operations of a run are computed one after the other, so that one may read the result of another one. Functions are
     /// computed side by side.
     fn may_chain(self) -> bool {
         match self {
@@ -76,9 +76,9 @@ pub(super) struct Run {
     pub kind: Kind,
     /// First row that is filled.
     pub out: u32,
-    /// Where the operands stand, operation by operation.
+    /// The range of the operands, operation by operation.
     pub operands: Range<usize>,
-    /// `true` if an operation reads what another one of the run fills.
+    /// `true` if an operation of the run reads the result of another one.
     pub chained: bool,
 }
 
@@ -142,7 +142,7 @@ impl<S: Scalar> Compiler<'_, S> {
         }
     }
 
-    /// The operations kind by kind, each as soon as its operands are there; those that begin a run are marked.
+    /// The operations grouped by kind, each as soon as its operands are available; the first ones of runs are marked.
     fn grouped(&self, nodes: &[usize]) -> Vec<(usize, bool)> {
         let count = self.graph.nodes.len();
         let (mut waiting, mut here) = (vec![0u32; count], vec![false; count]);

@@ -1,4 +1,4 @@
-//! First and second derivatives of a recorded function, operation by operation, zeros left out.
+//! First and second derivatives of a recorded function, operation by operation, without zeros.
 //!
 //! With the adjoints `w` of one reverse sweep, the tangents `t` of all values along some directions and the tangents `z` of the adjoints, an
 //! operation `y = f(a, ..)` adds
@@ -7,9 +7,9 @@
 //! t_y = f' t_a,    w_a += f' w_y,    z_a += f' z_y + w_y f'' t_a.
 //! ```
 //!
-//! Tangents are lists of the directions along which a value moves at all. Those of adjoints are kept as sums of a few lists with factors, as
-//! long as that takes fewer products: on the way through operations of one operand a factor is multiplied instead of a list. On numbers of another recording the result is a program of the
-//! derivatives, in which what is zero or constant does not occur.
+//! Tangents are lists of the directions along which a value varies. Those of adjoints are kept as sums of a few lists with factors, as long
+//! as that takes fewer products: an operation with one operand then multiplies a factor instead of a list. On numbers of another recording
+//! the result is a program of the derivatives, without zeros and constants.
 
 use super::Program;
 use super::replay::Step;
@@ -26,8 +26,7 @@ type Sparse<R> = Vec<(u32, R)>;
 pub struct Directions<R> {
     /// How fast each input moves along which directions.
     pub seeds: Vec<Sparse<R>>,
-    /// Inputs by which the second derivative is taken, and the direction that is the input's own: of two such inputs the derivative
-    /// stands with the later one.
+    /// Inputs for second derivatives, with their own directions: for two such inputs, the derivative is stored with the later one.
     pub rows: Vec<Option<u32>>,
     /// Directions from here on belong to no single input: derivatives along them are kept with every input.
     pub shared: u32,
@@ -41,12 +40,12 @@ pub struct Derivatives<R> {
     pub value: R,
     /// By every input.
     pub first: Vec<R>,
-    /// By every input and along the directions that were requested.
+    /// Second derivatives by every input and along the requested directions.
     pub second: Vec<Sparse<R>>,
 }
 
 impl<S: Scalar> Program<S> {
-    /// Value and first derivatives of the only output, and second ones along directions; `None` where those take more tangents than allowed.
+    /// Value and first derivatives of the only output, and second ones along directions; `None` if those take more tangents than allowed.
     pub fn derivatives<R: Real>(
         &self,
         inputs: &[R],
@@ -100,7 +99,7 @@ struct Sweep<'a, S, R> {
     program: &'a Program<S>,
     values: Vec<R>,
     directions: Option<&'a Directions<R>>,
-    /// The last direction of its own among the inputs that a value depends on, and by which second derivatives are wanted.
+    /// The last own direction among the inputs that a value depends on and by which second derivatives are requested.
     last: Vec<Option<u32>>,
     /// Tangents of all values, and then sums that were computed for adjoints.
     tangents: Vec<Sparse<R>>,
@@ -187,7 +186,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
             second: vec![Vec::new(); inputs],
         };
         adjoints[output] = R::one();
-        // Of uniform rows nothing is asked.
+        // Uniform rows are not needed.
         for step in program.steps().rev().take_while(|step| step.out >= program.uniform_rows) {
             let (w, z) = (adjoints[step.out], core::mem::replace(&mut curved[step.out], Curve::none()));
             let operand = |k: usize| step.operands[k] as usize;
@@ -259,7 +258,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         Some(derivatives)
     }
 
-    /// Adds `factor z` and `bend t`, as far as they reach a second derivative that is wanted.
+    /// Adds `factor z` and `bend t`, as far as they contribute to a requested second derivative.
     fn curve(
         &mut self,
         curved: &mut [Curve<R>],
@@ -293,7 +292,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         self.spent += short.len().saturating_sub(before);
     }
 
-    /// The list of the tangents, as far as it reaches a second derivative by what row `x` depends on.
+    /// The list of the tangents, as far as it contributes to a second derivative by the inputs of row `x`.
     fn sum(&mut self, z: Curve<R>, x: usize) -> Sparse<R> {
         let (Some(directions), Some(last)) = (self.directions, self.last[x]) else { return Vec::new() };
         let mut sum = z.short;
@@ -305,7 +304,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         sum
     }
 
-    /// A list as it is.
+    /// A list without a factor.
     fn kept(&mut self, list: Sparse<R>) -> Curve<R> {
         if list.len() < LONG {
             return Curve { long: Vec::new(), short: list };
@@ -314,7 +313,7 @@ impl<S: Scalar, R: Real> Sweep<'_, S, R> {
         Curve { long: vec![(self.tangents.len() - 1, None)], short: Vec::new() }
     }
 
-    /// The tangents of the adjoint of row `x` as they continue to so many operands: added now where that takes no more products than later.
+    /// The tangents of the adjoint of row `x` that continue to `ways` operands: added now if that takes no more products than later.
     fn passed_on(&mut self, z: Curve<R>, x: usize, ways: usize) -> Curve<R> {
         let is_plain = z.long.iter().all(|(_, factor)| factor.is_none());
         let later = match z.long.len() {

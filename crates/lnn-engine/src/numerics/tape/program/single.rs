@@ -1,8 +1,8 @@
 //! Single states of small programs: one operation after the other.
 //!
-//! A run is decided on once for its operations and lanes. Of a single state with few operations that decision takes more time than the
-//! operations; here each is decided on by itself, and no index needs a check, because a byte names one of 256 rows. The results are the same
-//! to the bit.
+//! A run is dispatched once for all its operations and lanes. For a single state with few operations that dispatch takes longer than the
+//! operations. Here each operation is dispatched separately, and no index needs a check, because a byte addresses one of 256 rows. The
+//! results are the same to the bit.
 
 use super::Program;
 use super::replay::value;
@@ -14,8 +14,8 @@ use alloc::vec::Vec;
 
 /// Rows of a program at most. One more takes the inputs that no operation reads.
 const ROWS: usize = u8::MAX as usize;
-/// Operations at most: a processor foretells only so many jumps. By `cargo bench --bench hessians -- "one state, by the handle/"` a chain of two
-/// pendula is faster without runs, and one of four is not, though it takes fewer instructions.
+/// Largest number of operations: a processor predicts only a limited number of jumps. According to `cargo bench --bench hessians -- "one
+/// state, by the handle/"` a chain of two pendula is faster without runs, and one of four is not, though it takes fewer instructions.
 const OPERATIONS: usize = 80;
 
 /// What an operation does.
@@ -33,11 +33,11 @@ enum Code {
     Square,
     SinCos,
     Select,
-    /// A function that is a call: the third operand says which.
+    /// A function that is a call: the third operand selects it.
     Function,
 }
 
-/// An operation: what it does, the row that it fills, the rows that it reads.
+/// An operation: its code, the row that it fills, and the rows that it reads.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     code: Code,
@@ -52,7 +52,7 @@ pub(super) struct Single<S> {
     inputs: Vec<u8>,
     parameters: Vec<u8>,
     constants: Vec<(u8, S)>,
-    /// Those that depend on parameters alone, then those of the state.
+    /// Operations that depend on parameters alone, then those of the state.
     uniform: Vec<Operation>,
     lanes: Vec<Operation>,
     functions: Vec<Kind>,
@@ -60,7 +60,7 @@ pub(super) struct Single<S> {
 }
 
 impl<S: Scalar> Single<S> {
-    /// The operations of a program; `None` of a larger one.
+    /// The operations of a program; `None` for a larger one.
     pub fn new(program: &Program<S>) -> Option<Self> {
         let count = program.uniform_rows + program.lane_rows;
         if count > ROWS {

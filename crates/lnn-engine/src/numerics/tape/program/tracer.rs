@@ -94,7 +94,7 @@ impl<'t, S: Scalar> Tracer<'t, S> {
     }
 }
 
-/// `true` for numbers by which a product has no rounding, far from those that are too large or too small.
+/// `true` for numbers whose products are exact, far from the largest and the smallest ones.
 fn is_power_of_two<S: Scalar>(x: S) -> bool {
     let x = x.to_f64().abs();
     x.to_bits() & ((1 << 52) - 1) == 0 && (1e-6..1e6).contains(&x)

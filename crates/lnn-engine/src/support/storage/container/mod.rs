@@ -1,8 +1,8 @@
-//! One description and some tensors in a safetensors file with a checksum: what model files and checkpoints are made of.
+//! One description and some tensors in a safetensors file with a checksum: the format of model files and checkpoints.
 //!
-//! The metadata has one key, whose value is a JSON object with the fields of the description and `checksum`: eight
-//! hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of
-//! the tensors in the order of the file. The same content gives the same bytes; a changed bit anywhere is refused.
+//! The metadata has one key, whose value is a JSON object with the fields of the description and `checksum`: eight hexadecimal digits, the
+//! CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors in the order of the file. The
+//! same content gives the same bytes; any changed bit is detected and refused.
 
 use crate::names::one_line;
 use crate::scalar::Scalar;
@@ -84,7 +84,7 @@ pub fn text_checksum(text: &str) -> String {
 /// The bytes of a file; the description must have the fields `format` and `crate_version`.
 ///
 /// # Errors
-/// [`ContainerError::Header`] or [`ContainerError::NotSafetensors`] for what cannot be written.
+/// [`ContainerError::Header`] or [`ContainerError::NotSafetensors`] for contents that cannot be written.
 pub fn pack(kind: &FileKind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> Result<Vec<u8>, ContainerError> {
     // The payload in the file is in safetensors' own order.
     tensors.sort_by(|a, b| b.dtype.cmp(&a.dtype).then_with(|| a.name.cmp(&b.name)));
@@ -139,7 +139,7 @@ impl Tensors<'_> {
     /// A tensor of this shape in this precision, converted to `S`: widening is exact, narrowing rounds to nearest.
     ///
     /// # Errors
-    /// It is missing, or its type or shape is another.
+    /// It is missing, or has another type or shape.
     pub fn numbers<S: Scalar>(
         &self,
         name: &str,
@@ -191,7 +191,7 @@ pub(crate) fn check_version(supported: u32, found: u32, writer: &str) -> Result<
     Err(ContainerError::Version { writer, found, reader, supported })
 }
 
-/// Limits the description before it is parsed, and refuses one that two readers could understand differently.
+/// Limits the description before it is parsed, and rejects ambiguous ones.
 fn check_container(bytes: &[u8]) -> Result<(), ContainerError> {
     let refuse = |text: &str| Err(ContainerError::NotSafetensors(text.to_string()));
     let Some(length) = bytes.first_chunk::<8>().map(|b| u64::from_le_bytes(*b)) else {
@@ -237,14 +237,14 @@ fn read_header<H: DeserializeOwned>(kind: &FileKind, text: &str, payload: &[u8])
     serde_json::from_str(&body).map_err(malformed)
 }
 
-/// Why a model file, or another file of the same make, could not be written or read.
+/// Why a model file, or another file of the same format, could not be written or read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ContainerError {
     /// Missing, not a regular file, too large, or refused by the system.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The file could not be written; what stood there before still does.
+    /// The file could not be written; its previous content is unchanged.
     #[error("cannot write: {0}")]
     Write(std::io::Error),
     /// Not a safetensors file, or one that is cut off or damaged in its structure.
@@ -281,28 +281,28 @@ pub enum ContainerError {
     /// The description makes no sense.
     #[error("description: {0}")]
     Header(String),
-    /// A tensor that the architecture asks for is not there.
+    /// A tensor of the architecture is missing.
     #[error("tensor {0} is missing")]
     MissingTensor(String),
     /// A tensor that the architecture does not know.
     #[error("tensor {0} does not belong to this architecture")]
     ExtraTensor(String),
-    /// A tensor has another number type than the description says.
+    /// A tensor has another number type than the description states.
     #[error("tensor {name}: expected {expected}, found {found}")]
     WrongType {
         /// Name of the tensor.
         name: String,
-        /// Type by the description.
+        /// Type in the description.
         expected: &'static str,
         /// Type in the file.
         found: String,
     },
-    /// A tensor has another shape than the architecture says.
+    /// A tensor has another shape than the architecture states.
     #[error("tensor {name}: expected shape {expected:?}, found {found:?}")]
     WrongShape {
         /// Name of the tensor.
         name: String,
-        /// Shape by the architecture.
+        /// Shape in the architecture.
         expected: Vec<usize>,
         /// Shape in the file.
         found: Vec<usize>,
@@ -325,7 +325,7 @@ pub enum ContainerError {
     },
 }
 
-/// Any JSON value in which no object names a key twice.
+/// Any JSON value in which no object contains a key twice.
 struct Unambiguous;
 
 /// Checks that no object in `text` names a key twice, at any depth.
@@ -391,7 +391,7 @@ pub enum StoredPrecision {
 }
 
 impl StoredPrecision {
-    /// That of a number type, if files know it.
+    /// The precision of a number type, if files support it.
     pub fn of<S: Scalar>() -> Option<Self> {
         [Self::F32, Self::F64].into_iter().find(|precision| precision.name() == S::NAME)
     }

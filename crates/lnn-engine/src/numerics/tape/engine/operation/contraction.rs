@@ -74,7 +74,7 @@ impl<S: Scalar> Contraction<'_, S> {
         S::dots(simd, a, b)
     }
 
-    /// Adds what a block holds of the upper triangle.
+    /// Adds the part of the upper triangle that lies in a block.
     #[inline(always)]
     fn block<V: Simd, const R: usize, const O: usize>(&mut self, simd: V, lane: usize, (row, column): (usize, usize)) {
         let mut at = [0; O];
@@ -96,7 +96,7 @@ impl<S: Scalar> Contraction<'_, S> {
 impl<S: Scalar> WithSimd for Contraction<'_, S> {
     type Output = ();
 
-    // Loops over indices, not closures: those would not inherit the instruction set.
+    // Loops over indices, not closures, which would not inherit the instruction set.
     #[inline(always)]
     fn with_simd<V: Simd>(mut self, simd: V) {
         let (units, count) = (self.curvature.len(), self.velocities.len());

@@ -153,7 +153,7 @@ impl Dense {
             add_rows(plane, &mut sweep.gradient[bias..bias + self.outputs]);
         }
         if wanted {
-            // The adjoint of the mixed channel, which comes last, is that of the value and known already.
+            // The adjoint of the mixed channel, which comes last, equals that of the value and is already known.
             let rows = (own.count - usize::from(own.st.is_some())) * lanes;
             let below = &mut before.all_mut(self.x)[..rows * self.inputs];
             self.pull_back(sweep.kept.parameters, rows, accumulate, &adjoints[..rows * self.outputs], below);

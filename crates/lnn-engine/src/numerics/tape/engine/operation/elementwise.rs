@@ -24,7 +24,7 @@ fn planes<S>(all: &[S], channels: Mixed, size: usize) -> [&[S]; 4] {
     [value, s, t, st].map(|channel| channel.map_or(&[] as &[S], |channel| &all[channel * size..(channel + 1) * size]))
 }
 
-/// The same, to be written.
+/// The planes, for writing.
 fn planes_mut<S>(all: &mut [S], channels: Mixed, size: usize) -> [&mut [S]; 4] {
     let Mixed { value, s, t, st, .. } = channels;
     let mut rest = all;
@@ -128,7 +128,7 @@ impl Elementwise {
         let outer = sweep.value_adjoints.plane(out, 0);
         let [_, xs, xt, xst] = planes(sweep.mixed.all(self.x), from, size);
         let (mut before, adjoints) = sweep.adjoints.reverse(out);
-        // Of what is is_output only the mixed channel has an adjoint.
+        // If the value is an output, only its mixed channel has an adjoint.
         let [y0, ys, yt, _] = planes(adjoints, own, size);
         let targets = before.all_mut(self.x);
         if !in_place {

@@ -1,4 +1,4 @@
-//! Functions of two numbers: those that the table knows, by their partial derivatives, and products.
+//! Functions of two numbers: those of the table, by their partial derivatives, and products.
 
 use super::{Forward, MixedForward, MixedReverse, Reverse, add_if, add_if_both};
 use crate::ops::Binary;
@@ -12,7 +12,7 @@ pub(crate) struct Function {
     pub f: Binary,
     pub a: usize,
     pub b: usize,
-    /// Number of the function among those of its Lagrangian: where its partial derivatives stand.
+    /// Index of the function among those of its Lagrangian, which locates its partial derivatives.
     pub number: usize,
 }
 
@@ -103,7 +103,7 @@ fn weighted<S: Scalar>(w: &[S], d: &[S]) -> [S; STATES] {
     product
 }
 
-/// Adjoints of the operand `x` beside `y`: partial derivatives `x`, `xx`, `xy`, `xxx`, `xxy`, `xyy`.
+/// Adjoints of the operand `x`, with the other operand `y`: partial derivatives `x`, `xx`, `xy`, `xxx`, `xxy`, `xyy`.
 fn add_to_operand<S: Scalar>(
     (x, y): (usize, usize),
     [fx, xx, xy, xxx, xxy, xyy]: [&[S]; 6],

@@ -215,13 +215,13 @@ fn column<S>(plane: &[S], unit: usize, lanes: usize) -> Column<&[S]> {
     Column::new(plane, unit, plane.len() / lanes)
 }
 
-/// The same, to be written.
+/// One unit of a plane, for writing.
 fn column_mut<S>(plane: &mut [S], unit: usize, lanes: usize) -> Column<&mut [S]> {
     let units = plane.len() / lanes;
     Column::new(plane, unit, units)
 }
 
-/// Copies a unit; what is not there is zero, by a column that stays where it is.
+/// Copies a unit; missing ones are zero, from a column that does not advance.
 fn copy<S: Scalar>(lanes: usize, to: Column<&mut [S]>, from: Option<Column<&[S]>>) {
     match from {
         Some(from) => update_column(lanes, to, from, |to, x| *to = x),

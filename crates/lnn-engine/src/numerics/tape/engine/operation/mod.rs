@@ -55,7 +55,7 @@ pub(super) enum Operation<S> {
 }
 
 impl<S> Operation<S> {
-    /// Visits the values that it reads.
+    /// Visits the values that the operation reads.
     pub fn operands(&self, mut visit: impl FnMut(usize)) {
         match self {
             Self::Input(_) | Self::Parameter(_) | Self::Constant(_) => {}
@@ -83,7 +83,7 @@ pub(super) struct Forward<'a, S> {
     pub scale: &'a [S],
 }
 
-/// The forward sweep as it was left for the sweeps after it.
+/// The data that the forward sweep keeps for later sweeps.
 pub(super) struct Kept<'a, S> {
     pub values: &'a [Value],
     pub forward: View<'a, S>,
