@@ -91,7 +91,7 @@ fn short_numbers(text: &str) -> String {
         let length = rest[start..].find(|c| !is_part(c)).unwrap_or(rest.len() - start);
         let (before, number, after) = (&rest[..start], &rest[start..start + length], &rest[start + length..]);
         let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || "_/\\-".contains(c));
-        // A minus sign is not part of a word if none precedes it.
+        // A minus sign without a word before it is not part of a word.
         let left = before.strip_suffix('-').filter(|left| !inside(left.chars().last())).unwrap_or(before);
         let apart = length > MOST_DIGITS && !inside(left.chars().last()) && !inside(after.chars().next());
         whole.push_str(before);

@@ -268,7 +268,7 @@ pub(super) struct LagrangianInputs<'a, R> {
     pub velocities: &'a [R],
     /// The parameters outside the network.
     pub constants: &'a [R],
-    /// Factor of the added term of a black box with an effective mass that is not learned.
+    /// Factor of the term added to a black box, if it is not learned.
     pub alpha: f64,
     /// The coordinate that is a time.
     pub time_like: Option<usize>,

@@ -118,7 +118,7 @@ impl Drop for DirectoryLock {
     }
 }
 
-/// The beginning of a file, up to the first byte that is not text.
+/// The beginning of a file, if it is text.
 fn text(file: &mut File) -> String {
     let mut text = String::new();
     // An unreadable file does not identify the holder; only the lock itself counts.

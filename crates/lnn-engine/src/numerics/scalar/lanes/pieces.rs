@@ -119,7 +119,7 @@ macro_rules! impl_pieces {
                 let shifted = self.mul_add(core::$float::consts::FRAC_2_PI, MAGIC);
                 let n = shifted - MAGIC;
                 let r = n.mul_add(-$quarter_high, self);
-                // r is exact; z contains the error of the difference r - p, including the rounding of the product.
+                // r is exact. `lost` is the error of z = r - p, including the rounding of the product.
                 let p = n * $quarter_middle;
                 let z = r - p;
                 let back = z - r;

@@ -187,7 +187,7 @@ impl<S> Store<'_, S> {
         let (before, rest) = self.numbers.split_at_mut(range.start);
         (View { layout: self.layout, lanes: self.lanes, numbers: before }, &mut rest[..range.end - range.start])
     }
-    /// The planes of a value, for adding to, and everything computed before it.
+    /// The planes of earlier values, to be added to, and those of a value.
     #[inline]
     pub fn reverse(&mut self, value: usize) -> (Store<'_, S>, &[S]) {
         let range = self.layout.range(value, self.lanes);
