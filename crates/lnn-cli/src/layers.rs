@@ -242,7 +242,7 @@ impl Layers {
             let refusal = Some((path.clone(), message.clone()));
             let mut suspects: Vec<usize> = (0..entries.len()).rev().collect();
             suspects.retain(|&k| covers(&path, &entries[k].key()) || covers(&entries[k].key(), &path));
-            // A table of several kinds does not say which of its keys is wrong: the one without which it is read further.
+            // The error of a table with several kinds does not name the wrong key: it is the one whose removal changes the error.
             let without = |k: usize| {
                 let others: Vec<&Entry> =
                     entries.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, entry)| *entry).collect();

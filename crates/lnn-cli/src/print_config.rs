@@ -216,7 +216,7 @@ mod tests {
                 let listed = names.len() > 1 && names.iter().all(is_name) && key.values != "true, false";
                 let texts = if listed { names } else { vec![key.example.to_string()] };
                 for text in texts.iter().filter(|text| !text.is_empty() && !path.ends_with("penalty.time")) {
-                    // A penalty has further keys by its kind.
+                    // The kind of a penalty decides its other keys.
                     let beside = match text.as_str() {
                         "\"lorentzian-sylvester\"" => "lambda = 1\ntime = \"t\"\n",
                         _ if path.ends_with("penalty.kind") && text != "\"none\"" => "lambda = 1\n",

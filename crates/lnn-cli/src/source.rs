@@ -72,7 +72,7 @@ impl<S: Scalar> Source<S> {
     }
 }
 
-/// Refuses more coordinates than a command serves, whose memory or time grows with a power of their number.
+/// Refuses more coordinates than a command supports: its memory or time grows with a power of their number.
 ///
 /// # Errors
 /// A usage error with the numbers.

@@ -9,7 +9,7 @@ pub use sweep::{Choice, Variation, combinations, sweep_runs};
 
 use crate::configuration::Config;
 
-/// Figures that others report for a row, in the paper's convention.
+/// Published numbers for a row, in the paper's convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reported {
     /// Validation loss.

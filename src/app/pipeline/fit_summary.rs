@@ -83,7 +83,7 @@ struct ConstraintsSummary<'a> {
     found: bool,
     /// The formulas that vanish, by name.
     formulas: &'a BTreeMap<String, String>,
-    /// Distance of the smoothed positions that are learned from, root mean square: they were projected onto the constraints.
+    /// Root mean square distance by which the smoothed training positions were moved onto the constraints.
     distance: f64,
 }
 

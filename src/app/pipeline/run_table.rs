@@ -7,7 +7,7 @@ use crate::report::DataTable;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Numbers that come from the `summary.json` of a run: names of columns, and where they are.
+/// Numbers taken from the `summary.json` of a run: names of columns, and their paths.
 const FROM_SUMMARY: [(&str, &str); 6] = [
     ("epochs", "/epochs"),
     ("weights", "/weights"),

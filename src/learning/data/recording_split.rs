@@ -102,8 +102,8 @@ impl Split {
         pairs.map(|(track, states)| StateEstimate { track, q: &states.q, v: &states.v, between }).collect()
     }
 
-    /// Samples that are learned from: away from the ends of trajectories, or all of them if nothing had to be derived; at most
-    /// about `most`. Each with `true` if its acceleration is a measured one.
+    /// Training samples: those away from the ends of trajectories, or all of them if nothing had to be derived; at most about
+    /// `most`. Each has `true` if its acceleration was measured.
     fn rows(&self, targets: Targets, most: usize) -> impl Iterator<Item = Row<'_>> {
         let stride = self.recording.samples().div_ceil(most.max(1)).max(1);
         self.recording.tracks.iter().zip(&self.states).flat_map(move |(track, states)| {

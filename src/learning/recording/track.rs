@@ -30,7 +30,7 @@ pub struct Recording {
     pub tracks: Vec<RecordedTrajectory>,
 }
 
-/// Why numbers do not make a trajectory.
+/// Why numbers do not form a trajectory.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TrajectoryError {

@@ -444,7 +444,7 @@ mod tests {
         let four = bounds.starts::<f64>(4, 7);
         assert_eq!(bounds.starts::<f64>(6, 7)[..4], four[..]);
         assert_ne!(bounds.starts::<f64>(4, 8), four);
-        // The draws of the initial weights are others.
+        // Initial weights are drawn from another stream.
         assert_ne!(four[0].0[0], 6.0 * RngStream::Weights.generator(7).random::<f64>());
         assert!(four.iter().all(|(q, v)| (1.0..2.0).contains(&q[1]) && v.iter().all(|v| v.abs() <= 1.0)));
     }

@@ -25,11 +25,11 @@ pub struct MotionSamples {
     velocity_noise: Vec<f64>,
     /// First sample of each trajectory.
     starts: Vec<usize>,
-    /// Number of samples per one with independent errors of velocities.
+    /// Number of samples that share the errors of their velocities.
     shared: f64,
     /// Cancels a search in them.
     pub(super) cancellation: Cancellation,
-    /// Number of samples per one with independent errors of positions, and how much larger the variance of their noise may be.
+    /// Number of samples that share the errors of their positions, and how much larger the variance of their noise may be.
     alike: f64,
     slack: f64,
     /// Columns that do not move, with the reason.
@@ -146,7 +146,7 @@ impl MotionSamples {
     pub(super) fn shared(&self) -> f64 {
         self.shared
     }
-    /// About how many samples have independent noise.
+    /// Approximate number of samples with independent noise.
     pub(super) fn independent(&self) -> f64 {
         self.len() as f64 / self.alike.max(1.0)
     }

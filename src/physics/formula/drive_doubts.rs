@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 /// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
 const REPEATED: f64 = 0.02;
 const MOST_REPEATED: usize = 4;
-/// Most terms of a law with a drive, whose frequency is fitted too: for two nearly linear coordinates outside the libraries, 24 terms
+/// Largest number of terms of a law with a drive, whose frequency is fitted too: for two nearly linear coordinates outside the libraries, 24 terms
 /// fitted one recording in ten; laws with a drive in the same study have up to 7 (`lnn-studies rates --part drives`).
 const MOST_TERMS: usize = 12;
 

@@ -27,7 +27,7 @@ pub enum FormulaError {
         /// Largest number.
         most: usize,
     },
-    /// A user's function that is not valid.
+    /// An invalid function of the user.
     #[error("function {text:?}: {problem}")]
     Function {
         /// The function.

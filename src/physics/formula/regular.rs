@@ -5,7 +5,7 @@ use crate::linalg::{self, Workspace};
 /// Largest condition number of a mass matrix in units of its diagonal: systems in textbooks stay below 100 except near singular positions.
 const MOST_CONDITION: f64 = 1e4;
 
-/// `true` if most of some symmetric matrices `(n, n)` have a condition number, rows and columns scaled to size 1, below
+/// `true` if most of the symmetric matrices `(n, n)`, with rows and columns scaled to size 1, have a condition number below
 /// [`MOST_CONDITION`].
 pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
     let mut scaled = matrices.to_vec();

@@ -190,7 +190,7 @@ pub(super) fn shorten(
         let mut best: Option<(f64, Vec<usize>, Model)> = None;
         for (term, over) in quotient.over_kept.iter().enumerate() {
             let Some(over) = over.as_ref().filter(|_| !model.terms.contains(&term)) else { continue };
-            // The new term over the model's own, if it is a combination of them.
+            // The new term as a combination of two of the model's own terms, if it is one.
             let support: Vec<usize> = (0..over.len()).filter(|&k| over[k].abs() > 1e-6).collect();
             let inside = |k: &usize| own.contains(&Some(*k));
             if support.len() != 2 || !support.iter().all(inside) {

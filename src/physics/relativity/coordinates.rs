@@ -312,7 +312,7 @@ pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: 
 
 /// Later and earlier times at which a metric is compared, as shares of the relevant span.
 const TIMES: [f64; 3] = [0.31, -0.57, 1.0];
-/// Differences of the components, over the largest of them, that are rounding.
+/// Differences of the components up to this, relative to the largest of them, are rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// `true` if the metric at some point changes with time: by a span of time, or a part of it, later or earlier. `points` are `(points, n)`,

@@ -76,7 +76,7 @@ impl<S: Scalar> CanonicalForm<S> {
     }
 }
 
-/// `s` of a mass matrix `(n, n)`.
+/// The factor `s` for a mass matrix `(n, n)`.
 fn factor<S: Scalar>(n: usize, matrix: &[S]) -> Result<S, MechanicsError> {
     let refused = |_| MechanicsError::NotFinite { row: 0, what: "mass matrix" };
     let singular = Err(MechanicsError::Singular { row: 0, condition: f64::INFINITY });

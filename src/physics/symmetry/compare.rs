@@ -16,8 +16,8 @@ pub struct Comparison {
     /// Coefficients of `f`, from the first power of `B`: a factor, or for geodesics of a metric a polynomial, whose first coefficient
     /// `f'(0)` is the factor of the mass matrix at rest.
     pub factors: Vec<f64>,
-    /// Factors of the groups of coordinates that do not act on each other by `B`, in the order of their first coordinates; empty if all
-    /// coordinates are one group. They have been taken out first: everything here is of `B` with these factors.
+    /// Factors of the groups of coordinates that do not act on each other in `B`, in the order of their first coordinates; empty if all
+    /// coordinates are one group. They are applied first: everything here refers to `B` with these factors.
     pub group_factors: Vec<f64>,
     /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the states
     /// determine `f'` only at this value, and mass matrices only up to a part `h p p^T`.

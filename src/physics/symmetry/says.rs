@@ -42,7 +42,7 @@ pub struct SymmetrySummary {
     pub conserved: Vec<bool>,
     /// Ascending.
     pub singular_values: Vec<f64>,
-    /// Degrees of the functions that fields are made of, as [`Degrees`] are read.
+    /// Degrees of the functions in the fields, in the text form of [`Degrees`].
     #[serde(serialize_with = "as_text")]
     pub basis: Degrees,
     /// Functions of the basis.

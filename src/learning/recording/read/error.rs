@@ -169,7 +169,7 @@ pub enum Problem {
         /// Row of the first of them.
         since: u64,
     },
-    /// A unit in a header that is not known.
+    /// An unknown unit in a header.
     #[error("row {row}, column {column}: {problem}; state its unit otherwise, the factor 1 for SI")]
     Unit {
         /// Row of the header.

@@ -269,7 +269,7 @@ impl Smoothing {
         (window, if derived { window + 1 } else { (self.degree + 3) | 1 })
     }
 
-    /// Window of coordinate `i` in samples of a trajectory: as many seconds as chosen, at most all of the trajectory.
+    /// Window of coordinate `i` in samples of a trajectory: the chosen number of seconds, at most the whole trajectory.
     fn samples(&self, i: usize, track: &RecordedTrajectory, clock: &Clock) -> usize {
         let least = (self.degree + self.more + 3) | 1;
         let samples = (self.coordinates[i].seconds / clock.step).round() as usize;

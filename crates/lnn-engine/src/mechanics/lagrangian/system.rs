@@ -204,16 +204,16 @@ pub struct LearningAdvice {
 }
 
 impl LearningAdvice {
-    /// No advice: the box of the training states does, and the paper has nothing on the system.
+    /// No advice: the box of the training states is suitable, and the paper does not cover the system.
     pub const NONE: Self = Self { states: None, paper: None, structure_rate: None };
 }
 
 /// Choices that go with the bounds of the training states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StateAdvice {
-    /// Coordinates of which half are drawn uniform in their logarithm; empty for none.
+    /// Coordinates for which half of the values are drawn uniform in their logarithm; empty for none.
     pub log_uniform: Vec<bool>,
-    /// Size, over the mean one, of accelerations at and above which residuals count relatively; 0 for none.
+    /// Accelerations above this multiple of the mean have relative residuals; 0 for none.
     pub acceleration_weighting: f64,
     /// Share of the states that lie along motions of the trajectory test.
     pub trajectory_fraction: f64,

@@ -2,7 +2,7 @@
 
 use crate::lagrangian::MechanicsError;
 
-/// Why steps became too small to continue although every evaluation of the model succeeded or failed for no other reason.
+/// Why steps became too small to continue although no evaluation of the model failed for another reason.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnderflowCause {
@@ -13,7 +13,7 @@ pub enum UnderflowCause {
         /// Largest absolute acceleration at the last accepted state.
         largest_acceleration: f64,
     },
-    /// The model failed at every trial state ahead.
+    /// The model failed at every further trial state.
     #[error("{0}")]
     Model(MechanicsError),
 }

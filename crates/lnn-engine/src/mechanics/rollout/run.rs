@@ -283,7 +283,7 @@ pub(super) type Nodes<'a, S> = dyn FnMut(S, S, &[S], &[S]) + 'a;
 /// Receivers of the samples, the nodes if requested, and the events.
 pub(super) type Receivers<'r, 'a, S> = (&'r mut Keep<'a, S>, Option<&'r mut Nodes<'a, S>>, &'r mut Vec<Occurrence<S>>);
 
-/// The error of a motion that a step ended.
+/// The error of a motion that ended with a failed step.
 pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
     match failure {
         StepFailure::Domain { component, value, lower, upper } => {

@@ -92,7 +92,7 @@ fn largest<F: Scalar>(bound: F, x: &[F]) -> F {
     x.iter().fold(bound, |bound, &x| if Real::abs(x) > bound { Real::abs(x) } else { bound })
 }
 
-/// Solves all systems, each refined once where it is due; returns the rows whose matrices must be examined.
+/// Solves all systems, refining each once if necessary; returns the rows whose matrices must be examined.
 pub(super) fn eliminate<F: Scalar + RealField>(
     n: usize,
     m: usize,

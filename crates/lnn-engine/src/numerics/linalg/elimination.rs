@@ -7,7 +7,7 @@ use crate::scalar::{Real, Scalar};
 pub(super) struct Pivots<S, const W: usize> {
     /// Smallest pivot, absolutely.
     pub smallest: Lane<S, W>,
-    /// Largest element of the upper triangular factor, absolutely.
+    /// Largest absolute value of an element of the upper triangular factor.
     pub growth: Lane<S, W>,
 }
 

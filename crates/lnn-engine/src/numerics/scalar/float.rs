@@ -271,7 +271,7 @@ impl<F: Foreign> Lanes for AnyFloat<F> {
         Self(self.0.mul_add(factor.0, summand.0))
     }
     fn lane_exp(self) -> Exponential<Self> {
-        // Three equal thirds reach below the smallest number together and are normal alone.
+        // The product of three equal factors reaches below the smallest number while each factor is normal.
         let limit = Self::of_f64(2.25) * Self::max_value().ln();
         let y = if self < -limit { -limit } else { self };
         let y = if y > limit { limit } else { y };

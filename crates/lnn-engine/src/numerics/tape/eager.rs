@@ -46,7 +46,7 @@ impl<T: Real> Node<T> {
 pub struct Tape<T> {
     /// Nodes `0..room`, written through shared references: recording is a comparison and four stores.
     room: Vec<Node<T>>,
-    /// Nodes from `room` on; the next reset makes room for as many.
+    /// Nodes beyond `room`; the next reset enlarges `room` by their number.
     overflow: RefCell<Vec<Node<T>>>,
     /// Nodes recorded, the constant at 0 included.
     count: Cell<u32>,

@@ -44,7 +44,7 @@ impl ExpressionConstraints {
         Self::compiled((coordinates.len(), parameters.len()), formulas.iter().copied(), &mut compiler, &scope)
     }
 
-    /// The formula of one row that vanishes.
+    /// Value of the formula of one row, which should vanish.
     pub fn value<R: Real>(&self, row: usize, parameters: &[R], q: &[R], v: &[R]) -> R {
         self.rows[row].value.evaluate(parameters, q, v)
     }

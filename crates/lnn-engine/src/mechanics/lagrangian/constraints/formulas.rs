@@ -124,7 +124,7 @@ impl FormulaConstraints {
         &self.compiled
     }
 
-    /// A model under them.
+    /// A model under these constraints.
     ///
     /// # Errors
     /// [`ConstraintError::Shape`] for a model of other coordinates.
