@@ -35,8 +35,8 @@
 //! | [`architecture`] | flow of data, modules, how to add a system, an operation, an integrator |
 //! | [`building`] | test programs, fuzzing, benchmarks |
 
-/// A page behind the definitions of its links: the first definition of a label counts, so that these, to modules, stand
-/// before the page's own, to files.
+/// A page after the definitions of its links: the first definition of a label counts, so that these definitions, to modules, precede the
+/// page's own, to files.
 macro_rules! page {
     ($file:literal) => {
         concat!(

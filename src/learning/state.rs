@@ -17,7 +17,7 @@ pub fn to_bytes(state: &impl Serialize) -> Result<Vec<u8>, ContainerError> {
 /// The state that [`to_bytes`] wrote; never panics and allocates no more than a small multiple of the bytes.
 ///
 /// # Errors
-/// [`ContainerError::Header`] for anything else, further bytes behind it included.
+/// [`ContainerError::Header`] for anything else, including additional bytes.
 pub fn from_bytes<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ContainerError> {
     match postcard::take_from_bytes(bytes).map_err(refused)? {
         (state, []) => Ok(state),

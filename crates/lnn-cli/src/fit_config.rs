@@ -247,7 +247,7 @@ impl<'a> Plan<'a> {
         self.finish(&mut training, &data)?;
         self.refuse_overruled(&training, shooting.as_ref(), targets)?;
         let recording = FitColumns { files: recording.files, ..FitColumns::from(&prepared.reading.columns) };
-        // A printed configuration shows the keys of multiple shooting in any case.
+        // A printed configuration always shows the keys of multiple shooting.
         let shooting = shooting.filter(|_| targets == Targets::Motion || self.args.run.print_config.is_some());
         Ok(FitConfig { formula, members, ..prepared.config(training, horizon, recording, shooting) })
     }

@@ -1,4 +1,4 @@
-//! Forces from outside, as arguments: constants, formulas of the time, and recorded columns.
+//! External forces as arguments: constants, formulas of the time, and recorded columns.
 
 use crate::number::{choice, finite};
 use crate::recording_args::unit;

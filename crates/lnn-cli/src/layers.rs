@@ -13,7 +13,7 @@ use std::fmt;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Wrong values that are listed at most: each is looked for in the whole configuration.
+/// Largest number of wrong values that are listed: each one needs a check of the whole configuration.
 const MOST_MISTAKES: usize = 100;
 
 /// The key that names the kind of a table.

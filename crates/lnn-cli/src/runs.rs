@@ -57,7 +57,7 @@ impl Work {
     }
 }
 
-/// Tables of every experiment, made anew of the records of its runs.
+/// Tables of every experiment, rewritten from the records of its runs.
 const TABLES: [&str; 2] = ["table.csv", "runs.csv"];
 
 /// Runs experiments, or a share of them.

@@ -39,7 +39,7 @@ impl Drop for Spool {
     }
 }
 
-/// Reads files of which one may be `-`, standard input; results use that name.
+/// Reads files, one of which may be `-`, standard input; results use that name.
 pub fn read_spooled(
     files: &[PathBuf],
     read: impl FnOnce(&[PathBuf]) -> Result<LoadedRecording, DataError>,

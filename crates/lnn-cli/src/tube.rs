@@ -90,7 +90,7 @@ impl TubeArgs {
         Ok(Some(MotionTube { tube, start, coordinates: coordinates.to_vec() }))
     }
 
-    /// The beginning of every motion that the model has not learned from and that lasts this long.
+    /// The beginning of every motion that was not used for training and lasts this long.
     fn windows(&self, path: &Path, coordinates: &[String], seconds: f64) -> Result<Vec<Window>, CliError> {
         let place = model_file(path)?.with_file_name("config.toml");
         let text = read_regular(&place, MAX_BYTES).map_err(|e| {

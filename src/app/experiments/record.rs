@@ -35,7 +35,7 @@ impl Learned {
     }
 }
 
-/// Outcome of a training; kept beside the model as `record.json`.
+/// Outcome of a training, stored next to the model as `record.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "outcome")]
 pub enum Outcome {

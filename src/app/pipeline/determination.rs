@@ -96,7 +96,7 @@ impl Determined {
     /// Analyses a model of recorded motion that was tested by `hold_out`.
     ///
     /// # Errors
-    /// [`PipelineError::Recording`] if the states that were learned from cannot be had again.
+    /// [`PipelineError::Recording`] if the training states cannot be obtained again.
     pub(crate) fn new(
         model: &NetworkLagrangian<f64>,
         (measured, targets): (&RecordingSplit, Targets),

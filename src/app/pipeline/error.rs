@@ -66,7 +66,7 @@ pub enum PipelineError {
         /// The problem.
         source: ModelFileError,
     },
-    /// A directory in which a model was looked for.
+    /// A directory without a model.
     #[error("{}: there is no {} in this directory", .0.display(), crate::pipeline::MODEL)]
     NoModel(PathBuf),
     /// Training failed.

@@ -38,7 +38,7 @@ pub struct Additions {
     pub subtitle: String,
     /// Paragraphs below the headline.
     pub introduction: Vec<String>,
-    /// Pictures of all runs behind the loss curves.
+    /// Pictures of all runs, after the loss curves.
     pub figures: Vec<Figure>,
     /// A part above the table of the report.
     pub above: Option<Part>,

@@ -39,7 +39,7 @@ pub enum NextStep {
     Fit,
 }
 
-/// The survey of a recording, the laws that were looked for, and the advice that follows.
+/// The survey of a recording, the laws that were sought, and the resulting advice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FirstLook {
     /// The guessed roles of the columns; empty if all were named.

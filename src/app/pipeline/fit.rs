@@ -80,8 +80,7 @@ pub fn usual_force(coordinate: &str) -> String {
     format!("{coordinate}_force")
 }
 
-/// Learns from recorded motion in the configuration's precision, judges by motion that was held out, and writes everything into
-/// the output.
+/// Learns from recorded motion in the configuration's precision, judges by held-out motion, and writes everything into the output.
 ///
 /// # Errors
 /// Configurations out of range, data that cannot be learned from, files that cannot be written;
@@ -189,7 +188,7 @@ impl<S: Scalar> LearnedFit<S> {
 }
 
 impl<S: Scalar> Start<S> {
-    /// The states, and the network that a configuration asks for.
+    /// The states, and the network of a configuration.
     ///
     /// # Errors
     /// Configurations out of range, data that cannot be learned from, a model of another shape, too little memory.

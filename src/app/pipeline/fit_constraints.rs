@@ -14,7 +14,7 @@ pub(crate) struct FitHeld {
     pub constraints: FormulaConstraints,
     /// `true` if they were found.
     pub found: bool,
-    /// Distance of the smoothed positions that are learned from, root mean square.
+    /// Root mean square distance of the smoothed training positions.
     pub distance: f64,
 }
 
@@ -80,10 +80,10 @@ impl FitHeld {
         Ok((Some(Self { constraints, found, distance: f64::NAN }), remarks))
     }
 
-    /// States projected onto the constraints, and how far their positions were away, root mean square.
+    /// States projected onto the constraints, and the root mean square distance of their positions.
     ///
     /// # Errors
-    /// [`PipelineError::Constraints`] for a state from which no way leads there.
+    /// [`PipelineError::Constraints`] for a state that cannot be projected.
     pub fn bring(&self, set: Dataset<f64>) -> Result<(Dataset<f64>, f64), PipelineError> {
         let manifold = self.constraints.manifold().map_err(PipelineError::constraints)?;
         set.brought_to(&manifold).map_err(PipelineError::constraints)

@@ -97,7 +97,7 @@ pub struct HoldOut {
     pub wrong_signature: f64,
     /// Energy along the held-out trajectories; none if the model gives no finite energy.
     pub(crate) energy: Option<Balance>,
-    /// Errors of the known forces of a model that was learned from them.
+    /// Errors of the known forces of a model that was trained on them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_errors: Vec<ForceError>,
     /// Pictures.

@@ -154,7 +154,7 @@ pub(crate) struct Subject<'a> {
     /// Names of coordinates and velocities, with units as labels of axes.
     pub columns: Vec<String>,
     pub labels: Vec<String>,
-    /// The recorded motion that it was learned from, if any, and what that determines.
+    /// The recorded motion that it was trained on, if any, and what that determines.
     pub recorded: Option<&'a Recording>,
     pub determined: Option<&'a Determined>,
     /// Learned motion along which charges are followed.

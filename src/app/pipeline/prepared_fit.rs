@@ -74,7 +74,7 @@ impl<'a> PreparedFit<'a> {
         Ok(Datasets { training, validation: bring(validation)?, test: bring(test)? })
     }
 
-    /// Targets that are learned from.
+    /// Targets of the training.
     pub fn targets(&self) -> Targets {
         self.targets
     }

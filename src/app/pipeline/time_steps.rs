@@ -17,7 +17,7 @@ pub(crate) struct TimeSteps {
     left_out: LeftOut,
 }
 
-/// Rows that no acceleration was learned from.
+/// Rows whose accelerations were not used for training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct LeftOut {
     /// Rows between gaps, too few for a trajectory.

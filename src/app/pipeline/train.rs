@@ -248,7 +248,7 @@ fn train_in<S: Scalar>(
 struct LearnedRun<S> {
     trained: Trained<S>,
     model: ModelFile<S>,
-    /// Coordinates and velocities of states that nothing was learned from.
+    /// Coordinates and velocities of states that were not used for training.
     fresh: (Vec<f64>, Vec<f64>),
 }
 

@@ -23,7 +23,7 @@ const PLAY: &str = include_str!("page/play.js");
 const MOST_BYTES: usize = 500_000;
 /// Seconds in which a system without a unit of time crosses the region that the model knows.
 const SECONDS: f64 = 20.0;
-/// States from which a start on the constraints is looked for, and at which mass matrices are compared.
+/// States from which a start on the constraints is sought, and at which mass matrices are compared.
 const STARTS: usize = 24;
 const COMPARED: usize = 200;
 

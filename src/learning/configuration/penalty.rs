@@ -9,7 +9,7 @@ use crate::linalg::{
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
-/// Builds the configuration's penalties from rows `Name "name" { further fields };`, all of which have a weight.
+/// Builds the configuration's penalties from rows `Name "name" { further fields };`, each with a weight.
 macro_rules! penalties {
     ($(
         $(#[$($doc:tt)*])*
@@ -67,9 +67,10 @@ penalties! {
     ///
     /// See [`Penalty::Sylvester`], of a classical system.
     Sylvester "sylvester" {};
-    /// The same beside a time-like coordinate, whose own element must be negative: not for metrics inside of a horizon or of an ergosphere, where it is positive.
+    /// As `sylvester`, with a time-like coordinate whose own element must be negative: not for metrics inside a horizon or an ergosphere,
+    /// where it is positive.
     ///
-    /// See [`Penalty::Sylvester`], of a relativistic system.
+    /// See [`Penalty::Sylvester`] for a relativistic system.
     LorentzianSylvester "lorentzian-sylvester" {
         /// Name of the time-like coordinate.
         time: String

@@ -18,8 +18,8 @@ use thiserror::Error;
 pub struct PrepareOptions {
     /// Local polynomials.
     pub smoothing: SmoothOptions,
-    /// Share of the samples held out to judge; half as much of the rest chooses the best epoch. With 0 everything is learned
-    /// from and chooses the best epoch too, and nothing judges.
+    /// Share of the samples held out to judge; half as much of the rest chooses the best epoch. With 0 all samples are used for training
+    /// and to choose the best epoch, and none for judging.
     pub held_out: f64,
     /// Most states of a supervised training; of more, evenly spaced ones are taken.
     pub most_states: usize,
@@ -188,7 +188,7 @@ impl RecordingSplit {
         Self::of_takes(recording, &takes, preparation)
     }
 
-    /// The same for trajectories of which some belong together: `takes` has the number of the take of each, see
+    /// As [`Self::new`], for trajectories some of which belong together: `takes` has the number of the take of each, see
     /// [`LoadedRecording::takes`](crate::recording::LoadedRecording::takes).
     ///
     /// # Errors

@@ -128,7 +128,8 @@ mod tests {
     use crate::lagrangian::configure;
     use crate::presets::Preset;
 
-    /// Unit velocities to the future from inside the horizon outward, distances uniform in their logarithm, rapidities as bounded.
+    /// Future-directed unit velocities from inside the horizon outward, with distances uniform in their logarithm and rapidities within
+    /// bounds.
     #[test]
     fn states_in_a_shell_are_time_like_and_of_all_distances() {
         for name in ["schwarzschild-cartesian", "kerr-cartesian", "reissner-nordstrom-cartesian"] {

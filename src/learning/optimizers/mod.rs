@@ -19,7 +19,7 @@ struct Traits {
     rectified: bool,
     /// `true` if the moments of weight matrices are taken in the eigenbases of Shampoo's preconditioner.
     eigenbases: bool,
-    /// `true` if weights decay beside the step, by rate times decay, instead of through the gradient.
+    /// `true` if weights decay in addition to the step, by rate times decay, instead of through the gradient.
     decoupled: bool,
 }
 
@@ -79,9 +79,9 @@ pub struct Update {
     pub method: Method,
     /// Learning rate.
     pub rate: f64,
-    /// Weight decay: added to the gradient (L2), or beside the step if the method decouples it.
+    /// Weight decay: added to the gradient (L2), or applied separately if the method decouples it.
     pub weight_decay: f64,
-    /// Parameters that decay, the first ones: constants of nature behind the weights do not.
+    /// Number of leading parameters that decay: constants of nature after the weights do not.
     pub decaying: usize,
     /// The gradient's norm is cut to this; infinity leaves it.
     pub clip: f64,

@@ -206,7 +206,7 @@ pub(super) struct Side<S> {
     pub covariance: Vec<S>,
     #[serde(with = "numbers")]
     pub vectors: Vec<S>,
-    /// The next eigenvectors, then how they are turned against the last; empty after they were read, until they are looked for.
+    /// The next eigenvectors, then their rotation relative to the last ones; empty after they were read, until they are updated.
     #[serde(skip)]
     next: Vec<S>,
     #[serde(skip)]

@@ -133,8 +133,8 @@ impl<'a> Trainer<'a> {
         Self { angles: indices.to_vec(), ..self }
     }
 
-    /// Constraints that hold the states, by name: formulas over the names of the coordinates and `NAME_dot` that vanish, such as
-    /// `("rod", "x^2 + y^2 - 1")`. They are kept in the model's file; those that follow from others are left out.
+    /// Constraints on the states, by name: formulas over the names of the coordinates and `NAME_dot` that vanish, such as `("rod", "x^2 +
+    /// y^2 - 1")`. They are kept in the model's file; those that follow from others are left out.
     pub fn constraints(self, formulas: &[(&str, &str)]) -> Self {
         let constraints = formulas.iter().map(|(name, formula)| (name.to_string(), formula.to_string())).collect();
         Self { constraints, ..self }

@@ -3,11 +3,11 @@
 /// A column by its header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Heading {
-    /// The header as it stands in the file.
+    /// The unprocessed header of the file.
     pub text: String,
     /// Name of the column.
     pub name: String,
-    /// Unit in brackets behind the name.
+    /// Unit in brackets after the name.
     pub unit: Option<String>,
 }
 

@@ -13,7 +13,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOut {
-    /// Nothing: all data are learned from.
+    /// Nothing: all data are used for training.
     Nothing,
     /// Whole trajectories, by number, ascending.
     Tracks(Vec<usize>),

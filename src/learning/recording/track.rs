@@ -86,7 +86,7 @@ impl RecordedTrajectory {
     /// list.
     ///
     /// # Errors
-    /// A coordinate of which every reading is missing.
+    /// A coordinate without any reading.
     pub(crate) fn fill_missing(&mut self, n: usize) -> Result<Vec<bool>, usize> {
         let missing: Vec<bool> = self.q.iter().map(|q| q.is_nan()).collect();
         if !missing.contains(&true) {

@@ -95,7 +95,7 @@ impl<S: Scalar> Motion<S> {
         for (right, &force) in self.right.iter_mut().zip(external) {
             *right += force;
         }
-        // Failed rows are `NaN` and looked for below.
+        // Failed rows are `NaN` and handled below.
         if self.manifold.is_some() {
             self.held.motion(&self.right, acceleration, &mut self.workspace);
             self.held.loads(loads);

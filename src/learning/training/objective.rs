@@ -46,7 +46,7 @@ pub struct BatchReport<S> {
     pub penalty: S,
     /// States whose penalty is active.
     pub penalised: usize,
-    /// States left out because they have no finite acceleration, or no finite force if forces are learned from.
+    /// States left out because they have no finite acceleration, or no finite force if the training uses forces.
     pub left_out: usize,
     /// First state, by its row in the dataset, that failed, and why.
     pub failure: Option<MechanicsError>,

@@ -22,7 +22,7 @@ pub enum StopReason {
 
 /// Result of a run of epochs.
 pub(crate) struct Epochs<S: Scalar, L: Learner<S>> {
-    /// Problem that was learned from; nothing if argmin lost it.
+    /// Problem of the training; none if argmin lost it.
     pub problem: Option<L::Problem>,
     /// State of the unknowns besides the weights.
     pub learner: L,

@@ -1,10 +1,10 @@
 //! Tubes around predicted motion that contain whole motions: split conformal prediction.
 //!
-//! Whole motions that a model has not learned from are predicted and divided in two. The errors of one half give every coordinate a scale
-//! `s_i(t)` by the time ahead. A motion of the other half has the score `max_(t, i) |measured - predicted|/s_i(t)`, and with `m` of them
-//! the tube is `predicted +- f s_i(t)`, where `f` is the `ceil((m + 1) share)`-th score in order. A fresh motion of the same kind stays inside,
-//! all coordinates at all times, with a probability of at least `share`, whatever the model (Vovk, Gammerman and Shafer 2005; Lei,
-//! G'Sell, Rinaldo, Tibshirani and Wasserman 2018). Measured positions count with their noise.
+//! Whole motions that were not used for training are predicted and divided into two halves. The errors of one half give every coordinate a
+//! scale `s_i(t)` by the time ahead. A motion of the other half has the score `max_(t, i) |measured - predicted|/s_i(t)`, and with `m` of
+//! them the tube is `predicted +- f s_i(t)`, where `f` is the `ceil((m + 1) share)`-th score in order. A fresh motion of the same kind
+//! stays inside, all coordinates at all times, with a probability of at least `share`, whatever the model (Vovk, Gammerman and Shafer 2005;
+//! Lei, G'Sell, Rinaldo, Tibshirani and Wasserman 2018). Measured positions count with their noise.
 
 use super::prediction::{Predictions, Window};
 use super::statistics::quantile;

@@ -231,7 +231,7 @@ pub const MOST_DEGREE: usize = 3;
 #[derive(Debug)]
 pub struct Basis {
     degree: usize,
-    /// The first monomial of each degree, and behind the last degree the number of all.
+    /// The first monomial of each degree, followed by the number of all monomials.
     starts: Vec<usize>,
     /// The axes of each monomial, ascending, as often as each is a factor.
     factors: Vec<Vec<usize>>,

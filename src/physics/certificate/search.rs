@@ -17,7 +17,7 @@ pub enum Verdict {
         /// Proven bound; infinite if the signature is proven by construction.
         condition: f64,
     },
-    /// No state has the signature, or every state has a condition number above the one asked for.
+    /// No state has the signature, or every state has a condition number above the requested one.
     Refuted,
     /// Neither is proven.
     Open,

@@ -148,7 +148,7 @@ impl FoundConstraints {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintSearchError {
-    /// The search was ended from outside.
+    /// The search was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// Too many terms.

@@ -27,7 +27,7 @@ const BESIDE: [f64; 2] = [2.0, 14.0];
 const LEAST_BESIDE: f64 = 6.0;
 /// Largest rate of false alarms, for all frequencies that are looked at together.
 const MOST_ALARMS: f64 = 1e-3;
-/// Independent frequencies for each unit of the resolution, of which a maximum is taken.
+/// Independent frequencies for each unit of the resolution, over which a maximum is taken.
 const INDEPENDENT: f64 = 3.0;
 /// Largest number of frequencies that are tried.
 const MOST_LINES: usize = 3;

@@ -4,11 +4,11 @@ use crate::cancellation::Cancelled;
 use crate::recording::smooth::SmoothError;
 use thiserror::Error;
 
-/// Why no formula could be looked for.
+/// Why no formula could be sought.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FormulaError {
-    /// The search was ended from outside.
+    /// The search was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// Too many coordinates, or none.

@@ -31,7 +31,7 @@ impl Families {
         self.radial == 0 && self.reciprocal == 0
     }
 
-    /// The functions of coordinates, of which `periodic` are angles.
+    /// The functions of coordinates; those marked `periodic` are angles.
     pub(super) fn functions(&self, periodic: &[bool]) -> Vec<Function> {
         let n = periodic.len();
         let lines: Vec<usize> = (0..n).filter(|&i| !periodic[i]).collect();

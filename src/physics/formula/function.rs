@@ -236,7 +236,7 @@ impl Function {
         matches!(self, Self::Product(factors) if factors.is_empty())
     }
 
-    /// `true` if it depends on the phase behind `n` coordinates.
+    /// `true` if it depends on the phase that follows `n` coordinates.
     pub fn has_phase(&self, n: usize) -> bool {
         let has = |factor: &Factor| matches!(factor, Factor::Sine(m) | Factor::Cosine(m) if m.get(n).is_some_and(|m| *m != 0));
         matches!(self, Self::Product(factors) if factors.iter().any(has))

@@ -41,7 +41,7 @@ pub(super) struct Term {
 pub(super) struct Library {
     /// Names of the coordinates.
     pub names: Vec<String>,
-    /// Functions of the coordinates, and of the phase `om t` of the drive behind them.
+    /// Functions of the coordinates, and of the phase `om t` of the drive that follows them.
     pub functions: Vec<Function>,
     pub terms: Vec<Term>,
     pub drive: Option<Drive>,
@@ -53,7 +53,7 @@ pub(super) struct Library {
 pub(super) type Values = Vec<Taylor>;
 
 impl Library {
-    /// The library of coordinates, of which `periodic` are angles, with the user's own formulas.
+    /// The library of coordinates, where those marked `periodic` are angles, with the user's own formulas.
     ///
     /// # Errors
     /// Too many coordinates or terms, or an invalid formula.

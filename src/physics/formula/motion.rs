@@ -109,8 +109,8 @@ impl Motion<'_> {
         model.terms.iter().any(|&k| self.library.is_driven(k))
     }
 
-    /// Multiple shooting with a model; the unknowns are the frequency of its drive, if asked for, and the coefficients of the wanted terms, which
-    /// the model need not all have; `None` for a formula that cannot be recorded.
+    /// Multiple shooting with a model. The unknowns are the frequency of its drive, if requested, and the coefficients of the wanted terms,
+    /// which the model need not all have; `None` for a formula that cannot be recorded.
     fn shooting<T>(
         &self,
         model: &Model,

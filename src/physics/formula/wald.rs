@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn terms_without_weight_go_and_others_are_refitted() {
-        // y = 2 a + 0 b + 3 c, a and b alike.
+        // y = 2 a + 0 b + 3 c, with a and b correlated.
         let matrix = [100.0, 90.0, 0.0, 90.0, 100.0, 0.0, 0.0, 0.0, 50.0];
         let right = times(3, &matrix, &[2.0, 0.01, 3.0]);
         let equations = Equations { matrix: &matrix, right: &right, coefficients: &[0.0; 3], complexity: &[1.0; 3] };

@@ -224,7 +224,7 @@ impl<S: Scalar> Equator<'_, S> {
         self.orbit(radius, sense)
     }
 
-    /// The horizon, below which nothing stays at its radius, sought from `high` inward to `low`; `None` if there is none.
+    /// The horizon, inside which nothing can stay at constant radius, sought from `high` inward to `low`; `None` if there is none.
     ///
     /// # Errors
     /// As [`Equator::at`].
@@ -232,7 +232,7 @@ impl<S: Scalar> Equator<'_, S> {
         self.outermost(range, |metric| Some(metric.room()))
     }
 
-    /// The ergosurface, below which nothing stays at its place, sought from `high` inward to `low`; `None` if there is none.
+    /// The ergosurface, inside which nothing can stay at rest, sought from `high` inward to `low`; `None` if there is none.
     ///
     /// # Errors
     /// As [`Equator::at`].
@@ -272,10 +272,10 @@ impl<S: Scalar> Symmetric<S> {
 }
 
 impl<S: Scalar> Equator<'_, S> {
-    /// The free fall of a sense that turns at both radii, at the first of them; `None` if there is none.
+    /// The free fall with this sense that turns at both radii, at the first of them; `None` if there is none.
     ///
-    /// Energy and angular momentum per mass obey `E^2 g_pp + 2 E L g_tp + L^2 g_tt = g_tp^2 - g_tt g_pp` wherever the radius stands still;
-    /// two such places determine both. Whether the motion between them is possible is not asked.
+    /// Energy and angular momentum per mass obey `E^2 g_pp + 2 E L g_tp + L^2 g_tt = g_tp^2 - g_tt g_pp` at every turning point of the
+    /// radius; two such points determine both. Whether the motion between them is possible is not tested.
     ///
     /// # Errors
     /// As [`Equator::at`].

@@ -54,7 +54,7 @@ pub enum Value<S> {
     Tensor(Vec<S>, usize),
 }
 
-/// Every component stands for itself.
+/// Every component is independent.
 fn each(_: &[usize]) -> bool {
     true
 }

@@ -14,7 +14,7 @@ pub enum Observer {
     /// At rest: its coordinates do not change.
     #[default]
     Rest,
-    /// Along the normal of the slices of equal time. In the coordinates of Kerr and Schild it falls, from outside the horizon or within.
+    /// Along the normal of the slices of equal time. In Kerr-Schild coordinates it falls, outside the horizon and inside.
     Normal,
 }
 

@@ -206,7 +206,7 @@ impl LearnedHole<'_> {
         let kept = learned.filter(|fall| fall.keeps_signature).map(|fall| fall.time / mass);
         let name = "infall from rest at 10 M to 1.5 M, signature kept: proper time [M]";
         all.extend(Self::reading(name, truth.map(|fall| fall.time / mass), kept, 1e-3));
-        // An inclined bound orbit, between 10 and 14 M without a spin: far from those that whirl, which multiply every error.
+        // An inclined bound orbit, between 10 and 14 M without a spin: far from whirling orbits, which multiply every error.
         let (q, mut v) = (self.around.place(10.0 * mass, [1.0, 0.0, 0.0]), [0.0; 4]);
         if let CentralCoordinates::Cartesian(Chart { space: [_, y, z], .. }) = self.around {
             (v[y], v[z]) = (0.28, 0.28);

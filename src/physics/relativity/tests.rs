@@ -312,7 +312,7 @@ fn a_wormhole_shows_its_other_side() {
     }
 }
 
-/// Light straight through the throat comes from the place behind it, other light turns about the throat by the integral over its way.
+/// Light straight through the throat comes from the point behind it; other light turns about the throat by the integral along its path.
 #[test]
 fn places_in_the_second_region_have_their_angles() {
     let model = TwoSided::new(Mechanics::new(Wormhole(1.0, 0.0), vec![]), 0, [1, 2, 3], 5.0, 1e6).unwrap();

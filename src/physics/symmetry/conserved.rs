@@ -94,7 +94,7 @@ impl Conserved {
 pub struct Quadratic {
     /// Ascending; of quantities of unit size the mean rate along the motion, relative to the rates of momenta.
     pub singular_values: Vec<f64>,
-    /// Number of all conserved quantities that were found, known ones included, and the gap behind them.
+    /// Number of all conserved quantities that were found, including known ones, and the gap after them.
     pub separation: Separation,
     /// Quantities that are not combinations of the energy, the charges of the point symmetries and their products, in reduced echelon form;
     /// empty if there is no gap.

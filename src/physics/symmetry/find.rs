@@ -8,7 +8,7 @@ use super::{Algebra, Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
 
-/// Functions with a smaller part independent of the others count as combinations of them, as `sin^2` beside `1` and `cos 2x`.
+/// Functions with a smaller independent part count as combinations of the others, as `sin^2` given `1` and `cos 2x`.
 const DEPENDENT: f64 = 1e-7;
 
 /// Largest factor by which the noise of a field may grow to need fewer functions.
@@ -27,7 +27,7 @@ pub struct Symmetries {
     pub basis: Basis,
     /// Ascending; of fields of unit size the mean change of `L` along them, relative to the size of its terms.
     pub singular_values: Vec<f64>,
-    /// Number of symmetries and the gap behind them.
+    /// Number of symmetries and the gap after them.
     pub separation: Separation,
     /// The symmetries, in reduced echelon form; empty if there is no gap.
     pub fields: Vec<Field>,
@@ -215,7 +215,7 @@ impl Unknowns<'_> {
             (i, f) if i < n => self.change(i, f),
             (_, f) => self.columns.rates[f].iter().zip(self.weight).map(|(rate, w)| -rate * w).collect(),
         };
-        // F stands beside p.xi.
+        // F is subtracted from p.xi.
         let sample = self.sample;
         let momentum: Vec<f64> = sample.pace.iter().zip(&sample.size).map(|(pace, size)| pace * size).collect();
         let momentum = norm(&momentum).max(f64::MIN_POSITIVE.sqrt());

@@ -51,7 +51,7 @@ pub struct SymmetrySummary {
     pub points: usize,
     /// Seed of the states.
     pub seed: u64,
-    /// Quantities of second degree in the momenta, if they were looked for.
+    /// Quantities of second degree in the momenta, if they were sought.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadratic: Option<QuadraticSummary>,
 }

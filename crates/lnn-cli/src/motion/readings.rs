@@ -1,4 +1,4 @@
-//! The measured quantities of a system along a roll-out, as columns behind the others.
+//! The measured quantities of a system along a roll-out, as columns after the others.
 
 use crate::CliError;
 use crate::motion_source::MotionSource;

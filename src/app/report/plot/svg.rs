@@ -37,7 +37,7 @@ const BOLD: f64 = 1.16;
 /// Size of the texts of a legend, length of its lines.
 const ENTRY: (f64, f64) = (12.5, 22.0);
 
-/// Width of an entry of a legend with the room behind it.
+/// Width of an entry of a legend, including the space after it.
 pub(super) fn entry_width(name: &str) -> f64 {
     ENTRY.1 + text_width(name, ENTRY.0) + 19.0
 }

@@ -44,7 +44,7 @@ enum Role {
     Unused,
 }
 
-/// A table and the roles of its columns as far as they are known.
+/// A table and the roles of its columns, as far as they are known.
 struct Roles<'a> {
     table: &'a RawTable,
     given: &'a Columns,

@@ -30,7 +30,7 @@ pub fn restarts(values: &[f64]) -> Option<Vec<usize>> {
     (values.len() > 1 && falls.len() * RUN <= values.len() && still * RUN <= values.len()).then_some(falls)
 }
 
-/// `true` for 0, 1, 2, .. or 1, 2, 3, .., perhaps beginning anew.
+/// `true` for 0, 1, 2, .. or 1, 2, 3, .., possibly with restarts.
 pub fn counts(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[1] - pair[0] == 1.0 || pair[1] < pair[0])
         && values.iter().all(|x| x.fract() == 0.0)

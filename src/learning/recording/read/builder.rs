@@ -24,7 +24,7 @@ pub struct TrackBuilder {
     pub input: Vec<f64>,
     /// Which readings of positions are missing, `(samples, n)`; empty if none is.
     pub missing: Vec<bool>,
-    /// The row before, as it stands in the file.
+    /// The previous row, unprocessed.
     last: Vec<f64>,
     last_row: u64,
 }
@@ -79,8 +79,8 @@ impl<'a> Builder<'a> {
         self.selection.called(self.columns)
     }
 
-    /// Adds a row: the used columns in the order of the selection, as they stand in the file, and the value that tells
-    /// trajectories apart if there is such a column.
+    /// Adds a row: the unprocessed values of the used columns in the order of the selection, and the value that distinguishes trajectories
+    /// if there is such a column.
     pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {
         if self.lacks(row, values) {
             return Ok(());

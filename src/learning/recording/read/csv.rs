@@ -90,7 +90,7 @@ pub fn read<'a>(
     Ok((text, builders))
 }
 
-/// `true` for a line of one field above a line of several, none of which is a number: a title above the header, such as the name of a track.
+/// `true` for a line of one field above a line of several that are not numbers: a title above the header, such as the name of a track.
 fn is_title(line: &[u8], rest: &[u8]) -> bool {
     let next = rest.split(|byte| matches!(byte, b'\n' | b'\r')).find(|line| !line.trim_ascii().is_empty());
     let (Some((title, _)), Some((next, _))) = (decode(line), next.and_then(decode)) else { return false };

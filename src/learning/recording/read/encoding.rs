@@ -45,7 +45,7 @@ pub fn decode(bytes: &[u8]) -> Option<(Cow<'_, str>, Encoding)> {
     })
 }
 
-/// `true` for the beginning of a text in UTF-16: its byte order mark, and no zero character behind it, as UTF-32 has.
+/// `true` for the beginning of a text in UTF-16: its byte order mark, not followed by a zero character as in UTF-32.
 pub fn is_utf16(start: &[u8]) -> bool {
     (start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff")) && start.get(2..4) != Some(&[0, 0])
 }

@@ -5,7 +5,7 @@ use crate::recording::columns::{TIME, formula_in};
 use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, ColumnsError};
 
-/// The forces on the coordinates, some of which are formulas.
+/// The forces on the coordinates; some of them are formulas.
 pub struct ForceFormulas {
     /// A formula for each coordinate; for a column, its name.
     formulas: Vec<Given>,

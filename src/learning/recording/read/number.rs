@@ -4,7 +4,7 @@ use super::Problem;
 use super::encoding::decode;
 use super::text::{unquoted, with_point};
 
-/// Words that stand for a reading that is missing.
+/// Words for a missing reading.
 const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
 
 /// Decimal mark of a file, once it is known.

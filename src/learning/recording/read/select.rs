@@ -31,7 +31,7 @@ pub struct Selection {
     pub timed: bool,
     /// The column that distinguishes trajectories.
     pub trajectory: Option<Used>,
-    /// Number of the trajectory behind the names of its columns, if several are side by side.
+    /// Number of the trajectory after the names of its columns, if several are side by side.
     pub number: Option<String>,
 }
 

@@ -117,7 +117,7 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// Text of a comment behind its `#`, if the line is one.
+/// Text of a comment after its `#`, if the line is one.
 pub fn comment(line: &[u8]) -> Option<&[u8]> {
     line.starts_with(b"#").then(|| {
         let marks = line.iter().take_while(|byte| **byte == b'#').count();

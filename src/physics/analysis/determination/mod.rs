@@ -319,7 +319,7 @@ mod tests {
     use rand::Rng;
     use rand_distr::StandardNormal;
 
-    /// A pendulum whose bob is `p` times as heavy as it is.
+    /// A pendulum whose bob is `p` times as heavy as in the exact one.
     struct Pendulum;
 
     impl Lagrangian for Pendulum {

@@ -29,10 +29,10 @@ pub struct Observed {
 const STATES: usize = 4000;
 
 impl Observed {
-    /// The states that a fit learned from.
+    /// The training states of a fit.
     ///
     /// # Errors
-    /// As [`RecordingSplit::datasets`].
+    /// Those of [`RecordingSplit::datasets`].
     pub fn new(measured: &RecordingSplit, targets: Targets) -> Result<Self, RecordingSplitError> {
         let data = measured.datasets::<f64>(targets)?.training.remove(0);
         let finer = if is_derived(measured, targets) { measured.finer_accelerations() } else { None };
@@ -43,7 +43,7 @@ impl Observed {
     /// The states held out to judge the model; `None` if there are none.
     ///
     /// # Errors
-    /// See [`RecordingSplit::datasets`].
+    /// Those of [`RecordingSplit::datasets`].
     pub fn held_out(measured: &RecordingSplit, targets: Targets) -> Result<Option<Self>, RecordingSplitError> {
         if measured.test.states.is_empty() {
             return Ok(None);

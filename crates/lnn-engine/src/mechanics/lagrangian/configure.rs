@@ -164,7 +164,7 @@ impl<S: Scalar> SystemInstance<S> {
     /// As [`build`](super::build).
     ///
     /// # Errors
-    /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
+    /// [`SystemError::UnknownSystem`] if the description is not in the catalogue or the scalar is not one of `f32`, `f64` and
     /// [`Dd`](crate::scalar::Dd).
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let count = self.inputs().count();

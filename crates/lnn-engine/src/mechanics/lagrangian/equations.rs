@@ -56,8 +56,8 @@ impl Equations {
         Ok(Some(Self { rows, ..Self::of(n, count, &parts, (chosen, &[]))? }))
     }
 
-    /// Records the equations of a sum of parts of `count` parameters, with slopes by chosen parameters and then by the factors of
-    /// `terms` that the sum may get. The time and inputs are coordinates of the parts behind `n` others.
+    /// Records the equations of a sum of parts of `count` parameters, with slopes by chosen parameters and then by the factors of `terms`
+    /// that the sum may get. The time and inputs are coordinates of the parts, after `n` others.
     ///
     /// # Errors
     /// [`TapeError`] for parts that branch on their data.

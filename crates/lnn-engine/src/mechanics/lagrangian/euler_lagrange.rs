@@ -144,7 +144,7 @@ impl<S: Scalar> Terms<S> {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Adds forces from outside, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`] and without a failure: `M^-1 Q` to
+    /// Adds external forces, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`] and without a failure: `M^-1 Q` to
     /// the accelerations, `Q` to the forces and `-v.Q` to the power they take.
     ///
     /// # Errors

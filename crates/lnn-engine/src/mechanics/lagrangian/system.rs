@@ -241,7 +241,7 @@ pub struct PaperPhase {
     pub rate: f64,
     /// Lowest learning rate.
     pub lowest_rate: f64,
-    /// Bounds of all positions, where they are others than the box of the training states.
+    /// Bounds of all positions, if they differ from the box of the training states.
     pub positions: Option<(f64, f64)>,
 }
 

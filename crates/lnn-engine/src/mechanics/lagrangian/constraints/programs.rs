@@ -205,8 +205,8 @@ impl<S: Scalar> RowPrograms<S> {
         Some((Replay::new(Arc::clone(program)), starts))
     }
 
-    /// The pivots of `U A A^T U - x`, of a diagonal matrix `U` and a number `x` behind the state: all are positive where no eigenvalue of
-    /// `U A A^T U` is below `x`.
+    /// The pivots of `U A A^T U - x`, for a diagonal matrix `U` and a number `x` that follow the state: all are positive if no eigenvalue
+    /// of `U A A^T U` is below `x`.
     pub(crate) fn shifted(&self) -> Option<Replay<S>> {
         let (n, m) = self.rows.rate.size;
         let record = || {

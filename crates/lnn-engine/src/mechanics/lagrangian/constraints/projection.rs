@@ -13,7 +13,7 @@ const MAX_STEPS: usize = 60;
 /// Defects below this many roundings of the state count as zero.
 const ROUNDINGS: f64 = 1024.0;
 
-/// A state from which no way to the constraints was found.
+/// A state that could not be projected onto the constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffManifold {
     /// The most violated row.

@@ -22,7 +22,7 @@ pub struct EventDescription {
     /// Only where it rises through 0.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "super::is_false"))]
     rising: bool,
-    /// The motion ends when this has happened so many times.
+    /// The motion ends when this event has happened this many times.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     after: Option<usize>,
     /// What happens.

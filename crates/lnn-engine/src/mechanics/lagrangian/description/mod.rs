@@ -55,10 +55,11 @@ pub struct Description {
     /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub lagrangian: Option<String>,
-    /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
+    /// Rayleigh's dissipation function `D` of the same names, whose force is `-dD/dv`; none if left out.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<String>,
-    /// Generalized forces beside those of `L` and `D`, by the coordinates that they act on: of the same names, of the time `t` and of inputs.
+    /// Generalized forces in addition to those of `L` and `D`, by the coordinates that they act on: formulas of the same names, of the time
+    /// `t` and of inputs.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub forces: BTreeMap<String, String>,
     /// Measured quantities in the forces, such as the voltage of a motor, and their units.
@@ -317,8 +318,8 @@ pub struct Described {
     pub description: Description,
     /// The description with its links, if it has any.
     written: Option<Description>,
-    /// Its Lagrangian; parameters in the order of their names. If it or the forces depend on the time, this is a coordinate behind the others,
-    /// and inputs are coordinates behind the time.
+    /// Its Lagrangian; parameters in the order of their names. If it or the forces depend on the time, this is a coordinate after the
+    /// others, and inputs are coordinates after the time.
     pub lagrangian: ExpressionLagrangian,
     /// Its dissipation function, if it has one; parameters as the Lagrangian's.
     pub dissipation: Option<ExpressionLagrangian>,

@@ -221,7 +221,7 @@ impl Compiler {
         self.given(value, |entry| if let Entry::Position(i) = entry { Some(*i as usize) } else { None })
     }
 
-    /// The picked entries among those that a value depends on.
+    /// The picked entries that a value depends on.
     fn given(&self, value: Value, pick: impl Fn(&Entry) -> Option<usize>) -> Vec<usize> {
         let entries = self.entries.iter().zip(self.needed(value)).filter(|(_, needed)| *needed);
         entries.filter_map(|(entry, _)| pick(entry)).collect()

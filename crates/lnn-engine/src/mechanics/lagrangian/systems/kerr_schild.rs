@@ -111,7 +111,7 @@ pub const fn system(hole: KerrSchild) -> System {
     }
 }
 
-/// States from inside the horizon to where periastra advance by little.
+/// States from inside the horizon to where the advance of periastra is small.
 fn around(low: f64) -> StateAdvice {
     StateAdvice {
         log_uniform: Vec::new(),

@@ -318,7 +318,7 @@ mod tests {
     fn check(what: &str, f: &impl Function) {
         let (q, v) = ([dd(0.25), dd(-0.125)], [dd(0.375), dd(0.5)]);
         let mut space = Space::new(2, 2);
-        // Numbers of an earlier use leave nothing behind.
+        // Earlier numbers leave no traces.
         f.of(&[space.position(0, q[0]), space.position(1, q[1])], &[space.velocity(0, v[0]), space.velocity(1, v[1])]);
         space.clear();
         let found = f.of(&[0, 1].map(|i| space.position(i, q[i])), &[0, 1].map(|i| space.velocity(i, v[i])));

@@ -9,7 +9,7 @@ use num_traits::Float as _;
 
 /// Size of a sine or cosine that counts as rounding.
 const ROUNDING: f64 = 1e-15;
-/// Frame of the base, and of a link whose constants stand in the frame of its joint.
+/// Frame of the base, and of a link whose constants are given in the frame of its joint.
 const SAME: Matrix<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 type Outcome<T> = Result<T, DescriptionError>;
