@@ -36,7 +36,7 @@ pub enum MechanicsError {
     OffConstraints {
         /// Row of the batch.
         row: usize,
-        /// Index of the most violated constraint.
+        /// Index of the most violated constraint, from 0.
         constraint: usize,
         /// Distance to the nearest state that they allow.
         distance: f64,
