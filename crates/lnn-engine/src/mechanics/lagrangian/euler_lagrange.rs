@@ -319,7 +319,7 @@ pub fn force_parts_by_rows<S: Scalar>(
     Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
 }
 
-/// [`inverse_dynamics_by_drives`] with an error for every row that fails, whose forces are `NaN`.
+/// `inverse_dynamics_by_drives` with an error for every row that fails, whose forces are `NaN`.
 ///
 /// # Errors
 /// A [`MechanicsError`] that concerns no single row.

@@ -179,7 +179,7 @@ pub fn one_negative_violation<S: Scalar>(
 }
 
 /// Sylvester's criterion on `M`, `(n, n)`, with characteristic scales `c`, `(n)`; formula in
-/// [`Penalty::Sylvester`](crate::configuration::Penalty::Sylvester).
+/// `Penalty::Sylvester`.
 ///
 /// With `D = diag(c_i^(-1/2))`, `det M_k / (s_k + eps) = det (D M D)_k / (1 + eps/s_k)`: minors are taken of the scaled
 /// matrix. The gradient of a minor is its adjugate, also where the minor is singular.

@@ -58,7 +58,7 @@ pub(super) fn independent<S: Scalar>(n: usize, matrix: &[S], tolerance: f64) -> 
     (kept, basis)
 }
 
-/// [`independent`] up to rounding.
+/// `independent` up to rounding.
 pub fn independent_rows<S: Scalar>(n: usize, matrix: &[S]) -> (Vec<usize>, Vec<S>) {
     independent(n, matrix, RANK * S::epsilon().to_f64().sqrt())
 }
