@@ -20,9 +20,9 @@
 //! ```
 //! use lnn_engine::lagrangian::{EulerLagrange, build};
 //!
-//! let pendulum = build::<f64>("pendulum", &[])?;
-//! let acceleration = pendulum.acceleration(&[0.5], &[0.0])?; // q in rad, v in rad/s
-//! assert!((acceleration[0] + 9.81 * 0.5_f64.sin()).abs() < 1e-12);
+//! let oscillator = build::<f64>("harmonic-oscillator", &[("k".to_string(), "8".to_string()), ("m".to_string(), "2".to_string())])?;
+//! let acceleration = oscillator.acceleration(&[0.5], &[0.0])?; // q in m, v in m/s
+//! assert!((acceleration[0] + 8.0 / 2.0 * 0.5).abs() < 1e-15);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 // Code for some features is dead without them; the build with all features finds code that is always dead.

@@ -4,6 +4,7 @@
 //! use lnn::lagrangian::{EulerLagrange, Request, Terms};
 //! use lnn::network::{ModelFile, NetworkLagrangian};
 //!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! // A double pendulum that was learned, beside the examples; two states of it.
 //! let file = ModelFile::<f64>::load("examples/data/double_pendulum.safetensors".as_ref())?;
 //! let model = NetworkLagrangian::new(file.header.architecture, file.weights)?;
