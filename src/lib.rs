@@ -213,7 +213,6 @@ pub use physics::{analysis, formula, identification};
 pub use physics::{relativity, symmetry};
 
 #[cfg(all(any(doc, doctest), feature = "pipeline"))]
-#[cfg(any(doc, doctest))]
 pub mod docs;
 
 /// The README's code runs as a documentation test.

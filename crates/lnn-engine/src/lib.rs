@@ -1,8 +1,6 @@
-//! The engine of `lnn`: derivatives of Lagrangians, their Euler-Lagrange terms in batches, their motion.
+#![doc = include_str!("../README.md")]
 //!
-//! The package `lnn` re-exports every module below under the same name and adds learning, physics and the program. Depend on this
-//! package alone to embed the engine in a solver: without features it needs neither the standard library nor any of the packages that
-//! training and files need.
+//! The modules have the names that they have in `lnn`, which re-exports them:
 //!
 //! | module | contents |
 //! |---|---|
@@ -16,15 +14,6 @@
 //!
 //! Shapes, units and numbers are those of `lnn`: batches are row-major `(batch, n)`, units SI, results do not depend on the number of
 //! threads. Items hidden from these pages are shared by the packages of the repository and may change in every version.
-//!
-//! ```
-//! use lnn_engine::lagrangian::{EulerLagrange, build};
-//!
-//! let oscillator = build::<f64>("harmonic-oscillator", &[("k".to_string(), "8".to_string()), ("m".to_string(), "2".to_string())])?;
-//! let acceleration = oscillator.acceleration(&[0.5], &[0.0])?; // q in m, v in m/s
-//! assert!((acceleration[0] + 8.0 / 2.0 * 0.5).abs() < 1e-15);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 // Code for some features is dead without them; the build with all features finds code that is always dead.
 #![cfg_attr(not(all(feature = "faer", feature = "model-files", feature = "rollout")), allow(dead_code, unused_imports))]
 #![cfg_attr(not(feature = "std"), no_std)]

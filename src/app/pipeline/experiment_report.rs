@@ -73,7 +73,7 @@ pub(crate) fn conclude(
     let rows = rows(&results);
     let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
     let output = store.open_tables()?;
-    experiment.command().sign(&output)?;
+    experiment.command().write(&output)?;
     output.write("table.csv", table.to_csv().as_bytes())?;
     output.write("runs.csv", run_table(&results, store)?.to_csv().as_bytes())?;
     let mut figures = loss_figures(&results);

@@ -180,7 +180,7 @@ impl<S: Scalar> LearnedFit<S> {
     /// The model first, then small files; pictures come last, so that a full disk loses none of the others.
     fn write(&self, output: &dyn Output, toml: &str) -> Result<(), PipelineError> {
         write_model(output, &self.model)?;
-        Command::Fit.sign(output)?;
+        Command::Fit.write(output)?;
         output.write("config.toml", toml.as_bytes())?;
         output.write("history.csv", history(&self.trained.history).as_bytes())?;
         self.shot.as_ref().map_or(Ok(()), |shot| output.write("shooting.csv", history(&shot.history).as_bytes()))

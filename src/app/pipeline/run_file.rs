@@ -57,7 +57,7 @@ impl Command {
     ///
     /// # Errors
     /// [`PipelineError::Output`].
-    pub(crate) fn sign(self, output: &dyn Output) -> Result<(), PipelineError> {
+    pub(crate) fn write(self, output: &dyn Output) -> Result<(), PipelineError> {
         output.write(RUN, self.text()?.as_bytes())
     }
 
@@ -82,7 +82,7 @@ mod tests {
         assert!(Command::of(temporary.path()).unwrap_err().contains(RUN));
         let output = Directory::create(temporary.path()).unwrap();
         for command in [Command::Train, Command::Fit, Command::Evaluate, Command::Sweep, Command::Experiment] {
-            command.sign(&output).unwrap();
+            command.write(&output).unwrap();
             assert_eq!(Command::of(temporary.path()), Ok(command));
         }
         output.write(RUN, br#"{"command":"dream","version":"0.1.0"}"#).unwrap();

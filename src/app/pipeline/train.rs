@@ -210,7 +210,7 @@ fn train_in<S: Scalar>(
     let LearnedRun { trained, model, fresh } = LearnedRun::<S>::new((config, &toml), system, options, watch)?;
     // The model first, then small files, pictures last, so that a full disk loses none of the others.
     write_model(output, &model)?;
-    Command::Train.sign(output)?;
+    Command::Train.write(output)?;
     output.write("config.toml", toml.as_bytes())?;
     output.write("history.csv", history(&trained.history).as_bytes())?;
 

@@ -47,6 +47,9 @@ fn a_wave_number_is_found_although_smoothing_leaves_out_the_ends() {
         let found = identify(&wiggler(1.4, wave_number), &recording, &options).unwrap();
         let off = off(&found, &[("B", 1.2), ("k", 2.0)]);
         assert!(found.converged && off.iter().all(|off| off.abs() < 4.5), "{seed}: {found:?}");
+        // A wave number that lies beyond what is searched is not found, and the motion is not explained.
+        let far = identify(&wiggler(1.4, 0.7), &recording, &options).unwrap();
+        assert!(!far.explained, "{seed}: {far:?}");
     }
 }
 
