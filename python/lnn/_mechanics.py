@@ -35,6 +35,17 @@ def _event(name: str, t: float, q: np.ndarray, v: np.ndarray, impact: tuple[np.n
     return Event(name, t, q, v, *(impact or ()))
 
 
+def _times(t: Numbers | None, shape: tuple[int, ...]) -> np.ndarray | None:
+    """Times of states, one for each or one for all of them, ``(b,)``."""
+    if t is None:
+        return None
+    given = doubles("t", t)
+    try:
+        return np.ascontiguousarray(np.broadcast_to(given, shape).reshape(-1))
+    except ValueError:
+        raise ValueError(f"t: expected an array {shape}, one time for each state, found the shape {given.shape}") from None
+
+
 class Mechanics:
     """What systems and models have in common: a Lagrangian, its terms, its motion, its geometry."""
 
@@ -78,13 +89,15 @@ class Mechanics:
         """Bounds of the states of interest by column: those that a model learned from, or that a system is judged by."""
         return dict(zip(self.columns, map(tuple, self._facts["position"] + self._facts["velocity"])))
 
-    def terms(self, q: Numbers, v: Numbers, *, threads: int = 1) -> Terms:
+    def terms(self, q: Numbers, v: Numbers, *, t: Numbers | None = None, threads: int = 1) -> Terms:
         """All terms of states.
 
         Parameters
         ----------
         q, v : array_like (..., n)
             Coordinates and velocities in SI units and rad.
+        t : array_like (...), optional
+            Times in s, which only a system that depends on the time needs.
         threads : int
             Threads; results do not depend on them.
 
@@ -96,7 +109,7 @@ class Mechanics:
         """
         n = self._n
         q, v, shape = states(q, v, n)
-        found, failures = self._subject.terms(q, v, threads if threads == 1 else thread_count(threads))
+        found, failures = self._subject.terms(q, v, _times(t, shape), threads if threads == 1 else thread_count(threads))
         vector, matrix = (*shape, n), (*shape, n, n)
         lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy, *friction = found
         return Terms(
@@ -111,25 +124,34 @@ class Mechanics:
             tuple(failures),
         )
 
-    def _term(self, name: str, width: tuple[int, ...], q: Numbers, v: Numbers, threads: int) -> np.ndarray:
+    def _term(
+        self, name: str, width: tuple[int, ...], q: Numbers, v: Numbers, t: Numbers | None, threads: int
+    ) -> np.ndarray:
         q, v, shape = states(q, v, self._n)
         threads = threads if threads == 1 else thread_count(threads)
-        return self._subject.term(name, q, v, threads).reshape(shape + width)
+        return self._subject.term(name, q, v, _times(t, shape), threads).reshape(shape + width)
 
-    def lagrangian(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
+    def lagrangian(self, q: Numbers, v: Numbers, *, t: Numbers | None = None, threads: int = 1) -> np.ndarray:
         """L, ``(...)``, of states ``(..., n)``."""
-        return self._term("lagrangian", (), q, v, threads)
+        return self._term("lagrangian", (), q, v, t, threads)
 
-    def momentum(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
+    def momentum(self, q: Numbers, v: Numbers, *, t: Numbers | None = None, threads: int = 1) -> np.ndarray:
         """p = dL/dv, ``(..., n)``."""
-        return self._term("momentum", (self._n,), q, v, threads)
+        return self._term("momentum", (self._n,), q, v, t, threads)
 
-    def mass_matrix(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
+    def mass_matrix(self, q: Numbers, v: Numbers, *, t: Numbers | None = None, threads: int = 1) -> np.ndarray:
         """M = d2L/dv2, ``(..., n, n)``."""
-        return self._term("mass_matrix", (self._n, self._n), q, v, threads)
+        return self._term("mass_matrix", (self._n, self._n), q, v, t, threads)
 
     def acceleration(
-        self, q: Numbers, v: Numbers, *, force: Numbers | None = None, friction: bool = True, threads: int = 1
+        self,
+        q: Numbers,
+        v: Numbers,
+        *,
+        t: Numbers | None = None,
+        force: Numbers | None = None,
+        friction: bool = True,
+        threads: int = 1,
     ) -> np.ndarray:
         """a, ``(..., n)``, NaN where it is not determined: ``M a = dL/dq - c - dD/dv + force``.
 
@@ -137,6 +159,8 @@ class Mechanics:
         ----------
         q, v : array_like (..., n)
             Coordinates and velocities in SI units and rad.
+        t : array_like (...), optional
+            Times in s, which only a system that depends on the time needs.
         force : array_like (..., n), optional
             Generalized forces from outside, such as torques of motors; none by default.
         friction : bool
@@ -145,7 +169,8 @@ class Mechanics:
         q, v, shape = states(q, v, self._n)
         threads = threads if threads == 1 else thread_count(threads)
         given = None if force is None else self._forces(force, shape)
-        return self._subject.term("acceleration", q, v, threads, given, bool(friction)).reshape(*shape, self._n)
+        found = self._subject.term("acceleration", q, v, _times(t, shape), threads, given, bool(friction))
+        return found.reshape(*shape, self._n)
 
     def _forces(self, force: Numbers, shape: tuple[int, ...], n: int | None = None, what: str = "force") -> np.ndarray:
         """Forces on states, one for each or one for all of them, ``(b, n)``."""
@@ -155,13 +180,15 @@ class Mechanics:
         except ValueError:
             raise ValueError(f"{what}: expected an array (..., {n}) for states {shape}, found the shape {given.shape}") from None
 
-    def inverse_dynamics(self, q: Numbers, v: Numbers, a: Numbers) -> InverseDynamics:
+    def inverse_dynamics(self, q: Numbers, v: Numbers, a: Numbers, *, t: Numbers | None = None) -> InverseDynamics:
         """Forces that give states their accelerations: the torques that an arm's motors need, or a controller sends ahead.
 
         Parameters
         ----------
         q, v, a : array_like (..., n)
             Coordinates, velocities and accelerations in SI units and rad.
+        t : array_like (...), optional
+            Times in s, which only a system that depends on the time needs.
 
         Returns
         -------
@@ -180,7 +207,7 @@ class Mechanics:
         if given.shape[-1:] != (n,) and not given.shape == shape == ():
             raise ValueError(f"a: expected an array (..., {n}), found the shape {given.shape}")
         accelerations = np.ascontiguousarray(np.broadcast_to(given, (*shape, n)).reshape(-1, n))
-        found = _lnn.inverse_dynamics(self._subject, q, v, accelerations)
+        found = _lnn.inverse_dynamics(self._subject, q, v, accelerations, _times(t, shape))
         every = len(q) or 1
         parts = [numbers.reshape(*shape, len(numbers) // every) for numbers in found]
         return InverseDynamics(*(part if part.shape[-1] or k == 4 else np.zeros((*shape, n)) for k, part in enumerate(parts)))
@@ -214,9 +241,9 @@ class Mechanics:
         by_q, by_v, by_force = (matrix.reshape(*shape, n, n) for matrix in matrices)
         return Linearization(acceleration.reshape(*shape, n), by_q, by_v, by_force)
 
-    def energy(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
+    def energy(self, q: Numbers, v: Numbers, *, t: Numbers | None = None, threads: int = 1) -> np.ndarray:
         """E = v.p - L, ``(...)``."""
-        return self._term("energy", (), q, v, threads)
+        return self._term("energy", (), q, v, t, threads)
 
     def rollout(
         self,

@@ -1,8 +1,8 @@
 //! Forces from outside as Python gives them, and the forces that make a known motion.
 
 use crate::errors::value;
-use crate::subject::{Subject, slice};
-use lnn::lagrangian::{ForceParts, Inputs, InverseDynamics, force_parts, inverse_dynamics};
+use crate::subject::{Subject, slice, times};
+use lnn::lagrangian::{ForceParts, Inputs, InverseDynamics, force_parts_by_rows, inverse_dynamics_by_rows};
 use lnn::rollout::{Between, Force, SampledForce};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -113,7 +113,7 @@ impl Forces {
 
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 
-/// Forces that give states `(b, n)` their accelerations, flat: generalized, friction, external, of constraints, multipliers, then the parts
+/// Forces that give states `(b, n)` their accelerations, at times where the system depends on them, flat: generalized, friction, external, of constraints, multipliers, then the parts
 /// inertial, Coriolis and gravity; empty where there are none.
 #[pyfunction(name = "inverse_dynamics")]
 pub fn forces_of_motion<'py>(
@@ -122,9 +122,16 @@ pub fn forces_of_motion<'py>(
     q: PyReadonlyArray2<'py, f64>,
     v: PyReadonlyArray2<'py, f64>,
     a: PyReadonlyArray2<'py, f64>,
+    t: Option<PyReadonlyArray1<'py, f64>>,
 ) -> PyResult<Vec<Numbers<'py>>> {
-    let ((q, v), a, model) = (subject.states(&q, &v)?, slice(&a)?, subject.moving());
-    let found = py.detach(|| Ok((inverse_dynamics(model, q, v, a)?, force_parts(model, q, v, a)?)));
+    let ((q, v), a, t, model) = (subject.states(&q, &v)?, slice(&a)?, times(t.as_ref())?, subject.moving());
+    let found = py.detach(|| {
+        let (forces, failures) = inverse_dynamics_by_rows(model, &[], [q, v, a], t)?;
+        match failures.first() {
+            Some(error) => Err(*error),
+            None => Ok((forces, force_parts_by_rows(model, [q, v, a], t)?.0)),
+        }
+    });
     let (forces, parts) = found.map_err(|error: lnn::lagrangian::MechanicsError| value(error))?;
     let InverseDynamics { generalized, friction, external, constraint, multipliers } = forces;
     let ForceParts { inertial, coriolis, gravity, .. } = parts;

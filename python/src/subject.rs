@@ -21,7 +21,7 @@ use lnn::pipeline::{
 use lnn::report::page;
 use lnn::rollout::{Event, Integrator, Occurrence, Options, Rollout, RolloutError, Start, rollout_each};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use serde_json::{Value, json};
@@ -302,28 +302,32 @@ impl Subject {
         (request, friction): (Request, bool),
         threads: usize,
     ) -> PyResult<Vec<(Terms<f64>, usize)>> {
-        if let Kind::System(configured, _) = &self.kind
-            && configured.is_timed()
-        {
+        if states.times.is_empty() && self.moving().is_timed() {
             return Err(value(MechanicsError::Timed));
         }
         let work = |watch: &Watch| {
             self.with_friction(friction, |model| computed(model, states, request, threads, &watch.interrupt))
         };
-        if states.0.len() <= CHUNK * self.n() {
+        if states.q.len() <= CHUNK * self.n() {
             return Ok(py.detach(|| work(&Watch::default())));
         }
         whole(py, None, work)
     }
 }
 
-/// Coordinates and velocities of states `(b, n)`, and the forces from outside that act on them, if there are some.
-type States<'a> = (&'a [f64], &'a [f64], Option<&'a [f64]>);
+/// States `(b, n)`, the forces from outside that act on them, and their times `(b)`, which only a system that depends on the time needs.
+#[derive(Clone, Copy)]
+struct States<'a> {
+    q: &'a [f64],
+    v: &'a [f64],
+    force: Option<&'a [f64]>,
+    times: &'a [f64],
+}
 
 /// Terms of states, chunk by chunk, parts of them side by side.
 fn computed(
     model: &dyn EulerLagrange<f64>,
-    (q, v, force): States<'_>,
+    States { q, v, force, times }: States<'_>,
     request: Request,
     threads: usize,
     stop: &AtomicBool,
@@ -335,8 +339,9 @@ fn computed(
         let chunks = range.clone().step_by(chunk).map(|row| row * n..(row + chunk).min(range.end) * n);
         let terms = chunks.take_while(|_| !stop.load(Ordering::Relaxed)).map(|at| {
             let (q, v, mut terms) = (&q[at.clone()], &v[at.clone()], Terms::default());
+            let times = times.get(at.start / n..at.end / n).unwrap_or_default();
             // Every row that fails is among the failures, its accelerations are NaN.
-            let _ = model.terms(q, v, request, &mut terms);
+            let _ = model.terms_at(times, q, v, request, &mut terms);
             if let Some(force) = force {
                 let _ = terms.add_force(n, v, &force[at], &mut Workspace::new());
             }
@@ -464,10 +469,12 @@ impl Subject {
         py: Python<'py>,
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
+        t: Option<PyReadonlyArray1<'py, f64>>,
         threads: usize,
     ) -> PyResult<(Vec<Numbers<'py>>, Vec<(usize, String)>)> {
         let (q, v) = self.states(&q, &v)?;
-        let mut parts = self.attended(py, (q, v, None), (Request::ALL, true), threads)?;
+        let states = States { q, v, force: None, times: times(t.as_ref())? };
+        let mut parts = self.attended(py, states, (Request::ALL, true), threads)?;
         let mut failures = Vec::new();
         let mut before = 0;
         for (terms, states) in &parts {
@@ -495,13 +502,14 @@ impl Subject {
 
     /// One term of states `(b, n)`, flat; forces from outside and friction act on accelerations alone.
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (name, q, v, threads, force=None, friction=true))]
+    #[pyo3(signature = (name, q, v, t, threads, force=None, friction=true))]
     fn term<'py>(
         &self,
         py: Python<'py>,
         name: &str,
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
+        t: Option<PyReadonlyArray1<'py, f64>>,
         threads: usize,
         force: Option<PyReadonlyArray2<'py, f64>>,
         friction: bool,
@@ -516,7 +524,8 @@ impl Subject {
             "energy" => (Request::ENERGY, 1, |t| &mut t.energy),
             _ => (Request::ACCELERATION, n, |t| &mut t.acceleration),
         };
-        let mut parts = self.attended(py, (q, v, force), (request, friction), threads)?;
+        let states = States { q, v, force, times: times(t.as_ref())? };
+        let mut parts = self.attended(py, states, (request, friction), threads)?;
         Ok(field(py, &mut parts, width, take))
     }
 
@@ -789,6 +798,11 @@ impl Subject {
 /// `ValueError` for a text that is none.
 pub fn degrees_of(text: &str) -> PyResult<Degrees> {
     text.parse().map_err(|problem: String| value(format_args!("basis: {problem}")))
+}
+
+/// Times of states; none where none are given.
+pub fn times<'a>(given: Option<&'a PyReadonlyArray1<'_, f64>>) -> PyResult<&'a [f64]> {
+    given.map_or(Ok(&[]), |times| times.as_slice().map_err(value))
 }
 
 /// The numbers of an array, row by row.

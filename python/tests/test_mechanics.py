@@ -49,6 +49,22 @@ def test_systems_by_name_formula_and_file(arm, tmp_path):
     assert len(chain.coordinates) == 4
 
 
+def test_a_system_that_depends_on_the_time_takes_times():
+    shaken = lnn.System(
+        "x_dot^2/2 - x^2/2*(1 + e*cos(2*t))", coordinates=["x"], parameters={"e": 0.5}, forces={"x": "0.3*sin(t)"}
+    )
+    x, t = np.array([[0.5], [0.7]]), np.array([0.0, 1.3])
+    a = shaken.acceleration(x, 0 * x, t=t)
+    assert np.allclose(a[:, 0], -x[:, 0] * (1 + 0.5 * np.cos(2 * t)) + 0.3 * np.sin(t), rtol=1e-14)
+    assert np.array_equal(shaken.terms(x, 0 * x, t=t).acceleration, a)
+    assert np.allclose(shaken.energy(x, 0 * x, t=1.3), x[:, 0] ** 2 / 2 * (1 + 0.5 * np.cos(2.6)), rtol=1e-14)
+    assert np.allclose(shaken.inverse_dynamics(x, 0 * x, a, t=t).external, 0, atol=1e-15)
+    with pytest.raises(ValueError, match="time"):
+        shaken.acceleration(x, 0 * x)
+    with pytest.raises(ValueError, match="one time for each state"):
+        shaken.acceleration(x, 0 * x, t=[1.0, 2.0, 3.0])
+
+
 def test_a_system_under_constraints_moves_on_them():
     rod = {"lagrangian": "m*(x_dot^2 + y_dot^2)/2 - m*g*y", "constraints": {"rod": "x^2 + y^2 - 1"}}
     system = lnn.System("rod", coordinates=["x", "y"], parameters={"m": 1, "g": 9.8}, **rod)

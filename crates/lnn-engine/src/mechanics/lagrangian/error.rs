@@ -100,9 +100,7 @@ impl core::fmt::Display for MechanicsError {
             Self::NotFinite { row, what } => write!(f, "{what} of state {row} is not finite"),
             Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
             Self::Interrupted => f.write_str("interrupted"),
-            Self::Timed => f.write_str(
-                "this system depends on the time t, which a state does not tell: roll its motion out, or identify its constants",
-            ),
+            Self::Timed => f.write_str("this system depends on the time t: every state needs its time"),
             Self::Derivatives { what } => write!(f, "{what}: this model has no such derivatives"),
         }
     }

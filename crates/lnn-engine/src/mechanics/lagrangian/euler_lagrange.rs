@@ -265,7 +265,7 @@ pub fn inverse_dynamics_by_drives<S: Scalar>(
     drives: &[usize],
     states: [&[S]; 3],
 ) -> Result<InverseDynamics<S>, MechanicsError> {
-    let (forces, failures) = inverse_dynamics_by_rows(model, drives, states)?;
+    let (forces, failures) = inverse_dynamics_by_rows(model, drives, states, &[])?;
     failures.first().map_or(Ok(forces), |&error| Err(error))
 }
 
@@ -293,25 +293,25 @@ pub fn force_parts<S: Scalar>(
     v: &[S],
     a: &[S],
 ) -> Result<ForceParts<S>, MechanicsError> {
-    let (parts, failures) = force_parts_by_rows(model, q, v, a)?;
+    let (parts, failures) = force_parts_by_rows(model, [q, v, a], &[])?;
     failures.first().map_or(Ok(parts), |&error| Err(error))
 }
 
-/// [`force_parts`] with an error for every row that fails, whose inertial part is `NaN`.
+/// [`force_parts`] at times `(batch)`, which only a model that depends on the time needs, with an error for every row that fails, whose inertial
+/// part is `NaN`. If the momentum depends on the time, its derivative at a fixed state counts as gravity.
 ///
 /// # Errors
 /// A [`MechanicsError`] that concerns no single row.
 pub fn force_parts_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
+    [q, v, a]: [&[S]; 3],
+    times: &[S],
 ) -> Result<(ForceParts<S>, Vec<MechanicsError>), MechanicsError> {
     let still = vec![<S as Real>::zero(); v.len()];
-    let (moving, failures) = inverse_dynamics_by_rows(model, &[], [q, v, a])?;
+    let (moving, failures) = inverse_dynamics_by_rows(model, &[], [q, v, a], times)?;
     let generalized = |v: &[S]| match recursive_forces(model, [q, v, &still]) {
         Some(found) => Ok(found.generalized),
-        None => Ok(all_forces(model, q, v, &still)?.0),
+        None => Ok(all_forces(model, [q, v, &still], times)?.0),
     };
     let (coasting, gravity) = (generalized(v)?, generalized(&still)?);
     let less = |from: &[S], what: &[S]| from.iter().zip(what).map(|(&from, &what)| from - what).collect::<Vec<S>>();
@@ -319,7 +319,8 @@ pub fn force_parts_by_rows<S: Scalar>(
     Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
 }
 
-/// `inverse_dynamics_by_drives` with an error for every row that fails, whose forces are `NaN`.
+/// `inverse_dynamics_by_drives` at times `(batch)`, which only a model that depends on the time needs, with an error for every row that fails,
+/// whose forces are `NaN`.
 ///
 /// # Errors
 /// A [`MechanicsError`] that concerns no single row.
@@ -327,6 +328,7 @@ pub fn inverse_dynamics_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     drives: &[usize],
     [q, v, a]: [&[S]; 3],
+    times: &[S],
 ) -> Result<(InverseDynamics<S>, Vec<MechanicsError>), MechanicsError> {
     let n = model.coordinates();
     if !drives.is_empty() {
@@ -335,7 +337,7 @@ pub fn inverse_dynamics_by_rows<S: Scalar>(
     if let Some(found) = recursive_forces(model, [q, v, a]) {
         return Ok((found, Vec::new()));
     }
-    let (mut generalized, mut terms) = all_forces(model, q, v, a)?;
+    let (mut generalized, mut terms) = all_forces(model, [q, v, a], times)?;
     let held = Held::of(n, &terms, (&generalized, a), drives);
     terms.prepend_failures(held.refused);
     let Held { mut external, mut constraint, mut multipliers, .. } = held;
@@ -352,9 +354,8 @@ pub fn inverse_dynamics_by_rows<S: Scalar>(
 /// `M a + c - g` of every row, and its terms; the failures list the rows that fail.
 fn all_forces<S: Scalar>(
     model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
+    [q, v, a]: [&[S]; 3],
+    times: &[S],
 ) -> Result<(Vec<S>, Terms<S>), MechanicsError> {
     let n = model.coordinates();
     if a.len() != v.len() {
@@ -362,7 +363,7 @@ fn all_forces<S: Scalar>(
     }
     let mut terms = Terms::default();
     let request = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ | Request::FORCE | Request::CONSTRAINTS;
-    let outcome = model.terms(q, v, request, &mut terms);
+    let outcome = model.terms_at(times, q, v, request, &mut terms);
     let failed = terms.drain_failures(outcome)?;
     let mut generalized = Vec::with_capacity(a.len());
     for (k, a) in a.chunks(n.max(1)).enumerate() {
