@@ -1,15 +1,14 @@
 //! `lnn certify`: a proof of where the mass matrix has its signature.
 
-use crate::format::TableOrJson;
+use crate::format::FormatArgs;
 use crate::learned::Learned;
-use crate::number::{finite, seconds, thread_count, threads, whole};
+use crate::number::{finite, index_of, range, seconds, thread_count, threads, whole};
 use crate::source::{SystemOrModel, require_at_most};
 use crate::system_arg::{self, learned_system};
-use crate::{CliError, interrupt, output};
+use crate::{CliError, interrupt};
 use lnn::certificate::{Certificate, CertificateError, Options, Signature, certify_network, certify_system};
 use lnn::lagrangian::configure_system;
 use lnn::lagrangian::system::Bounds;
-use lnn::names::unknown;
 use lnn::network::file::{Header, MAX_COORDINATES};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -20,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Args {
     #[command(flatten)]
     subject: SystemOrModel,
-    /// Region of states: bounds of columns, such as theta1=-1..1,theta1_dot=-3..3. Columns that are not named keep the
-    /// validation bounds of the system, of a model those of its training, and of an angle of a model one turn.
+    /// Region of states: bounds of columns, such as theta1=-1..1,theta1_dot=-3..3. Other columns keep the validation bounds of the
+    /// system, or the training range of the model; an angle of a model covers one turn.
     #[arg(long = "box", value_name = "COLUMN=LOW..HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = side)]
     region: Vec<(String, (f64, f64))>,
     /// Largest condition number allowed, the ratio of the largest to the smallest absolute eigenvalue of the mass matrix in the units of
@@ -40,22 +39,14 @@ pub struct Args {
     /// Threads; they do not change the result of a search that --boxes ends [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
-    /// Text, or one JSON object.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
-    format: TableOrJson,
-    /// The same as --format json.
-    #[arg(long, conflicts_with = "format")]
-    json: bool,
+    #[command(flatten)]
+    format: FormatArgs,
 }
 
 /// `column=low..high`.
 fn side(text: &str) -> Result<(String, (f64, f64)), String> {
-    let found = text.split_once('=').and_then(|(name, range)| {
-        let (low, high) = range.split_once("..")?;
-        Some((name.trim().to_string(), (finite(low).ok()?, finite(high).ok()?)))
-    });
-    let ordered = |(_, (low, high)): &(String, (f64, f64))| low <= high && (high - low).is_finite();
-    found.filter(ordered).ok_or_else(|| "expected COLUMN=LOW..HIGH, two finite numbers in order".to_string())
+    let found = text.split_once('=').and_then(|(name, sides)| Some((name.trim().to_string(), range(sides, "..")?)));
+    found.ok_or_else(|| "expected COLUMN=LOW..HIGH, two finite numbers in order".to_string())
 }
 
 /// A condition number.
@@ -72,7 +63,7 @@ fn signature(text: &str) -> Result<Signature, String> {
 
 /// The certificate and the columns of its region.
 #[derive(Serialize)]
-struct Named {
+struct CertifiedRegion {
     system: String,
     columns: Vec<String>,
     #[serde(flatten)]
@@ -85,7 +76,7 @@ struct Named {
 /// A usage error for an unknown system, a wrong parameter or a region that does not fit; a data error for a bad model; the code of a signal
 /// that ended the search, after the proofs so far are printed.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let stop = interrupt::flag()?;
     let refused = |error: CertificateError| CliError::usage(error);
     let (name, columns, found) = match &args.subject.model {
         Some(path) => {
@@ -110,9 +101,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         }
     };
     let open = found.open;
-    let named = Named { system: name, columns, certificate: found };
-    let json = args.json || args.format == TableOrJson::Json;
-    output::print(&output::shown(&named, json, |named| named.certificate.findings(&named.columns))?)?;
+    let result = CertifiedRegion { system: name, columns, certificate: found };
+    args.format.print(&result, |result| result.certificate.findings(&result.columns))?;
     if stop.load(Ordering::Relaxed) {
         return Err(CliError::interrupted(format_args!("interrupted, {:.4} % of the region is open", 100.0 * open)));
     }
@@ -146,10 +136,7 @@ impl Args {
         let n = columns.len() / 2;
         let mut bounds = usual;
         for (k, (name, range)) in self.region.iter().enumerate() {
-            let place = columns.iter().position(|column| column == name).ok_or_else(|| {
-                let problem = unknown("column", name, columns.iter().map(String::as_str));
-                CliError::usage(format_args!("--box: {problem}"))
-            })?;
+            let place = index_of("--box", "column", name, columns)?;
             if self.region[..k].iter().any(|(earlier, _)| earlier == name) {
                 return Err(CliError::usage(format_args!("--box: column {name} is given twice")));
             }

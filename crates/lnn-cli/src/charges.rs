@@ -2,14 +2,12 @@
 
 use crate::CliError;
 use crate::probe::Probe;
+use crate::thresholds::CHARGES_SEED;
 use lnn::findings::text_table;
 use lnn::names::rounded;
 use lnn::rollout::Trajectory;
 use lnn::symmetry::{charges, unknowns};
 use serde::Serialize;
-
-/// Seed of the states on which symmetries are sought.
-const SEED: u64 = 0;
 
 /// A charge and its drift.
 #[derive(Debug, Serialize)]
@@ -42,7 +40,7 @@ impl Charges {
     /// A usage error for a region outside the domain, a data error for terms that are not finite.
     pub fn new(probe: &Probe, motion: &Trajectory<f64>) -> Result<Self, CliError> {
         let (largest, model) = (probe.basis(None)?.0, probe.model.as_ref());
-        let (q, v) = probe.states(probe.enough(unknowns(model.coordinates(), largest.len())), SEED)?;
+        let (q, v) = probe.states(probe.enough(unknowns(model.coordinates(), largest.len())), CHARGES_SEED)?;
         let (found, _) = probe.symmetries(None, (&q, &v), None)?;
         let basis = &found.basis;
         let all = charges(model, basis, &found.fields, motion).map_err(CliError::data)?;

@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 /// # Errors
 /// A data error for motion that cannot be smoothed, an interruption.
 pub fn first_look(reading: &LoadedRecording, guessed: Vec<ColumnGuess>) -> Result<FirstLook, CliError> {
-    let stop = Cancellation::by(&interrupt::flag().map_err(CliError::signals)?);
+    let stop = Cancellation::by(&interrupt::flag()?);
     FirstLook::new(reading, guessed, &stop).map_err(|error| match error {
         PipelineError::Interrupted => CliError::nothing_written(),
         error => error.into(),

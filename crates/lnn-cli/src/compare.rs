@@ -1,10 +1,10 @@
 //! `lnn compare`: what two Lagrangians have in common, up to factor and gauge.
 
-use crate::format::TableOrJson;
+use crate::format::FormatArgs;
 use crate::probe::{Bound, Probe, bound};
 use crate::source::parameter;
 use crate::symmetries::degrees;
-use crate::{CliError, number, output};
+use crate::{CliError, number};
 use lnn::symmetry::{ComparisonSummary, Degrees, compare, unknowns};
 
 /// Arguments.
@@ -22,25 +22,21 @@ pub struct Args {
     /// A parameter of the system B; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1, value_parser = parameter)]
     param_b: Vec<(String, String)>,
-    /// Functions that the gauge function is made of, by family and total degree: polynomial, trigonometric, hyperbolic; chosen
-    /// by the coordinates if not given.
+    /// Functions that the gauge function is made of, by family and total degree: polynomial, trigonometric, hyperbolic; by
+    /// default they suit the coordinates.
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
     basis: Option<Degrees>,
-    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3; what both have in common if not given.
+    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3 [default: the bounds that both have in common].
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are examined; two for every unknown coefficient if not given.
+    /// Number of states that are examined [default: two for every unknown coefficient].
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.
     #[arg(long, value_name = "N", default_value = "0", value_parser = number::seed)]
     seed: u64,
-    /// Text, or one JSON object.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
-    format: TableOrJson,
-    /// The same as --format json.
-    #[arg(long, conflicts_with = "format")]
-    json: bool,
+    #[command(flatten)]
+    format: FormatArgs,
 }
 
 /// Compares and prints.
@@ -65,8 +61,5 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
     let [first, second] = [&args.first, &args.second].map(Clone::clone);
     let compared = ComparisonSummary { first, second, comparison: found, points, seed: args.seed };
-    if args.json || args.format == TableOrJson::Json {
-        return output::print(&(serde_json::to_string(&compared).map_err(CliError::data)? + "\n"));
-    }
-    output::print(&compared.findings().to_string())
+    args.format.print(&compared, ComparisonSummary::findings)
 }

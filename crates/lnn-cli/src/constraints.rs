@@ -1,6 +1,6 @@
 //! `lnn constraints`: constraints of recorded motion, or constraints and degenerate directions of a Lagrangian.
 
-use crate::files::OutputFile;
+use crate::files::{OutputFile, ends_in};
 use crate::number::whole;
 use crate::probe::Probe;
 use crate::recording_args::RecordingArgs;
@@ -36,9 +36,6 @@ pub struct Args {
     out: Option<PathBuf>,
     #[command(flatten)]
     page: PageArgs,
-    /// Replace the files that are there.
-    #[arg(long)]
-    overwrite: bool,
     /// One JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -57,8 +54,7 @@ fn optional(argument: clap::Arg) -> clap::Arg {
 
 /// `true` for a file that is neither a model nor a system.
 fn is_data(path: &Path) -> bool {
-    let ends = |end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
-    path.is_file() && !ends("toml") && !ends("safetensors")
+    path.is_file() && !ends_in(path, &["toml", "safetensors"])
 }
 
 /// The table of a file.
@@ -79,8 +75,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return examined(&one.to_string_lossy(), args);
     }
     let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
-    let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.overwrite)).transpose()?;
-    let page = args.page.claim(&inputs, args.overwrite)?;
+    let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.page.overwrite)).transpose()?;
+    let page = args.page.claim(&inputs)?;
     let recording = args.recording.read()?.0.recording;
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
     let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
@@ -123,7 +119,7 @@ fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if examined.states == 0 {
         return Err(CliError::data(format_args!("{}: the mass matrix is not finite at any sampled state", probe.name)));
     }
-    let page = args.page.claim(&[Path::new(name)], args.overwrite)?;
+    let page = args.page.claim(&[Path::new(name)])?;
     result_page::write(page, "Constraints of a Lagrangian", &examined.findings(), &[])?;
     output::print(&output::shown(&examined, args.json, ExaminedLagrangian::findings)?)
 }

@@ -1,16 +1,16 @@
 //! Where two configurations differ.
 
+use crate::thresholds::SHOWN_NAMES;
 use toml::{Table, Value};
 
-/// The first few values that differ, such as `seed: 0 in the checkpoint, 5 asked for`; empty if the texts agree.
+/// The first few values that differ, such as `seed: 0 in the checkpoint, 5 requested`; empty if the texts agree.
 pub fn differences(saved: &str, asked: &str) -> String {
     let parse =
         |text: &str| text.parse::<Table>().map(Value::Table).unwrap_or_else(|_| Value::String(text.to_string()));
     let mut found = Vec::new();
     compare("", &parse(saved), &parse(asked), &mut found);
-    const SHOWN: usize = 4;
-    let more = found.len().saturating_sub(SHOWN);
-    found.truncate(SHOWN);
+    let more = found.len().saturating_sub(SHOWN_NAMES);
+    found.truncate(SHOWN_NAMES);
     if more > 0 {
         found.push(format!("and {more} more"));
     }
@@ -27,8 +27,8 @@ fn compare(path: &str, saved: &Value, asked: &Value, found: &mut Vec<String>) {
                 let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
                 match (a.get(key), b.get(key)) {
                     (Some(a), Some(b)) => compare(&path, a, b, found),
-                    (Some(a), None) => found.push(format!("{path}: {a} in the checkpoint, not asked for")),
-                    (None, Some(b)) => found.push(format!("{path}: not in the checkpoint, {b} asked for")),
+                    (Some(a), None) => found.push(format!("{path}: {a} in the checkpoint, not requested")),
+                    (None, Some(b)) => found.push(format!("{path}: not in the checkpoint, {b} requested")),
                     (None, None) => {}
                 }
             }
@@ -39,7 +39,7 @@ fn compare(path: &str, saved: &Value, asked: &Value, found: &mut Vec<String>) {
             }
         }
         _ if saved.to_string() == asked.to_string() => {}
-        _ => found.push(format!("{path}: {saved} in the checkpoint, {asked} asked for")),
+        _ => found.push(format!("{path}: {saved} in the checkpoint, {asked} requested")),
     }
 }
 
@@ -54,8 +54,8 @@ mod tests {
         let asked = "seed = 5\nrate = inf\n[data]\nn = [1, 3]\nm = 1\n[[phase]]\n";
         assert_eq!(
             differences(saved, asked),
-            "data.m: not in the checkpoint, 1 asked for; data.n[1]: 2 in the checkpoint, 3 asked for; \
-             phase[0].epochs: 3 in the checkpoint, not asked for; seed: 0 in the checkpoint, 5 asked for"
+            "data.m: not in the checkpoint, 1 requested; data.n[1]: 2 in the checkpoint, 3 requested; \
+             phase[0].epochs: 3 in the checkpoint, not requested; seed: 0 in the checkpoint, 5 requested"
         );
         assert!(differences("a = 1", "b = [1]\nc = 2\nd = 3\ne = 4\n").ends_with("and 1 more"));
     }

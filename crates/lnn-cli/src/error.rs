@@ -1,6 +1,6 @@
 //! Failures of a command: one line, or one for each mistake of a configuration, and an exit code.
 
-use crate::interrupt;
+use crate::{input, interrupt};
 use lnn::names::one_line;
 use lnn::pipeline::PipelineError;
 use std::fmt;
@@ -46,9 +46,9 @@ impl CliError {
     pub fn data(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Data, message: one_line(&message.to_string()) }
     }
-    /// Wrong data in a file, or a file that cannot be read or written.
+    /// Wrong data in a file or on standard input, or a file that cannot be read or written.
     pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
-        Self::data(format_args!("{}: {problem}", path.display()))
+        Self::data(format_args!("{}: {problem}", input::name(path)))
     }
     /// A signal; the message names what was kept.
     pub fn interrupted(message: impl fmt::Display) -> Self {
@@ -64,10 +64,6 @@ impl CliError {
             return Self { kind: Kind::ClosedPipe, message: "standard output was closed".to_string() };
         }
         Self::data(format_args!("standard output: cannot write: {error}"))
-    }
-    /// Signals that cannot be watched for.
-    pub fn signals(error: io::Error) -> Self {
-        Self::data(format_args!("cannot watch for Ctrl-C: {error}"))
     }
     /// The kind of the failure.
     pub fn kind(&self) -> Kind {

@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     options.threads = threads(args.threads);
     // If the model's file describes a system, the model was learned under the constraints of that system.
     options.constraints = learned.header.description.is_none().then(|| learned.header.constraints.clone());
-    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let stop = interrupt::flag()?;
     let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {
         Err(PipelineError::Interrupted) => {
             return Err(CliError::interrupted("interrupted before anything was compared"));

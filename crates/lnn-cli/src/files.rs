@@ -4,7 +4,7 @@
 use crate::input::is_standard;
 use crate::{CliError, output};
 use lnn::storage::{check_target, write_atomically, write_new};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// `true` if two paths lead to the same file: through links, other spellings or hard links.
@@ -107,6 +107,22 @@ impl<'a> OutputFile<'a> {
     }
 }
 
+/// `true` if the extension of a file's name is one of these, in small letters or in capitals.
+pub fn ends_in(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|end| extensions.iter().any(|known| end.eq_ignore_ascii_case(known)))
+}
+
+/// A parser of file names with one of these extensions.
+pub fn file_ending<const N: usize>(
+    extensions: &'static [&'static str; N],
+) -> impl Fn(&str) -> Result<PathBuf, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let path = PathBuf::from(text);
+        let known = ends_in(&path, extensions);
+        if known { Ok(path) } else { Err(format!("expected a file that ends in .{}", extensions.join(" or ."))) }
+    }
+}
+
 /// A file that cannot be written.
 pub fn cannot_write(path: &Path, error: io::Error) -> CliError {
     CliError::file(path, format_args!("cannot write: {error}"))
@@ -126,6 +142,13 @@ mod tests {
         assert!(OutputFile::claim(&path, &[], false).is_err());
         OutputFile::claim(&path, &[], true).unwrap().write(b"3").unwrap();
         assert_eq!((fs::read(&path).unwrap(), fs::read_dir(directory.path()).unwrap().count()), (b"3".to_vec(), 1));
+    }
+
+    #[test]
+    fn files_are_known_by_their_extensions() {
+        let picture = file_ending(&["svg", "html"]);
+        assert!(picture("a.SVG").is_ok() && picture("a.html").is_ok());
+        assert!(["a.png", "a", "svg"].iter().all(|bad| picture(bad).unwrap_err().ends_with(".svg or .html")));
     }
 
     #[cfg(unix)]

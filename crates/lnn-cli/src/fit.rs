@@ -2,10 +2,10 @@
 
 use crate::check::first_look;
 use crate::fit_config::{Args, Plan, Saved};
-use crate::learn::{Learned, Session, open};
+use crate::learn::{LearnedRun, Session, open};
 use crate::print_config::{PrintFormat, commented, fit_reference, training_reference};
 use crate::recording_args::read;
-use crate::resume::{Text, reopen};
+use crate::resume::{SavedText, reopen};
 use crate::{CliError, output};
 use lnn::pipeline::{Begin, Command, FitConfig, PipelineError, PreparedFit, fit};
 use lnn::recording::LoadedRecording;
@@ -27,7 +27,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (plan, resumed) = match &args.run.resume {
         None => (Plan::new(args, None)?, None),
         Some(path) => {
-            let read = |text: Text<'_>| Plan::new(args, Some(Saved::read(path, text)?));
+            let read = |text: SavedText<'_>| Plan::new(args, Some(Saved::read(path, text)?));
             let Some((folder, plan)) = reopen(path, Command::Fit, args.run.json, read)? else { return Ok(()) };
             (plan, Some(folder))
         }
@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let report = fit(&prepared, &config, &session.options, &session.folder, &session.watch());
     session.conclude(report.map(|report| {
         let (json, findings, epochs) = (report.json().to_string(), report.findings().clone(), report.history.len());
-        Learned { json, findings, stop: report.stop, epochs, unfinished: report.unfinished }
+        LearnedRun { json, findings, stop: report.stop, epochs, unfinished: report.unfinished }
     }))
 }
 

@@ -7,8 +7,8 @@ use crate::input::is_standard;
 use crate::layers::{Entry, Layers, Mistake};
 use crate::plain_name::plain_name;
 use crate::recording_args::RecordingArgs;
-use crate::resume::{Text, parse, require_same};
-use crate::run_args::{RunArgs, fill_periods, imply, structure};
+use crate::resume::{SavedText, parse, require_same};
+use crate::run_args::{RunArgs, add_implied, fill_periods, structure};
 use lnn::configuration::{Config, Data, Regularizer};
 use lnn::network::Structure;
 use lnn::pipeline::{FitColumns, FitConfig, FitOptions, PreparedFit, StartModel, shorten};
@@ -85,10 +85,10 @@ impl Saved {
     ///
     /// # Errors
     /// A data error naming the file.
-    pub fn read(path: &Path, text: Text<'_>) -> Result<Self, CliError> {
+    pub fn read(path: &Path, text: SavedText<'_>) -> Result<Self, CliError> {
         match text {
-            Text::Checkpoint(text) => Ok(Self { text: text.to_string(), ..parse(path, LATEST, text)? }),
-            Text::Configuration(text) => Ok(Self::begin(parse(path, "config.toml", text)?)),
+            SavedText::Checkpoint(text) => Ok(Self { text: text.to_string(), ..parse(path, LATEST, text)? }),
+            SavedText::Configuration(text) => Ok(Self::begin(parse(path, "config.toml", text)?)),
         }
     }
 
@@ -139,9 +139,9 @@ impl<'a> Plan<'a> {
             }
         }
         let timed = layers_time(&layers).is_some();
-        imply(&mut layers, TRAINING, timed);
+        add_implied(&mut layers, TRAINING, timed);
         if structure(&layers, TRAINING).unwrap_or(Structure::BlackBox) == Structure::BlackBox {
-            layers.imply("training.network.time_like", |time| {
+            layers.add_implied("training.network.time_like", |time| {
                 let kind = ("training.penalty.kind".to_string(), "lorentzian-sylvester".into());
                 vec![kind, ("training.penalty.time".to_string(), time.clone())]
             });

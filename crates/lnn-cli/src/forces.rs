@@ -1,9 +1,10 @@
 //! External forces as arguments: constants, formulas of the time, and recorded columns.
 
-use crate::number::{choice, finite};
+use crate::number::{choice, finite, index_of};
 use crate::recording_args::unit;
 use crate::states::{column_names, parse_table};
-use crate::{CliError, output, states};
+use crate::thresholds::{MAX_STATES_BYTES, ROUNDING_OF_TIMES};
+use crate::{CliError, output};
 use lnn::lagrangian::NamedFormula;
 use lnn::names::unknown;
 use lnn::network::file::Header;
@@ -11,6 +12,7 @@ use lnn::pipeline::usual_force;
 use lnn::recording::{TIME, factor};
 use lnn::rollout::{Between, Force, SampledForce};
 use lnn::storage::read_regular;
+use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -29,8 +31,9 @@ pub struct ForceArgs {
     /// Units of columns of the forces' CSV that are not SI, or factors to SI, such as t=ms,tau1=mN.
     #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit, requires = "force")]
     force_units: Vec<(String, String)>,
-    /// Forces of the CSV between its rows; those of an identified system as `lnn identify` says that it took them [default: linear].
-    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "WAY", requires = "force")]
+    /// Interpolation of the forces between the rows of the CSV; for an identified system, the one that `lnn identify` reports [default:
+    /// linear].
+    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "NAME", requires = "force")]
     between: Option<Between>,
 }
 
@@ -114,59 +117,20 @@ impl ForceArgs {
         &self,
         coordinates: &[String],
         known: &[String],
-        from: f64,
-        to: f64,
+        span: (f64, f64),
     ) -> Result<Option<KnownForce>, CliError> {
-        let inputs = &known[coordinates.len()..];
         if self.force.is_empty() {
-            return match inputs.first() {
-                None => Ok(None),
-                Some(name) => Err(missing(name)),
-            };
+            return known.get(coordinates.len()).map_or(Ok(None), |name| Err(missing(name)));
         }
-        let mut constants: Vec<Option<f64>> = vec![None; known.len()];
-        let mut formulas: Vec<(usize, NamedFormula)> = Vec::new();
-        let mut file: Option<PathBuf> = None;
-        for given in &self.force {
-            match given.split_once('=') {
-                Some((name, value)) if !Path::new(given).exists() => {
-                    let name = name.trim();
-                    let usual = |i: &usize| {
-                        known[*i] == name || coordinates.get(*i).is_some_and(|own| usual_force(own) == name)
-                    };
-                    let Some(i) = (0..known.len()).find(usual) else {
-                        let problem = unknown("force", name, known.iter().map(String::as_str));
-                        return Err(CliError::usage(format_args!("--force: {problem}")));
-                    };
-                    let value = match finite(value) {
-                        Ok(value) => value,
-                        Err(problem) => {
-                            let wrong = |fault| format!("--force {name}: {problem} or a formula of t: {fault}");
-                            formulas.push((i, of_time(value).map_err(|fault| CliError::usage(wrong(fault)))?));
-                            0.0
-                        }
-                    };
-                    if constants[i].replace(value).is_some() {
-                        return Err(CliError::usage(format_args!("--force: {name} is given twice")));
-                    }
-                }
-                _ => {
-                    if let Some(first) = file.replace(PathBuf::from(given)) {
-                        let both = format!("found {} and {given}", first.display());
-                        return Err(CliError::usage(format_args!("--force: expected one file at most, {both}")));
-                    }
-                }
-            }
-        }
+        let components = Components { coordinates, known };
+        let Given { constants, formulas, file } = self.given(components)?;
         let sampled = match file {
-            Some(path) => self.with_columns(&path, (coordinates, known), &constants, (from, to)),
+            Some(path) => self.recorded(&path, components, &constants, span),
             None if self.force_time.is_some() || !self.force_units.is_empty() || self.between.is_some() => {
                 Err(CliError::usage("--force-time, --force-units and --between need a CSV of forces"))
             }
             None => {
-                if let Some(k) = (0..inputs.len()).find(|k| constants[coordinates.len() + k].is_none()) {
-                    return Err(missing(&inputs[k]));
-                }
+                components.require_inputs(|i| constants[i].is_some())?;
                 let values = constants.iter().map(|force| force.unwrap_or(0.0)).collect();
                 SampledForce::constant(values).map_err(CliError::data)
             }
@@ -174,92 +138,163 @@ impl ForceArgs {
         Ok(Some(KnownForce { sampled: sampled?, formulas }))
     }
 
+    /// The arguments of `--force`, sorted into constants, formulas and a file.
+    fn given(&self, components: Components<'_>) -> Result<Given, CliError> {
+        let mut all = Given { constants: vec![None; components.known.len()], formulas: Vec::new(), file: None };
+        for given in &self.force {
+            let (name, value) = match given.split_once('=') {
+                Some((name, value)) if !Path::new(given).exists() => (name.trim(), value),
+                _ => {
+                    if let Some(first) = all.file.replace(PathBuf::from(given)) {
+                        let both = format!("found {} and {given}", first.display());
+                        return Err(CliError::usage(format_args!("--force: expected one file at most, {both}")));
+                    }
+                    continue;
+                }
+            };
+            let i = components.index(name)?;
+            let value = match finite(value) {
+                Ok(value) => value,
+                Err(problem) => {
+                    let wrong = |fault| format!("--force {name}: {problem} or a formula of t: {fault}");
+                    all.formulas.push((i, of_time(value).map_err(|fault| CliError::usage(wrong(fault)))?));
+                    0.0
+                }
+            };
+            if all.constants[i].replace(value).is_some() {
+                return Err(CliError::usage(format_args!("--force: {name} is given twice")));
+            }
+        }
+        Ok(all)
+    }
+
     /// The columns of a file, together with constants.
-    fn with_columns(
+    fn recorded(
         &self,
         path: &Path,
-        (coordinates, known): (&[String], &[String]),
+        components: Components<'_>,
         constants: &[Option<f64>],
-        (from, to): (f64, f64),
+        span: (f64, f64),
     ) -> Result<SampledForce<f64>, CliError> {
-        let bytes = read_regular(path, states::MAX_BYTES).map_err(|e| CliError::file(path, e))?;
-        let header = column_names(&bytes).map_err(|e| CliError::file(path, e))?;
-        let there = |name: &String| header.contains(name);
-        let time = match &self.force_time {
-            Some(name) if there(name) => name.clone(),
-            Some(name) => {
-                let problem = unknown("column", name, header.iter().map(String::as_str));
-                return Err(CliError::file(path, format_args!("--force-time: {problem}")));
-            }
-            None => {
-                let named =
-                    header.iter().find(|name| ["t", "time"].iter().any(|usual| name.eq_ignore_ascii_case(usual)));
-                let none = "no column called t or time; --force-time names another";
-                named.cloned().ok_or_else(|| CliError::file(path, none))?
-            }
-        };
-        // The column of every coordinate's force, if the file has one.
-        let mut columns = vec![time];
-        let mut places: Vec<Option<usize>> = Vec::with_capacity(known.len());
-        for (i, (name, constant)) in known.iter().zip(constants).enumerate() {
-            let usual = coordinates.get(i).map(|coordinate| usual_force(coordinate));
-            let column = [name.clone()].into_iter().chain(usual).find(there);
-            if let (Some(column), Some(_)) = (&column, constant) {
-                let problem = format!("--force: {column} is a constant and a column of {}", path.display());
-                return Err(CliError::usage(problem));
-            }
-            places.push(column.as_ref().map(|_| columns.len()));
-            columns.extend(column);
+        let refused = |problem: &dyn fmt::Display| CliError::file(path, problem);
+        let bytes = read_regular(path, MAX_STATES_BYTES).map_err(|e| refused(&e))?;
+        let header = column_names(&bytes).map_err(|e| refused(&e))?;
+        let mut columns = vec![self.time_column(&header).map_err(|problem| refused(&problem))?];
+        let places = components.places(&header, &mut columns);
+        if let Some(i) = (0..places.len()).find(|&i| places[i].is_some() && constants[i].is_some()) {
+            let column = &columns[places[i].unwrap_or_default()];
+            let problem = format!("--force: {column} is a constant and a column of {}", path.display());
+            return Err(CliError::usage(problem));
         }
-        let lacks = |i: &usize| places[*i].is_none() && constants[*i].is_none();
-        if let Some(i) = (coordinates.len()..known.len()).find(lacks) {
-            return Err(missing(&known[i]));
-        }
+        let is_known = |i: usize| places[i].is_some() || constants[i].is_some();
+        components.require_inputs(is_known)?;
         if columns.len() == 1 {
-            let problem = format!("no column of forces, expected {}", known.join(", "));
-            return Err(CliError::file(path, problem));
+            return Err(refused(&format_args!("no column of forces, expected {}", components.known.join(", "))));
         }
-        if let Some((name, _)) = self.force_units.iter().find(|(name, _)| !columns.contains(name)) {
-            let problem = unknown("column", name, columns.iter().map(String::as_str));
-            return Err(CliError::usage(format_args!("--force-units: {problem}")));
-        }
-        let mut factors = Vec::with_capacity(columns.len());
-        for column in &columns {
-            let unit = self.force_units.iter().find(|(name, _)| name == column).map_or("1", |(_, unit)| unit.as_str());
-            let problem = |problem| CliError::usage(format_args!("--force-units: {column}: {problem}"));
-            factors.push(factor(unit).map_err(problem)?);
-        }
-        let table = parse_table::<f64>(&bytes, &columns).map_err(|e| CliError::file(path, e))?;
+        let factors = self.factors(&columns)?;
+        let table = parse_table::<f64>(&bytes, &columns).map_err(|e| refused(&e))?;
         let (mut times, mut values) = (Vec::with_capacity(table.rows.len()), Vec::new());
         for (row, &line) in table.values.chunks_exact(columns.len()).zip(&table.rows) {
             let t = row[0] * factors[0];
-            if let Some(&before) = times.last()
-                && t <= before
-            {
-                let column = &columns[0];
-                let problem = format!("row {line}, column {column}: expected a time after {before}, found {t}");
-                return Err(CliError::file(path, problem));
+            if let Some(before) = times.last().filter(|before| t <= **before) {
+                let problem = format_args!("expected a time after {before}, found {t}");
+                return Err(refused(&format_args!("row {line}, column {}: {problem}", columns[0])));
             }
             times.push(t);
-            for (place, constant) in places.iter().zip(constants) {
-                values.push(place.map_or(constant.unwrap_or(0.0), |at| row[at] * factors[at]));
-            }
+            let of = |(place, constant): (&Option<usize>, &Option<f64>)| {
+                place.map_or(constant.unwrap_or(0.0), |at| row[at] * factors[at])
+            };
+            values.extend(places.iter().zip(constants).map(of));
         }
-        let force = SampledForce::new(known.len(), times, values).map_err(|e| CliError::file(path, e))?;
-        let force = force.between(self.between.unwrap_or_default());
-        let ((first, last), slack) = (force.span(), 1e-9 * (to - from).abs());
-        if from.min(to) < first - slack || from.max(to) > last + slack {
-            let problem = format!(
-                "forces are known from t = {first} to {last} and the motion runs from {from} to {to}; see --t-start and \
-                 --t-end"
-            );
-            return Err(CliError::file(path, problem));
+        let force = SampledForce::new(places.len(), times, values).map_err(|e| refused(&e))?;
+        require_span(&force, span).map_err(|problem| refused(&problem))?;
+        let (forces, inputs) = (0..components.coordinates.len(), components.inputs());
+        let only_inputs = !inputs.is_empty() && !forces.clone().any(is_known);
+        for i in forces.filter(|i| !is_known(*i) && !only_inputs) {
+            output::note(&format!("{} has no column {}: this force is 0", path.display(), components.known[i]));
         }
-        let forces = 0..coordinates.len();
-        let only_inputs = known.len() > forces.len() && forces.clone().all(|i| lacks(&i));
-        for i in forces.filter(|i| lacks(i) && !only_inputs) {
-            output::note(&format!("{} has no column {}: this force is 0", path.display(), known[i]));
-        }
-        Ok(force)
+        Ok(force.between(self.between.unwrap_or_default()))
     }
+
+    /// The column of time among those of a file.
+    fn time_column(&self, header: &[String]) -> Result<String, String> {
+        let is_time = |name: &&String| match &self.force_time {
+            Some(time) => *name == time,
+            None => ["t", "time"].iter().any(|usual| name.eq_ignore_ascii_case(usual)),
+        };
+        let problem = || match &self.force_time {
+            Some(time) => format!("--force-time: {}", unknown("column", time, header.iter().map(String::as_str))),
+            None => "no column called t or time; --force-time names another".to_string(),
+        };
+        header.iter().find(is_time).cloned().ok_or_else(problem)
+    }
+
+    /// Factors that bring columns to SI units.
+    fn factors(&self, columns: &[String]) -> Result<Vec<f64>, CliError> {
+        for (name, _) in &self.force_units {
+            index_of("--force-units", "column", name, columns)?;
+        }
+        let of = |column: &String| {
+            let unit = self.force_units.iter().find(|(name, _)| name == column).map_or("1", |(_, unit)| unit.as_str());
+            factor(unit).map_err(|problem| CliError::usage(format_args!("--force-units: {column}: {problem}")))
+        };
+        columns.iter().map(of).collect()
+    }
+}
+
+/// The arguments of `--force`.
+struct Given {
+    /// By component; 0 where there is a formula.
+    constants: Vec<Option<f64>>,
+    /// By component.
+    formulas: Vec<(usize, NamedFormula)>,
+    file: Option<PathBuf>,
+}
+
+/// Names of forces, one per coordinate, and then of inputs.
+#[derive(Clone, Copy)]
+struct Components<'a> {
+    coordinates: &'a [String],
+    known: &'a [String],
+}
+
+impl Components<'_> {
+    /// The component of a name: its own or `COORDINATE_force`.
+    fn index(self, name: &str) -> Result<usize, CliError> {
+        let usual = self.coordinates.iter().position(|own| usual_force(own) == name);
+        let own = self.known.iter().position(|known| known == name);
+        own.into_iter().chain(usual).min().map_or_else(|| index_of("--force", "force", name, self.known), Ok)
+    }
+
+    /// For every component, the index of its column, if a file has one; the columns are added to those that are read.
+    fn places(self, header: &[String], columns: &mut Vec<String>) -> Vec<Option<usize>> {
+        let place = |(i, name): (usize, &String)| {
+            let usual = self.coordinates.get(i).map(|coordinate| usual_force(coordinate));
+            let column = [name.clone()].into_iter().chain(usual).find(|name| header.contains(name))?;
+            columns.push(column);
+            Some(columns.len() - 1)
+        };
+        self.known.iter().enumerate().map(place).collect()
+    }
+
+    /// Components that are inputs.
+    fn inputs(self) -> Range<usize> {
+        self.coordinates.len()..self.known.len()
+    }
+
+    /// Refuses inputs without values.
+    fn require_inputs(self, is_known: impl Fn(usize) -> bool) -> Result<(), CliError> {
+        self.inputs().find(|&i| !is_known(i)).map_or(Ok(()), |i| Err(missing(&self.known[i])))
+    }
+}
+
+/// Refuses recorded forces that do not cover a motion.
+fn require_span(force: &SampledForce<f64>, (from, to): (f64, f64)) -> Result<(), String> {
+    let ((first, last), slack) = (force.span(), ROUNDING_OF_TIMES * (to - from).abs());
+    if from.min(to) >= first - slack && from.max(to) <= last + slack {
+        return Ok(());
+    }
+    Err(format!(
+        "forces are known from t = {first} to {last} and the motion runs from {from} to {to}; see --t-start and --t-end"
+    ))
 }

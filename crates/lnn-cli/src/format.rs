@@ -1,25 +1,47 @@
 //! Results of states, one after the other, as JSON or text.
 
-use crate::{CliError, json};
+use crate::thresholds::{NUMBERS_AT_ONCE, ROWS_AT_ONCE};
+use crate::{CliError, json, output};
+use lnn::findings::Findings;
 use lnn::lagrangian::MechanicsError;
 use lnn::names::pluralize;
 use lnn::scalar::Scalar;
+use serde::Serialize;
+use std::path::Path;
 
-/// States evaluated together; bounds the memory whatever the length of the file.
-pub const CHUNK: usize = 256;
-
-/// Rows of a chunk for `n` coordinates, whose matrices have `n^2` numbers: at most a million numbers per chunk.
+/// Rows of a chunk for `n` coordinates, whose matrices have `n^2` numbers.
 pub fn chunk(n: usize) -> usize {
-    ((1 << 20) / (n * n).max(1)).clamp(1, CHUNK)
+    (NUMBERS_AT_ONCE / (n * n).max(1)).clamp(1, ROWS_AT_ONCE)
 }
 
 /// Form of a result that has no table of numbers alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum TableOrJson {
+enum TableOrJson {
     /// Text.
     Table,
     /// One object, or one per line.
     Json,
+}
+
+/// Form of a result, as arguments.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct FormatArgs {
+    /// Text, or one JSON object.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
+    format: TableOrJson,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+}
+
+impl FormatArgs {
+    /// Prints a result.
+    ///
+    /// # Errors
+    /// Numbers that JSON cannot represent; standard output that cannot be written.
+    pub fn print<T: Serialize>(self, result: &T, findings: impl FnOnce(&T) -> Findings) -> Result<(), CliError> {
+        output::print(&output::shown(result, self.json || self.format == TableOrJson::Json, findings)?)
+    }
 }
 
 /// Form in which results are written.
@@ -37,15 +59,13 @@ pub enum Format {
 ///
 /// # Errors
 /// A data error if any row failed.
-pub fn report_failures(place: &str, failures: &[(usize, String)]) -> Result<(), CliError> {
-    match failures {
-        [] => Ok(()),
-        [(row, problem)] => Err(CliError::data(format_args!("{place}: row {row}: {problem}"))),
-        [(row, problem), rest @ ..] => {
-            let more = pluralize(rest.len(), "more row", "more rows");
-            Err(CliError::data(format_args!("{place}: row {row}: {problem} (and {more})")))
-        }
-    }
+pub fn report_failures(file: &Path, failures: &[(usize, String)]) -> Result<(), CliError> {
+    let [(row, problem), rest @ ..] = failures else { return Ok(()) };
+    let more = match rest.len() {
+        0 => String::new(),
+        count => format!(" (and {})", pluralize(count, "more row", "more rows")),
+    };
+    Err(CliError::file(file, format_args!("row {row}: {problem}{more}")))
 }
 
 /// The reason without the batch row, which means nothing to a reader of the file.

@@ -1,6 +1,6 @@
 //! `lnn formula`: the Lagrangian of recorded motion, or of a model, as a formula.
 
-use crate::files::OutputFile;
+use crate::files::{OutputFile, ends_in};
 use crate::number::{choice, finite, positive, seed, thread_count, threads, whole};
 use crate::probe::Probe;
 use crate::recording_args::RecordingArgs;
@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     noise: Option<Vec<f64>>,
     /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
-    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "WAY")]
+    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "NAME")]
     between: Option<Between>,
     /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
     /// the forces where they are known].
@@ -71,9 +71,6 @@ pub struct Args {
     out: Option<PathBuf>,
     #[command(flatten)]
     page: PageArgs,
-    /// Replace the files that are there.
-    #[arg(long)]
-    overwrite: bool,
     /// Name of the system in the file.
     #[arg(long, value_name = "NAME", default_value = "formula", value_parser = system_name)]
     name: String,
@@ -148,8 +145,8 @@ impl Args {
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
-    let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.overwrite)).transpose()?;
-    let page = args.page.claim(&inputs, args.overwrite)?;
+    let out = args.out.as_deref().map(|out| OutputFile::claim_system(out, &inputs, args.page.overwrite)).transpose()?;
+    let page = args.page.claim(&inputs)?;
     let found = match args.recording.data.as_slice() {
         [path] if is_model(path) => of_model(args, path)?,
         _ => of_motion(args)?,
@@ -178,7 +175,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 
 /// `true` for a directory, and for a file of a model.
 fn is_model(path: &Path) -> bool {
-    path.is_dir() || path.extension().is_some_and(|end| end == "safetensors")
+    path.is_dir() || ends_in(path, &["safetensors"])
 }
 
 fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
@@ -207,7 +204,7 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     }
     let probe = Probe::model(path)?;
     let (q, v) = probe.states(MODEL_STATES, args.seed)?;
-    let chart = (probe.coordinates(), probe.periodic());
+    let chart = (probe.coordinates(), &probe.periodic[..]);
     let (units, time_unit) = probe.units();
     let options = FormulaOptions { units, time_unit, ..args.options()? };
     formula_of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)

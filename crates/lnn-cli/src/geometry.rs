@@ -1,16 +1,20 @@
 //! `lnn geometry`: metric, connection and curvature of points.
 
-use crate::format::{CHUNK, report_failures};
-use crate::number::{Precision, count, list, named};
+use crate::format::report_failures;
+use crate::number::{Precision, list, named, whole};
 use crate::source::{Source, SystemOrModel, require_at_most};
 use crate::states::{Table, parse_table};
-use crate::surfaces::Line;
-use crate::{CliError, input, output, states, tensors};
+use crate::thresholds::{MAX_STATES_BYTES, MOST_METRIC_COORDINATES, MOST_PIECES, ROWS_AT_ONCE};
+use crate::{CliError, input, output};
 use lnn::geometry::{GeometryError, MOST_COORDINATES, PointReport, at_once, depends_on_velocity, point_reports};
 use lnn::lagrangian::EulerLagrange;
 use lnn::names::trimmed;
 use lnn::scalar::{Dd, Real, Scalar};
 use std::path::{Path, PathBuf};
+use surfaces::Line;
+
+mod surfaces;
+mod tensors;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -35,13 +39,13 @@ pub struct Args {
     #[arg(long, value_name = "Q1,Q2,..", requires = "surface", allow_hyphen_values = true)]
     to: Option<String>,
     /// Pieces of the line, at most 1000000; two changes of sign in one piece are missed.
-    #[arg(long, value_name = "N", default_value = "200", requires = "surface", value_parser = pieces)]
+    #[arg(long, value_name = "N", default_value = "200", requires = "surface", value_parser = whole(1, MOST_PIECES))]
     steps: usize,
     /// Velocity at which the mass matrix is taken, in the order of the coordinates. It matters only to Lagrangians that are not
     /// quadratic in the velocities [default: zeros].
     #[arg(long, value_name = "V1,V2,..", allow_hyphen_values = true)]
     velocity: Option<String>,
-    /// Precision of everything, the reading of the points included.
+    /// Precision of all arithmetic, including the reading of the points.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
     /// One JSON object per line with every component and digit; or the nonzero components, without those that follow by symmetry, as a
@@ -64,15 +68,6 @@ enum Format {
     Latex,
 }
 
-/// Largest number of pieces of a line: seconds for a metric that is written down.
-const PIECES: usize = 1_000_000;
-
-/// Reads a number of pieces.
-fn pieces(text: &str) -> Result<usize, String> {
-    let pieces = count(text).ok().filter(|pieces| *pieces <= PIECES);
-    pieces.ok_or_else(|| format!("expected a whole number from 1 to {PIECES}"))
-}
-
 /// Prints one object per point, or the surfaces on a line.
 ///
 /// # Errors
@@ -85,13 +80,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
 }
 
-/// Most coordinates: curvature has `n^4` components.
-const MOST: usize = 64;
-
 fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let n = source.columns.len() / 2;
-    require_at_most(MOST, n)?;
+    require_at_most(MOST_METRIC_COORDINATES, n)?;
     let names = &source.columns[..n];
     let velocity = match &args.velocity {
         Some(text) => list("--velocity", text, names)?,
@@ -129,13 +121,12 @@ fn print_points<S: Scalar>(
     (names, velocity): (&[String], &[S]),
     format: Format,
 ) -> Result<(), CliError> {
-    let (n, place) = (names.len(), input::name(file));
-    let refused = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
-    let bytes = input::read(file, states::MAX_BYTES).map_err(|e| refused(&e))?;
-    let Table { values, rows } = parse_table::<S>(&bytes, names).map_err(|e| refused(&e))?;
+    let n = names.len();
+    let bytes = input::read(file, MAX_STATES_BYTES)?;
+    let Table { values, rows } = parse_table::<S>(&bytes, names).map_err(|e| CliError::file(file, e))?;
     drop(bytes);
     note_velocity(model, &values[..n], velocity);
-    let chunk = at_once(n).min(CHUNK);
+    let chunk = at_once(n).min(ROWS_AT_ONCE);
     let mut failures: Vec<(usize, String)> = Vec::new();
     for (points, rows) in values.chunks(chunk * n).zip(rows.chunks(chunk)) {
         let reports = point_reports(model, names, points, velocity).map_err(CliError::data)?;
@@ -146,7 +137,7 @@ fn print_points<S: Scalar>(
         }
         output::print(&text)?;
     }
-    report_failures(&place, &failures)
+    report_failures(file, &failures)
 }
 
 /// A point in words.

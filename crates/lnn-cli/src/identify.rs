@@ -1,7 +1,7 @@
 //! `lnn identify`: the constants of a known Lagrangian from recorded motion.
 
 use crate::files::OutputFile;
-use crate::number::{choice, positive, seconds, thread_count, threads};
+use crate::number::{choice, one_of, positive, seconds, thread_count, threads};
 use crate::recording_args::{RecordingArgs, read as read_files};
 use crate::result_page::{self, PageArgs};
 use crate::source::parameter;
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Clone, Debug, clap::Args)]
-#[command(mut_args(of_the_system))]
+#[command(mut_args(default_to_the_system))]
 pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
@@ -46,10 +46,10 @@ pub struct Args {
     #[arg(long, value_name = "COLUMN,..", value_delimiter = ',', conflicts_with = "noise")]
     error: Vec<String>,
     /// What the constants are fitted to: the motion or the known forces [default: the forces for a chain of links, else the motion].
-    #[arg(long, value_enum, value_name = "WHAT")]
-    targets: Option<Met>,
+    #[arg(long, value_parser = one_of(&TARGETS), value_name = "WHAT")]
+    targets: Option<Targets>,
     /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
-    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "WAY")]
+    #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "NAME")]
     between: Option<Between>,
     /// Length of the segments, in s [default: the one with the smallest standard errors].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = seconds)]
@@ -57,7 +57,7 @@ pub struct Args {
     /// Let residuals beyond three standard deviations count linearly, which limits the influence of outliers.
     #[arg(long)]
     robust: bool,
-    /// Identify every trajectory alone, too, and compare the constants.
+    /// Also identify each trajectory alone, and compare the constants.
     #[arg(long)]
     by_trajectory: bool,
     /// Threads; the result does not depend on them [default: all].
@@ -66,36 +66,20 @@ pub struct Args {
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write the system with the identified constants, as a file for rollout, train and grey boxes; FILE.urdf of a URDF writes that URDF.
+    /// Write the system with the identified constants, as a file for rollout, train and grey boxes; if the system is a URDF, FILE.urdf
+    /// writes that URDF.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     #[command(flatten)]
     page: PageArgs,
-    /// Replace the files that are there.
-    #[arg(long)]
-    overwrite: bool,
 }
 
 /// What the constants are fitted to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Met {
-    /// The motion.
-    Motion,
-    /// Known forces.
-    Forces,
-}
+const TARGETS: [(&str, Targets, &str); 2] =
+    [("motion", Targets::Motion, "The motion"), ("forces", Targets::Forces, "Known forces")];
 
-impl From<Met> for Targets {
-    fn from(met: Met) -> Self {
-        match met {
-            Met::Motion => Self::Motion,
-            Met::Forces => Self::Forces,
-        }
-    }
-}
-
-/// Columns have the names of the system's coordinates unless others are given.
-fn of_the_system(argument: clap::Arg) -> clap::Arg {
+/// The columns default to the coordinates of the system.
+fn default_to_the_system(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "coords" => argument.help("Columns of the coordinates, in the order of the system [default: its names]"),
         "periodic" => argument.help("Coordinates that are angles, which are unwrapped [default: those of the system]"),
@@ -116,7 +100,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let inputs: Vec<&Path> =
         args.recording.data.iter().map(PathBuf::as_path).chain([Path::new(&args.system)]).collect();
     let out = args.out.as_deref().map(|out| claim(args, out, &inputs)).transpose()?;
-    let page = args.page.claim(&inputs, args.overwrite)?;
+    let page = args.page.claim(&inputs)?;
     let instance =
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
     system_arg::note_impacts(&instance);
@@ -130,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         errors: reading.errors.clone(),
         inputs: reading.inputs.clone(),
         missing: reading.missing.clone(),
-        targets: args.targets.map(Targets::from),
+        targets: args.targets,
         between: args.between,
         segment: args.segment,
         robust: args.robust,
@@ -241,9 +225,9 @@ fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<
         true => {
             // Reports what cannot be written before the search.
             system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &[]))?;
-            OutputFile::claim(out, inputs, args.overwrite)
+            OutputFile::claim(out, inputs, args.page.overwrite)
         }
-        false => OutputFile::claim_system(out, inputs, args.overwrite),
+        false => OutputFile::claim_system(out, inputs, args.page.overwrite),
     }
 }
 

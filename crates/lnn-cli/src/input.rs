@@ -1,5 +1,6 @@
 //! Files that a command reads, `-` being standard input.
 
+use crate::CliError;
 use lnn::storage::{ReadError, read_regular};
 use std::io::Read;
 use std::path::Path;
@@ -17,9 +18,10 @@ pub fn name(path: &Path) -> String {
 /// Reads a regular file, or standard input to its end, of at most `limit` bytes.
 ///
 /// # Errors
-/// [`ReadError`].
-pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
-    if is_standard(path) { bounded(std::io::stdin().lock(), limit) } else { read_regular(path, limit) }
+/// A data error that names the file.
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, CliError> {
+    let bytes = if is_standard(path) { bounded(std::io::stdin().lock(), limit) } else { read_regular(path, limit) };
+    bytes.map_err(|error| CliError::file(path, error))
 }
 
 /// Reads to the end, of at most `limit` bytes.

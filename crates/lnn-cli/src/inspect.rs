@@ -6,7 +6,8 @@ use crate::inverse::inverse;
 use crate::number::{Precision, list};
 use crate::source::{Source, SystemOrModel};
 use crate::states::parse_states_at;
-use crate::{CliError, States, input, output, states};
+use crate::thresholds::{EXAMINED_MOTION_STATES, MAX_STATES_BYTES, MOST_SHOWN_PARAMETERS, ROUNDINGS_OF_ZERO};
+use crate::{CliError, States, input, output};
 use lnn::lagrangian::{
     EulerLagrange, LeastNorm, Linearizer, ManifoldRows, MechanicsError, ReducedMass, Request, Terms,
 };
@@ -59,7 +60,7 @@ pub struct Args {
     /// acceleration; acceleration_by_parameters, of a system, has a row for each parameter.
     #[arg(long, conflicts_with = "inverse")]
     linearize: bool,
-    /// Precision of everything, the reading of the states included.
+    /// Precision of all arithmetic, including the reading of the states.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
     /// One JSON object per line, or text. csv is for --inverse: the external forces, after the time if there is a column t.
@@ -98,28 +99,15 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     if format == Format::Csv {
         return Err(CliError::usage("--format csv needs --inverse; use json or table"));
     }
-    let place = input::name(file);
-    let bytes = input::read(file, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
+    let bytes = input::read(file, MAX_STATES_BYTES)?;
     let time: &[String] = if source.model.is_timed() { &["t".to_string()] } else { &[] };
     let found = parse_states_at(&bytes, &source.columns, time);
-    let (states, times): (States<S>, Vec<S>) = found.map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
+    let (states, times): (States<S>, Vec<S>) = found.map_err(|e| CliError::file(file, e))?;
     drop(bytes);
 
     let n = source.columns.len() / 2;
     let Source { model, columns, .. } = source;
-    let few = (STATES * n).min(states.q.len());
-    let model = match &args.constraints {
-        Some(file) => constrained(model, &columns, file, (&states.q[..few], &states.v[..few]))?,
-        None => model,
-    };
-    let (model, factor) = match &args.canonical {
-        None => (model, None),
-        Some(text) => {
-            let (model, form) = canonical(model, text, &columns, (&states.q, &states.v))?;
-            (model, Some(form.factor))
-        }
-    };
-    let model: Model<S> = if args.least_norm { Box::new(LeastNorm(model)) } else { model };
+    let (model, factor) = requested(args, model, &columns, (&states.q, &states.v))?;
     let mut failures: Vec<(usize, String)> = Vec::new();
     let mut terms = Terms::default();
     let mut linearizer = args.linearize.then(|| Linearizer::new(model.as_ref()));
@@ -131,7 +119,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
             Some(t) => model.terms_at(t, q, v, Request::ALL, &mut terms),
             None => model.terms(q, v, Request::ALL, &mut terms),
         };
-        let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
+        let failed = terms.drain_failures(outcome).map_err(|error| CliError::file(file, error))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let held = ConstrainedState::of(model.as_ref(), q, v, &terms);
         let squares = squares((n, v), &terms, &spectrum);
@@ -147,7 +135,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         }
         output::print(&text)?;
     }
-    report_failures(&place, &failures)
+    report_failures(file, &failures)
 }
 
 /// Prints the pattern of the second derivatives.
@@ -163,6 +151,28 @@ fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError>
 
 /// A model with its Lagrangian.
 type Model<S> = Box<dyn EulerLagrange<S>>;
+
+/// The model under the constraints, in the form and with the accelerations that the arguments request, and the factor of its canonical form.
+fn requested<S: Scalar>(
+    args: &Args,
+    model: Model<S>,
+    columns: &[String],
+    (q, v): (&[S], &[S]),
+) -> Result<(Model<S>, Option<S>), CliError> {
+    let few = (EXAMINED_MOTION_STATES * (columns.len() / 2)).min(q.len());
+    let model = match &args.constraints {
+        Some(file) => constrained(model, columns, file, (&q[..few], &v[..few]))?,
+        None => model,
+    };
+    let (model, factor) = match &args.canonical {
+        None => (model, None),
+        Some(text) => {
+            let (model, form) = canonical(model, text, columns, (q, v))?;
+            (model, Some(form.factor))
+        }
+    };
+    Ok((if args.least_norm { Box::new(LeastNorm(model)) } else { model }, factor))
+}
 
 /// The model in its canonical form at the base state in `text`, or at the first of the states `(q, v)` if that is empty.
 fn canonical<S: Scalar>(
@@ -197,7 +207,7 @@ fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
 /// `g(v, v)` of a batch of states of geodesics of a metric with a time, whose `L` is the energy, `g(v, v)/2`; nothing of another model.
 fn squares<S: Scalar>((n, v): (usize, &[S]), terms: &Terms<S>, spectrum: &[S]) -> Vec<S> {
     let zero = <S as Real>::zero();
-    let rounding = S::of_f64(ROUNDINGS) * S::epsilon();
+    let rounding = S::of_f64(ROUNDINGS_OF_ZERO) * S::epsilon();
     let values = terms.lagrangian.iter().zip(&terms.energy);
     let is_energy = |(k, (&l, &energy)): (usize, (&S, &S))| {
         let speed = v[k * n..(k + 1) * n].iter().fold(<S as Real>::one(), |sum, &v| sum + v * v);
@@ -222,11 +232,6 @@ struct ConstrainedState<S> {
     open: Vec<S>,
 }
 
-/// States of the file at which constraints are examined.
-const STATES: usize = 24;
-/// An eigenvalue below this many roundings of the largest counts as zero.
-const ROUNDINGS: f64 = 1024.0;
-
 impl<S: Scalar> ConstrainedState<S> {
     /// For every state of a batch.
     fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], terms: &Terms<S>) -> Vec<Self> {
@@ -240,7 +245,8 @@ impl<S: Scalar> ConstrainedState<S> {
                 }
                 let (mass, matrix) = (&terms.mass_matrix[k * n * n..(k + 1) * n * n], &terms.constraint_matrix);
                 let reduced = ReducedMass::of(n, mass, &matrix[k * m * n..(k + 1) * m * n]).ok();
-                let open = reduced.iter().flat_map(|reduced| reduced.null_directions(ROUNDINGS)).flatten().copied();
+                let open =
+                    reduced.iter().flat_map(|reduced| reduced.null_directions(ROUNDINGS_OF_ZERO)).flatten().copied();
                 let open = open.collect();
                 Self {
                     values: rows.values,
@@ -252,9 +258,6 @@ impl<S: Scalar> ConstrainedState<S> {
             .collect()
     }
 }
-
-/// Largest number of parameters whose derivatives are shown: those of systems, not the weights of networks.
-const PARAMETERS: usize = 256;
 
 /// The derivatives of the accelerations at a state; empty if it has none.
 #[derive(Default)]
@@ -281,7 +284,7 @@ impl<S: Scalar> Slopes<S> {
         for i in 0..n {
             let unit: Vec<S> = (0..n).map(|j| S::of_f64(f64::from(u8::from(i == j)))).collect();
             let of_row = &linearizer.gradient(q, v, &unit)?.by_parameters;
-            if of_row.len() > PARAMETERS {
+            if of_row.len() > MOST_SHOWN_PARAMETERS {
                 break;
             }
             by_parameters.resize(of_row.len() * n, S::nan());

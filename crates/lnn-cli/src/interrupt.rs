@@ -1,6 +1,7 @@
 //! Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a closed terminal: work that can be kept finishes its step first, everything
 //! else ends at once.
 
+use crate::CliError;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown, register_usize};
 use std::io;
@@ -22,8 +23,12 @@ static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 /// Signals end the program at once with their exit codes, until [`flag`] catches them; files being written are then whole or absent.
 ///
 /// # Errors
-/// If a handler cannot be installed.
-pub fn watch() -> io::Result<()> {
+/// A data error if a handler cannot be installed.
+pub fn watch() -> Result<(), CliError> {
+    install().map_err(|error| CliError::data(format_args!("cannot watch for Ctrl-C: {error}")))
+}
+
+fn install() -> io::Result<()> {
     if FLAG.get().is_some() {
         return Ok(());
     }
@@ -46,7 +51,7 @@ pub fn watch() -> io::Result<()> {
 ///
 /// # Errors
 /// As [`watch`].
-pub fn flag() -> io::Result<Arc<AtomicBool>> {
+pub fn flag() -> Result<Arc<AtomicBool>, CliError> {
     watch()?;
     let flag = FLAG.get_or_init(Arc::default);
     flag.store(false, Ordering::SeqCst);

@@ -1,11 +1,12 @@
 //! `lnn inspect --inverse`: the forces that make known accelerations.
 
 use crate::format::{Field, Format, Shape, chunk, explain, report_failures, show};
+use crate::number::index_of;
 use crate::source::Source;
 use crate::states::{column_names, parse_table};
-use crate::{CliError, input, json, output, states};
+use crate::thresholds::MAX_STATES_BYTES;
+use crate::{CliError, input, json, output};
 use lnn::lagrangian::{ForceParts, InverseDynamics, MechanicsError, force_parts_by_rows, inverse_dynamics_by_rows};
-use lnn::names::unknown;
 use lnn::scalar::Scalar;
 use std::path::Path;
 
@@ -15,12 +16,12 @@ use std::path::Path;
 /// A usage or data error; after the last state, a data error if the forces of any state are not finite.
 pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drives: &[String]) -> Result<(), CliError> {
     let n = source.columns.len() / 2;
-    let drives = driven(&source.columns[..n], drives)?;
+    let drives = drives.iter().map(|name| index_of("--drives", "coordinate", name, &source.columns[..n]));
+    let drives = drives.collect::<Result<Vec<usize>, CliError>>()?;
     let accelerations = source.columns[..n].iter().map(|name| format!("{name}_ddot"));
     let mut columns: Vec<String> = source.columns.iter().cloned().chain(accelerations).collect();
-    let place = input::name(path);
-    let refused = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
-    let bytes = input::read(path, states::MAX_BYTES).map_err(|e| refused(&e))?;
+    let refused = |e: &dyn std::fmt::Display| CliError::file(path, e);
+    let bytes = input::read(path, MAX_STATES_BYTES)?;
     let header = column_names(&bytes).map_err(|e| refused(&e))?;
     // The time of a row is passed on, unless t is a coordinate.
     let timed = format == Format::Csv && !columns.iter().any(|name| name == "t") && header.iter().any(|c| c == "t");
@@ -67,17 +68,7 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drive
         }
         output::print(&text)?;
     }
-    report_failures(&place, &failures)
-}
-
-/// Numbers of the coordinates on which drives act.
-fn driven(coordinates: &[String], drives: &[String]) -> Result<Vec<usize>, CliError> {
-    let of = |name: &String| {
-        let known = || unknown("coordinate", name, coordinates.iter().map(String::as_str));
-        let place = coordinates.iter().position(|coordinate| coordinate == name);
-        place.ok_or_else(|| CliError::usage(format_args!("--drives: {}", known())))
-    };
-    drives.iter().map(of).collect()
+    report_failures(path, &failures)
 }
 
 /// The forces on state `k` of a batch.

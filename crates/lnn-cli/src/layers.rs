@@ -3,6 +3,7 @@
 
 use crate::CliError;
 use crate::config::{self, Lines, line_of};
+use crate::thresholds::MOST_MISTAKES;
 use lnn::configuration::table::{Below, find_key};
 use lnn::configuration::{ConfigError, Key, PENALTY, join};
 use lnn::names::unknown;
@@ -12,9 +13,6 @@ use serde::de::DeserializeOwned;
 use std::fmt;
 use std::path::Path;
 use toml::{Table, Value};
-
-/// Largest number of wrong values that are listed: each one needs a check of the whole configuration.
-const MOST_MISTAKES: usize = 100;
 
 /// The key that names the kind of a table.
 const KIND: &str = "kind";
@@ -217,7 +215,7 @@ impl Layers {
     }
 
     /// Adds the values that an option implies for other keys; explicit options override them.
-    pub fn imply(&mut self, key: &str, also: impl FnOnce(&Value) -> Vec<(String, Value)>) {
+    pub fn add_implied(&mut self, key: &str, also: impl FnOnce(&Value) -> Vec<(String, Value)>) {
         let given = self.entries.iter().find(|entry| entry.option.is_some() && entry.key() == key);
         let Some(Entry { value, option: Some(option), .. }) = given.cloned() else { return };
         let at = self.entries.iter().position(|entry| entry.option.is_some()).unwrap_or_default();

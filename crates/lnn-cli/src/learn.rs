@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A result, as the command prints it.
-pub struct Learned {
+pub struct LearnedRun {
     /// Text of `summary.json`.
     pub json: String,
     /// Headline and tables.
@@ -62,7 +62,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// Signals that cannot be watched for.
     pub fn new(args: &'a RunArgs, folder: Folder, begin: Begin, identity: Option<String>) -> Result<Self, CliError> {
-        let stop = interrupt::flag().map_err(CliError::signals)?;
+        let stop = interrupt::flag()?;
         let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(begin);
         let checkpoints = Some(match identity {
             Some(identity) => checkpoints.identified_by(identity),
@@ -82,9 +82,9 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
-    pub fn conclude(self, learned: Result<Learned, PipelineError>) -> Result<(), CliError> {
+    pub fn conclude(self, learned: Result<LearnedRun, PipelineError>) -> Result<(), CliError> {
         let path = self.folder.path();
-        let Learned { json, findings, stop, epochs, unfinished } = match learned {
+        let LearnedRun { json, findings, stop, epochs, unfinished } = match learned {
             Ok(learned) => learned,
             Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
                 let on = how_to_go_on(path);

@@ -58,12 +58,11 @@ mod shard;
 mod source;
 mod spool;
 mod states;
-mod surfaces;
 mod sweep;
 mod symmetries;
 mod system_arg;
 mod systems;
-mod tensors;
+mod thresholds;
 mod train;
 mod train_config;
 mod tube;
@@ -160,7 +159,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// Runs a program with the signals and warnings of this one: a failure is one line on standard error and an exit code.
 pub fn ended(work: impl FnOnce() -> Result<(), CliError>) -> ExitCode {
     // A command with results to keep requests the flag before it begins its work.
-    let ready = watch_log().and_then(|()| interrupt::watch().map_err(CliError::signals));
+    let ready = watch_log().and_then(|()| interrupt::watch());
     match ready.and_then(|()| work()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

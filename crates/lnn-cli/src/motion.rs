@@ -1,13 +1,12 @@
 //! Results of a roll-out in addition to its samples: where it left the training range, pictures, facts in JSON.
 
 use crate::charges::Charges;
-use crate::files::cannot_write;
+use crate::thresholds::{EXAMINED_MOTION_STATES, MOST_CURVE_POINTS};
 use crate::tube::TubeFacts;
-use crate::{CliError, input, output};
+use crate::{CliError, input};
 use lnn::lagrangian::EulerLagrange;
 use lnn::names::{pluralize, rounded};
 use lnn::rollout::{Domain, Trajectory};
-use lnn::storage::{AtomicWriter, Disk, remove_leftovers};
 use lnn::symmetry::Invariant;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -17,11 +16,7 @@ use std::path::Path;
 pub mod events;
 pub mod pictures;
 pub mod readings;
-
-/// Number of points of a curve beyond which every second one is left out.
-const MOST_POINTS: usize = 4000;
-/// Number of states of a motion from which its conserved quantity is recognized.
-const STATES: usize = 24;
+pub mod samples;
 
 /// The first sample outside the states that a model was trained on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -48,7 +43,7 @@ impl Leaving {
 }
 
 /// Watches a motion whose samples come in pieces; keeps few of them.
-pub struct Watch {
+pub struct MotionRecord {
     domain: Domain<f64>,
     columns: Vec<String>,
     /// Where it left the training range.
@@ -64,7 +59,7 @@ pub struct Watch {
     seen: usize,
 }
 
-impl Watch {
+impl MotionRecord {
     /// Watches the motion of a model with these columns that was trained on `domain`.
     pub fn new(domain: Domain<f64>, columns: &[String]) -> Self {
         let values = vec![Vec::new(); columns.len() + 1];
@@ -98,7 +93,7 @@ impl Watch {
                 }
             }
             self.seen += 1;
-            if self.times.len() > MOST_POINTS {
+            if self.times.len() > MOST_CURVE_POINTS {
                 self.stride *= 2;
                 thin(&mut self.times);
                 self.values.iter_mut().for_each(thin);
@@ -109,7 +104,7 @@ impl Watch {
     /// The quantity that a model without friction conserves along its motion; `None` if its terms do not show one.
     pub fn invariant(&self, model: &dyn EulerLagrange<f64>) -> Option<Invariant> {
         let n = self.columns.len() / 2;
-        let states = (0..self.times.len()).step_by(self.times.len().div_ceil(STATES).max(1));
+        let states = (0..self.times.len()).step_by(self.times.len().div_ceil(EXAMINED_MOTION_STATES).max(1));
         let part = |columns: Range<usize>| {
             states.clone().flat_map(move |k| self.values[columns.clone()].iter().map(move |values| values[k]))
         };
@@ -162,7 +157,7 @@ pub struct Facts<'a> {
     pub energy_defect: Option<f64>,
     /// The quantity that the motion conserves without friction and forces, and its drift.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub conserved: Option<Kept>,
+    pub conserved: Option<Conserved>,
     /// The events that happened, of a system that has some.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub events: Option<Vec<Map<String, Value>>>,
@@ -180,7 +175,7 @@ pub struct Facts<'a> {
 
 /// A conserved quantity along a motion.
 #[derive(Debug, Serialize)]
-pub struct Kept {
+pub struct Conserved {
     /// `energy`, `g(v, v)` of geodesics of a metric with a time, or `p.v - L`.
     pub quantity: Invariant,
     /// Value at the start.
@@ -189,7 +184,7 @@ pub struct Kept {
     pub largest_change: f64,
 }
 
-impl Kept {
+impl Conserved {
     /// From the value of `p.v - L`, half of `g(v, v)`, at the start and its largest change.
     pub fn new(quantity: Invariant, (start, change): (f64, f64)) -> Self {
         let factor = if quantity == Invariant::Square { 2.0 } else { 1.0 };
@@ -203,51 +198,6 @@ impl Kept {
         };
         let [start, change] = [rounded(self.start, 10), rounded(self.largest_change, 2)];
         format!("the equations conserve {name}: {start} at the start, largest change {change}\n")
-    }
-}
-
-/// Place that the samples are written to.
-pub enum Target<'a> {
-    /// Standard output, as the samples come.
-    Standard,
-    /// A file that takes its name when it is whole.
-    File { path: &'a Path, growing: AtomicWriter<'a> },
-}
-
-impl<'a> Target<'a> {
-    /// Begins to write.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub fn create(path: &'a Path, standard: bool) -> Result<Self, CliError> {
-        if standard {
-            return Ok(Self::Standard);
-        }
-        if let Some(folder) = path.parent() {
-            remove_leftovers(&Disk, if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
-        }
-        let growing = AtomicWriter::create(&Disk, path).map_err(|e| cannot_write(path, e))?;
-        Ok(Self::File { path, growing })
-    }
-    /// Adds text at the end.
-    ///
-    /// # Errors
-    /// A closed pipe, a full disk.
-    pub fn append(&mut self, text: &str) -> Result<(), CliError> {
-        match self {
-            Self::Standard => output::print(text),
-            Self::File { path, growing } => growing.append(text.as_bytes()).map_err(|e| cannot_write(path, e)),
-        }
-    }
-    /// Gives the file its name.
-    ///
-    /// # Errors
-    /// As [`Target::append`].
-    pub fn finish(self) -> Result<(), CliError> {
-        match self {
-            Self::Standard => Ok(()),
-            Self::File { path, growing } => growing.finish().map_err(|e| cannot_write(path, e)),
-        }
     }
 }
 
@@ -271,7 +221,7 @@ impl Facts<'_> {
             _ => String::new(),
         };
         // The charges begin with it.
-        let kept = self.conserved.as_ref().filter(|_| self.charges.is_none()).map_or(String::new(), Kept::text);
+        let kept = self.conserved.as_ref().filter(|_| self.charges.is_none()).map_or(String::new(), Conserved::text);
         let charges = self.charges.map_or(String::new(), Charges::text);
         format!(
             "{} to {} = {}{unit}, {}, {}{iterations}, in {}\n{balance}{kept}{charges}",
@@ -306,7 +256,7 @@ mod tests {
     #[test]
     fn long_motions_are_thinned_and_watched() {
         let domain = Domain::new(vec![Some((-1.0, 5000.0)), None]);
-        let mut watch = Watch::new(domain, &["x".to_string(), "x_dot".to_string()]);
+        let mut watch = MotionRecord::new(domain, &["x".to_string(), "x_dot".to_string()]);
         let piece = |k: usize| Trajectory {
             coordinates: 1,
             t: vec![k as f64],
@@ -315,7 +265,7 @@ mod tests {
             energy: Some(vec![0.5]),
         };
         (0..10_001).for_each(|k| watch.add(&piece(k)));
-        assert!(watch.times.len() <= MOST_POINTS + 1 && watch.times.len() > MOST_POINTS / 2);
+        assert!(watch.times.len() <= MOST_CURVE_POINTS + 1 && watch.times.len() > MOST_CURVE_POINTS / 2);
         assert!(watch.times.windows(2).all(|t| t[1] - t[0] == watch.stride as f64) && watch.times[0] == 0.0);
         let leaving = watch.leaving.as_ref().unwrap();
         assert_eq!((leaving.t, leaving.column.as_str(), leaving.trained_on), (5001.0, "x", [-1.0, 5000.0]));

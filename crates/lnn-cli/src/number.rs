@@ -30,6 +30,15 @@ pub fn choice<T: Copy + Send + Sync>(
         .try_map(move |text| all.iter().copied().find(|&x| name(x) == text).ok_or("not named"))
 }
 
+/// A parser of one value by its name, from a table of names, values and descriptions for the help.
+pub fn one_of<T: Copy + Send + Sync>(
+    all: &'static [(&'static str, T, &'static str)],
+) -> impl TypedValueParser<Value = T> {
+    let values = all.iter().map(|&(name, _, about)| PossibleValue::new(name).help(about));
+    PossibleValuesParser::new(values)
+        .try_map(move |text| all.iter().find(|(name, ..)| *name == text).map(|(_, value, _)| *value).ok_or("not named"))
+}
+
 /// A finite decimal number.
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -74,10 +83,16 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     number(Options::<f64>::least_tolerance(), 1.0)(text)
 }
 
+/// A parser of numbers above 0, at most `most`.
+pub fn positive_up_to(most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        positive(text).ok().filter(|x| *x <= most).ok_or_else(|| format!("expected a number above 0, at most {most}"))
+    }
+}
+
 /// A time in seconds over which a command may work: up to a day.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    const DAY: f64 = 86_400.0;
-    positive(text).ok().filter(|x| *x <= DAY).ok_or_else(|| format!("expected a number above 0, at most {DAY}"))
+    positive_up_to(86_400.0)(text)
 }
 
 /// Samples per second of a recording.
@@ -93,9 +108,14 @@ pub fn seed(text: &str) -> Result<u64, String> {
 
 /// Two finite decimal numbers, the lower first: `LOW:HIGH`.
 pub fn bounds(text: &str) -> Result<(f64, f64), String> {
-    let pair = text.split_once(':').and_then(|(low, high)| Some((finite(low).ok()?, finite(high).ok()?)));
-    pair.filter(|(low, high)| low <= high && (high - low).is_finite())
-        .ok_or_else(|| "expected LOW:HIGH, two finite numbers in order".to_string())
+    range(text, ":").ok_or_else(|| "expected LOW:HIGH, two finite numbers in order".to_string())
+}
+
+/// Two finite decimal numbers around a separator, the lower first.
+pub fn range(text: &str, separator: &str) -> Option<(f64, f64)> {
+    let (low, high) = text.split_once(separator)?;
+    let (low, high) = (finite(low).ok()?, finite(high).ok()?);
+    (low <= high && (high - low).is_finite()).then_some((low, high))
 }
 
 /// A whole number above 0.
@@ -130,8 +150,7 @@ pub fn named<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Ve
             return Err(refused(format!("expected NAME=VALUE, found {:?}", part.trim())));
         };
         let (name, value) = (name.trim(), value.trim());
-        let place = names.iter().position(|known| known == name);
-        let place = place.ok_or_else(|| refused(unknown("coordinate", name, names.iter().map(String::as_str))))?;
+        let place = index_of(option, "coordinate", name, names)?;
         let number = quantity::<S>(value).map_err(|error| refused(format!("{name}: {error}")))?;
         if !number.is_finite() {
             return Err(refused(format!("{name}: expected a finite number, found {value:?}")));
@@ -154,6 +173,17 @@ fn outer_parts(text: &str) -> impl Iterator<Item = &str> {
     text.split(move |c: char| {
         depth += i32::from(c == '(') - i32::from(c == ')');
         c == ',' && depth <= 0
+    })
+}
+
+/// The index of a name among those known; `what` says what they name, and `option` is the name of the option.
+///
+/// # Errors
+/// A usage error with the nearest known name.
+pub fn index_of(option: &str, what: &str, name: &str, known: &[String]) -> Result<usize, CliError> {
+    known.iter().position(|own| own == name).ok_or_else(|| {
+        let problem = unknown(what, name, known.iter().map(String::as_str));
+        CliError::usage(format_args!("{option}: {problem}"))
     })
 }
 

@@ -1,7 +1,6 @@
 //! Names that become names of directories.
 
-/// Longest name, in bytes.
-const LONGEST: usize = 100;
+use crate::thresholds::LONGEST_NAME;
 
 /// A plain name: letters, digits, `-`, `_`, `.` and spaces within, the first a letter or digit. Names that lead elsewhere as part of a path
 /// are rejected.
@@ -11,7 +10,7 @@ const LONGEST: usize = 100;
 pub fn plain_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
     let begins = text.starts_with(char::is_alphanumeric) && !text.ends_with([' ', '.']);
-    if begins && text.len() <= LONGEST && text.chars().all(known) {
+    if begins && text.len() <= LONGEST_NAME && text.chars().all(known) {
         Ok(text.to_string())
     } else {
         Err("expected a plain name: letters, digits, - _ . and spaces within, a letter or digit first".to_string())
@@ -28,7 +27,7 @@ mod tests {
         for good in ["measured", "Arm 2", "x", "m_1-b.3", "Pendel-gedämpft"] {
             assert_eq!(plain_name(good).as_deref(), Ok(good));
         }
-        let long = "x".repeat(LONGEST + 1);
+        let long = "x".repeat(LONGEST_NAME + 1);
         for bad in ["", " ", ".", "..", "../evil", "a/b", "/tmp/x", "a\\b", ".hidden", "-x", "a\nb", "a.", "c:", &long]
         {
             assert!(plain_name(bad).is_err(), "{bad:?}");

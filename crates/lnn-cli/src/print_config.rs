@@ -1,5 +1,6 @@
 //! Commented configurations and the reference of all keys: what a key means, its allowed values and the value it has.
 
+use crate::thresholds::COMMENT_WIDTH;
 use lnn::configuration::table::Below;
 use lnn::configuration::{Config, Key, join};
 use lnn::lagrangian::configure;
@@ -8,9 +9,6 @@ use lnn::presets::Preset;
 use lnn::shooting::Shooting;
 use serde_json::{Value as Json, json};
 use toml::{Table, Value};
-
-/// Longest line of a comment.
-const WIDTH: usize = 110;
 
 /// Form in which a configuration is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -33,7 +31,7 @@ fn write_table(
     keys: &[Key],
     table: Option<&Table>,
     path: &str,
-    said: bool,
+    explain: bool,
     remark: &dyn Fn(&str) -> Option<String>,
     text: &mut String,
 ) {
@@ -44,7 +42,7 @@ fn write_table(
             None if key.example.is_empty() => continue,
             None => format!("# {} = {}\n", key.name, key.example),
         };
-        if said {
+        if explain {
             *text += &comment(&format!("{} ({})", key.purpose(), key.values));
         }
         *text += &line;
@@ -63,11 +61,11 @@ fn write_table(
             }
             (Some(Value::Table(table)), Below::Keys(keys)) => {
                 *text += &format!("{head}[{path}]\n");
-                write_table(keys, Some(table), &path, said, remark, text);
+                write_table(keys, Some(table), &path, explain, remark, text);
             }
             (None, Below::Keys(keys)) => {
                 *text += &format!("{head}# [{path}]\n");
-                write_table(keys, None, &path, said, remark, text);
+                write_table(keys, None, &path, explain, remark, text);
             }
             (Some(Value::Table(table)), Below::Open) if !table.is_empty() => {
                 *text += &format!("{head}[{path}]\n");
@@ -90,8 +88,7 @@ fn write_table(
 pub fn training_reference() -> String {
     let quick = configure::<f64>("double-pendulum", &[]).ok().and_then(|system| Preset::Quick.config(&system));
     let mut page = String::new();
-    let is_shooting = |key: &&Key| key.name == "shooting";
-    let shooting: Vec<Key> = FitConfig::KEYS.iter().filter(is_shooting).copied().collect();
+    let shooting: Vec<Key> = FitConfig::KEYS.iter().filter(|key| key.name == "shooting").copied().collect();
     describe(Config::KEYS, &serde_json::to_value(quick).unwrap_or_default(), "quick preset", &mut page);
     describe(&shooting, &json!({ "shooting": Shooting::default() }), "default", &mut page);
     page
@@ -100,9 +97,8 @@ pub fn training_reference() -> String {
 /// The keys that a fit has in addition to those of a training.
 pub fn fit_reference() -> String {
     let mut page = String::new();
-    let is_own = |key: &&Key| !["shooting", "training"].contains(&key.name);
-    let own: Vec<Key> = FitConfig::KEYS.iter().filter(is_own).copied().collect();
-    describe(&own, &Json::Null, "default", &mut page);
+    let own = FitConfig::KEYS.iter().filter(|key| !["shooting", "training"].contains(&key.name));
+    describe(&own.copied().collect::<Vec<_>>(), &Json::Null, "default", &mut page);
     page
 }
 
@@ -137,11 +133,11 @@ fn quoted(name: &str) -> String {
     if bare { name.to_string() } else { Value::from(name).to_string() }
 }
 
-/// Comment lines of at most [`WIDTH`] characters.
+/// Comment lines of at most [`COMMENT_WIDTH`] characters.
 fn comment(text: &str) -> String {
     let (mut lines, mut line) = (String::new(), String::from("#"));
     for word in text.split_whitespace() {
-        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+        if line.chars().count() + 1 + word.chars().count() > COMMENT_WIDTH {
             lines += &format!("{line}\n");
             line = String::from("#");
         }
@@ -192,7 +188,7 @@ mod tests {
     fn every_key_is_commented_and_those_left_out_can_be_taken_in() {
         let config = Preset::Paper.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
         let text = print(&config);
-        assert!(text.lines().all(|line| !line.starts_with('#') || line.chars().count() <= WIDTH));
+        assert!(text.lines().all(|line| !line.starts_with('#') || line.chars().count() <= COMMENT_WIDTH));
         assert_eq!(text.matches("\n[[phase]]").count(), 3);
         let taken_in = text.replace("# [lbfgs]", "[lbfgs]").replace("# iterations", "iterations");
         let taken_in = taken_in.replace("# memory", "memory").replace("# dissipation =", "dissipation =");

@@ -2,11 +2,11 @@
 
 use crate::CliError;
 use crate::learned::{Learned, held};
-use crate::number::{bounds, positive};
+use crate::number::{bounds, index_of, positive};
 use crate::source::{Source, require_at_most};
 use crate::system_arg::{self, learned_system};
+use crate::thresholds::NARROWEST_RANGE;
 use lnn::lagrangian::{EulerLagrange, SystemInstance, configure_system};
-use lnn::names::unknown;
 use lnn::network::file::MAX_COORDINATES;
 use lnn::symmetry::{
     Basis, Chart, Degrees, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states, most_symmetries,
@@ -29,7 +29,8 @@ pub struct Probe {
     pub exact: bool,
     /// The formulas of its constraints, by name.
     pub constraints: BTreeMap<String, String>,
-    periodic: Vec<bool>,
+    /// Which coordinates are angles.
+    pub periodic: Vec<bool>,
     units: Vec<String>,
     /// The system, or the system that a model learned, with its mass shell and its domain.
     system: Option<SystemInstance<f64>>,
@@ -38,9 +39,6 @@ pub struct Probe {
 /// `NAME=LOW:HIGH`, the bounds of a column.
 pub type Bound = (String, [f64; 2]);
 
-/// Width of a range relative to its larger end, at the least: functions of a column that hardly moves are not distinguished.
-const NARROWEST: f64 = 1e-6;
-
 /// Reads [`Bound`].
 ///
 /// # Errors
@@ -48,12 +46,12 @@ const NARROWEST: f64 = 1e-6;
 pub fn bound(text: &str) -> Result<Bound, String> {
     let wrong = || {
         format!(
-            "expected NAME=LOW:HIGH, such as r=4:12 or r_dot=-0.3:0.3, HIGH above LOW by {NARROWEST:e} of the larger at least"
+            "expected NAME=LOW:HIGH, such as r=4:12 or r_dot=-0.3:0.3, HIGH above LOW by {NARROWEST_RANGE:e} of the larger at least"
         )
     };
     let (name, range) = text.split_once('=').ok_or_else(wrong)?;
     let (low, high) = bounds(range).map_err(|_| wrong())?;
-    let wide = high - low > NARROWEST * low.abs().max(high.abs());
+    let wide = high - low > NARROWEST_RANGE * low.abs().max(high.abs());
     if wide && !name.trim().is_empty() { Ok((name.trim().to_string(), [low, high])) } else { Err(wrong()) }
 }
 
@@ -186,13 +184,9 @@ impl Probe {
     pub fn narrow(&mut self, ranges: &[Bound]) -> Result<(), CliError> {
         let n = self.model.coordinates();
         for (name, range) in ranges {
-            match self.columns.iter().position(|column| column == name) {
-                Some(k) if k < n => self.region.position[k] = *range,
-                Some(k) => self.region.velocity[k - n] = *range,
-                None => {
-                    let problem = unknown("column", name, self.columns.iter().map(String::as_str));
-                    return Err(CliError::usage(format_args!("--region: {problem}")));
-                }
+            match index_of("--region", "column", name, &self.columns)? {
+                k if k < n => self.region.position[k] = *range,
+                k => self.region.velocity[k - n] = *range,
             }
         }
         Ok(())
@@ -218,11 +212,6 @@ impl Probe {
     /// Names of the coordinates.
     pub fn coordinates(&self) -> &[String] {
         &self.columns[..self.model.coordinates()]
-    }
-
-    /// Which coordinates are angles.
-    pub fn periodic(&self) -> &[bool] {
-        &self.periodic
     }
 
     /// Units of the coordinates, empty texts where they are not known, and of time.

@@ -1,16 +1,12 @@
 //! A progress bar on standard error: loss, learning rate, remaining time.
 
 use crate::output;
+use crate::thresholds::{FIRST_LINE, NEXT_LINE};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lnn::names::number;
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
-
-/// Time after which a search reports its progress if standard error is not a terminal, and time between reports: short searches stay
-/// silent, logs of long ones stay short.
-const FIRST_LINE: Duration = Duration::from_millis(1500);
-const NEXT_LINE: Duration = Duration::from_secs(10);
 
 /// Progress through a known number of steps; silent when standard error is not a terminal, but for a line now and then of a search.
 pub struct Progress {

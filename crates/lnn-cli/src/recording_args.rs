@@ -66,20 +66,10 @@ pub fn unit(text: &str) -> Result<(String, String), String> {
 impl RecordingArgs {
     /// Meaning of the columns.
     pub fn meaning(&self) -> Columns {
-        Columns {
-            coords: self.coords.clone(),
-            velocity: self.velocity.clone(),
-            acceleration: self.acceleration.clone(),
-            force: self.force.clone(),
-            time: self.time.clone(),
-            rate: self.rate,
-            trajectory: self.trajectory.clone(),
-            periodic: self.periodic.clone(),
-            units: self.units.clone(),
-            names: (!self.columns.is_empty()).then(|| self.columns.clone()),
-            wide: self.wide,
-            ..Columns::default()
-        }
+        let Self { coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, .. } = self.clone();
+        let names = (!self.columns.is_empty()).then(|| self.columns.clone());
+        let columns = Columns { coords, velocity, acceleration, force, periodic, ..Columns::default() };
+        Columns { time, rate, trajectory, wide, units: self.units.clone(), names, ..columns }
     }
 
     /// Reads the files. Without coordinates, the roles of the columns are guessed first, and a note states the guess.

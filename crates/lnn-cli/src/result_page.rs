@@ -12,6 +12,9 @@ pub struct PageArgs {
     /// Also write the report as a self-contained HTML page, with pictures where there are some.
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
+    /// Replace existing files.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 impl PageArgs {
@@ -19,8 +22,8 @@ impl PageArgs {
     ///
     /// # Errors
     /// Those of [`OutputFile::claim`].
-    pub fn claim<'a>(&'a self, inputs: &[&Path], overwrite: bool) -> Result<Option<OutputFile<'a>>, CliError> {
-        self.html.as_deref().map(|html| OutputFile::claim(html, inputs, overwrite)).transpose()
+    pub fn claim<'a>(&'a self, inputs: &[&Path]) -> Result<Option<OutputFile<'a>>, CliError> {
+        self.html.as_deref().map(|html| OutputFile::claim(html, inputs, self.overwrite)).transpose()
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::CliError;
 use crate::files::{holds_something, same_file};
 use crate::resume::{command, has_checkpoint};
+use crate::thresholds::{MAX_RESULT_BYTES, SHOWN_NAMES};
 use lnn::pipeline::{CAPTIONS, Command, LEARNED, PLAY, PipelineError, RUN};
 use lnn::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
@@ -12,8 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// Files that evaluations write; trainings and fits have the last three as well.
 const EVALUATED: [&str; 4] = ["evaluation.json", "report.html", CAPTIONS, PLAY];
-/// Size in bytes of the longest file that is read to describe a directory.
-const MAX_BYTES: u64 = 1 << 26;
 
 /// Who wants to write into a directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,9 +54,9 @@ fn pictures(directory: &Path) -> Vec<String> {
 
 /// The first few names.
 fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 4;
-    let more = if names.len() > SHOWN { format!(" and {} more", names.len() - SHOWN) } else { String::new() };
-    format!("{}{more}", names[..names.len().min(SHOWN)].join(", "))
+    let more =
+        if names.len() > SHOWN_NAMES { format!(" and {} more", names.len() - SHOWN_NAMES) } else { String::new() };
+    format!("{}{more}", names[..names.len().min(SHOWN_NAMES)].join(", "))
 }
 
 /// The description of a run from its summary.
@@ -72,8 +71,9 @@ fn described(directory: &Path) -> Option<String> {
         #[serde(default)]
         ended: Option<String>,
     }
-    let read =
-        |name: &str| serde_json::from_slice::<Summary>(&read_regular(&directory.join(name), MAX_BYTES).ok()?).ok();
+    let read = |name: &str| {
+        serde_json::from_slice::<Summary>(&read_regular(&directory.join(name), MAX_RESULT_BYTES).ok()?).ok()
+    };
     if let Some(Summary { system, seed, epochs: Some(epochs), ended }) = read("summary.json") {
         let what = if Command::of(directory) == Ok(Command::Fit) { "fit" } else { "training" };
         let ended = if ended.as_deref() == Some("finished") { "a finished" } else { "an ended" };
@@ -165,7 +165,7 @@ fn remove(directory: &Path, names: &[&str]) -> Result<(), PipelineError> {
 
 /// Pictures named by the captions in a directory, if the names are valid for pictures in it.
 fn captioned(directory: &Path) -> Vec<PathBuf> {
-    let bytes = read_regular(&directory.join(CAPTIONS), MAX_BYTES).unwrap_or_default();
+    let bytes = read_regular(&directory.join(CAPTIONS), MAX_RESULT_BYTES).unwrap_or_default();
     let names: BTreeMap<String, serde_json::Value> = serde_json::from_slice(&bytes).unwrap_or_default();
     let plain = |name: &String| is_picture(name) && Path::new(name).file_name() == Some(name.as_ref());
     names.into_keys().filter(plain).map(|name| directory.join(name)).collect()

@@ -2,6 +2,7 @@
 
 use crate::differences::differences;
 use crate::folder::Folder;
+use crate::thresholds::MAX_RESULT_BYTES;
 use crate::{CliError, Kind, config, output};
 use lnn::pipeline::Command;
 use lnn::storage::{Disk, read_regular};
@@ -20,7 +21,7 @@ enum Found {
 
 /// The text of an existing run.
 #[derive(Clone, Copy, Debug)]
-pub enum Text<'a> {
+pub enum SavedText<'a> {
     /// The text of its checkpoint.
     Checkpoint(&'a str),
     /// Its `config.toml`.
@@ -36,15 +37,15 @@ pub fn reopen<T>(
     directory: &Path,
     command: Command,
     json: bool,
-    read: impl FnOnce(Text<'_>) -> Result<T, CliError>,
+    read: impl FnOnce(SavedText<'_>) -> Result<T, CliError>,
 ) -> Result<Option<(Folder, T)>, CliError> {
     // Searched before anything is created, and again when no other process can write.
     find(directory, command)?;
     let folder = Folder::open(directory)?;
     match find(directory, command)? {
-        Found::Unfinished(text) => Ok(Some((folder, read(Text::Checkpoint(&text))?))),
+        Found::Unfinished(text) => Ok(Some((folder, read(SavedText::Checkpoint(&text))?))),
         Found::Finished(text, summary) => {
-            read(Text::Configuration(&text))?;
+            read(SavedText::Configuration(&text))?;
             let said = format!("{}: this training has finished\n", directory.display());
             output::print(if json { &summary } else { &said })?;
             Ok(None)
@@ -86,7 +87,7 @@ fn finished(directory: &Path) -> Result<Found, CliError> {
     struct Summary {
         ended: String,
     }
-    let read = |name: &str| String::from_utf8(read_regular(&directory.join(name), 1 << 26).ok()?).ok();
+    let read = |name: &str| String::from_utf8(read_regular(&directory.join(name), MAX_RESULT_BYTES).ok()?).ok();
     let summary = read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?, json)));
     match (summary, read("config.toml")) {
         (Some((Summary { ended }, json)), Some(text)) if ended == "finished" => Ok(Found::Finished(text, json)),

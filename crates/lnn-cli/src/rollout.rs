@@ -2,19 +2,21 @@
 
 use crate::charges::Charges;
 use crate::constraints::constrained;
-use crate::files::{OutputFile, require_free};
-use crate::forces::ForceArgs;
-use crate::motion::pictures::{Texts, picture_file};
+use crate::files::{OutputFile, file_ending, require_free};
+use crate::forces::{ForceArgs, KnownForce};
+use crate::motion::pictures::{EXTENSIONS, Texts};
 use crate::motion::readings::ReadingColumns;
-use crate::motion::{Facts, Kept, Target, Watch, events, place};
+use crate::motion::samples::{MoreColumns, Samples};
+use crate::motion::{Conserved, Facts, Leaving, MotionRecord, events, place};
 use crate::motion_source::MotionSource;
 use crate::number::{choice, finite, positive, tolerance};
 use crate::probe::Probe;
 use crate::source::parameter;
+use crate::thresholds::ROUNDINGS_OF_ZERO;
 use crate::tube::{MotionTube, TubeArgs};
 use crate::{CliError, input, interrupt, output};
 use lnn::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
-use lnn::names::{pluralize, rounded};
+use lnn::names::pluralize;
 use lnn::report::DataTable;
 use lnn::rollout::{
     Driven, Ending, EnergyBalance, Event, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
@@ -36,15 +38,15 @@ pub struct Args {
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", conflicts_with = "model", value_parser = parameter)]
     param: Vec<(String, String)>,
-    /// Initial state: coordinates, then velocities, separated by commas. It is taken as it is, on a mass shell or off it. Under
-    /// constraints it is moved onto them if it is off by less than a thousandth of its size, and refused otherwise.
+    /// Initial state: coordinates, then velocities, separated by commas. It is used as given, on a mass shell or off it. Under
+    /// constraints, a state that misses them by less than a thousandth of its size is projected onto them, and any other is refused.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
     /// Time of the last sample, in the time unit of the system; for geodesics of a space-time an affine parameter, the proper time of
     /// matter. For a time before the start the motion runs backwards.
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
     t_end: f64,
-    /// Time of the start, in the same unit; it matters only with recorded forces.
+    /// Time of the start, in the same unit; it matters only where forces or the system depend on the time.
     #[arg(long, value_name = "T", default_value = "0", allow_hyphen_values = true, value_parser = finite)]
     t_start: f64,
     /// Time between samples, in the same unit.
@@ -61,7 +63,7 @@ pub struct Args {
     /// Absolute tolerance of a step.
     #[arg(long, value_name = "A", default_value = "1e-8", allow_hyphen_values = true, value_parser = positive)]
     atol: f64,
-    /// Longest step of midpoint, gauss4, gauss6 and variational, cut to the time between samples [default: one step per
+    /// Longest step of midpoint, gauss4, gauss6 and variational, at most the time between samples [default: one step per
     /// sample].
     #[arg(long, value_name = "H", allow_hyphen_values = true, value_parser = positive)]
     step: Option<f64>,
@@ -75,13 +77,13 @@ pub struct Args {
     /// Take the acceleration of least norm where the mass matrix is singular, and report the number of free directions.
     #[arg(long)]
     least_norm: bool,
-    /// CSV of the trajectory: t, the columns of a state, energy, measured quantities of the system; - for standard output. A file with content is refused
-    /// unless --overwrite is given, the model always.
+    /// CSV of the trajectory: t, the columns of a state, energy, measured quantities of the system; - for standard output. An existing file is
+    /// replaced only with --overwrite, the file of the model never.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Plot of the coordinates against time, a panel for each unit, with the path in the plane of polar ones, or a page that
     /// also shows velocities and energy.
-    #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
+    #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = file_ending(&EXTENSIONS))]
     plot: Option<PathBuf>,
     /// CSV of the events of the system: name, t, state, and the energies of impacts.
     #[arg(long, value_name = "FILE.csv")]
@@ -156,6 +158,20 @@ impl Args {
         Ok(())
     }
 
+    /// Refuses options that exclude one another.
+    fn check(&self, source: &MotionSource, is_driven: bool) -> Result<(), CliError> {
+        if self.json && input::is_standard(&self.out) {
+            return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
+        }
+        events::check(self.events.as_deref(), self.charges, &source.events)?;
+        if self.charges && (is_driven || source.model.is_timed()) {
+            return Err(CliError::usage(
+                "--charges: external forces and a dependence on time change them; leave these out",
+            ));
+        }
+        Ok(())
+    }
+
     /// Charges of the symmetries along a motion.
     fn charges(&self, motion: &Trajectory<f64>) -> Result<Charges, CliError> {
         let probe = match &self.model {
@@ -173,91 +189,75 @@ impl Args {
 /// motion that ends before its time, the samples up to there being written.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let mut source = args.source()?;
+    let (q, v) = args.state.split_at(source.columns.len() / 2);
     let span = (args.t_start, args.t_end);
-    let coordinates = &source.columns[..source.columns.len() / 2];
-    let force = args.forces.force(coordinates, &source.forces, span.0, span.1)?;
+    let force = args.forces.force(&source.columns[..q.len()], &source.forces, span)?;
     let force = source.take_inputs(force)?;
-    let (columns, standard) = (&source.columns, input::is_standard(&args.out));
-    if args.json && standard {
-        return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
-    }
-    let (q, v) = args.state.split_at(columns.len() / 2);
-    events::check(args.events.as_deref(), args.charges, &source.events)?;
+    args.check(&source, force.is_some())?;
     let options = args.options(&source)?;
     args.require_room(&source)?;
-    if args.charges && (force.is_some() || source.model.is_timed()) {
-        return Err(CliError::usage("--charges: forces from outside and the time change them; leave these out"));
-    }
-    let tube = args.tube.tube((source.model.as_ref(), args.model.as_deref()), &columns[..q.len()], span)?;
-    let mut target = Target::create(&args.out, standard)?;
-    let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
-    let header = header.csv_header(columns).map_err(CliError::data)?;
-    let readings = ReadingColumns::of(&source, force.is_some())?;
-    let header = tube.as_ref().map_or(header.clone(), |tube| tube.header(&header));
-    target.append(&readings.as_ref().map_or(header.clone(), |readings| readings.header(&header)))?;
-    let chosen = LeastNorm(source.model.as_ref());
-    let network: &dyn EulerLagrange<f64> = if args.least_norm { &chosen } else { source.model.as_ref() };
+    let tube = args.tube.tube((source.model.as_ref(), args.model.as_deref()), &source.columns[..q.len()], span)?;
+    let more = MoreColumns { tube, readings: ReadingColumns::of(&source, force.is_some())? };
+    let mut samples = Samples::create(&args.out, &source, more, args.charges)?;
+    let least_norm = LeastNorm(source.model.as_ref());
+    let model: &dyn EulerLagrange<f64> = if args.least_norm { &least_norm } else { source.model.as_ref() };
     if args.least_norm {
         note_open_directions(source.model.as_ref(), q, v);
     }
-    let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
-    let moving = Interruptible::new(network, &stop);
-    let driven = force.as_ref().map(|force| Driven::new(&moving, force));
-    let mut watch = Watch::new(source.range(), columns);
-    let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
-    let mut take = |piece: &Trajectory<f64>| {
-        watch.add(piece);
-        if let Some(sampled) = &mut sampled {
-            sampled.t.extend(&piece.t);
-            sampled.q.extend(&piece.q);
-            sampled.v.extend(&piece.v);
-        }
-        let lines = tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece));
-        let lines = match &readings {
-            Some(readings) => readings.rows(&lines, piece),
-            None => lines,
-        };
-        failed = target.append(&lines).err();
-        let is_over = failed.is_some() || stop.load(Ordering::Relaxed);
-        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let result = match &driven {
-        Some(driven) => driven.rollout_in_pieces(q, v, &options, &mut take),
-        None => rollout_in_pieces(&moving, q, v, &options, &mut take),
-    };
-    if let Some(error) = failed {
-        return Err(error);
-    }
-    if let Some(error @ (RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. })) = &result.stop {
-        return Err(refused(error));
-    }
-    if !standard {
+    let result = integrate(model, force.as_ref(), (q, v), &options, &mut samples)?;
+    if !input::is_standard(&args.out) {
         // Another program may have written it meanwhile.
         args.require_room(&source)?;
     }
-    target.finish()?;
+    let (watch, tube, kept) = samples.finish()?;
     let table = events::table(&source, &result.events);
     if let (Some(file), Some(table)) = (&args.events, &table) {
         OutputFile::claim(file, &[], args.overwrite)?.write(table.to_csv().as_bytes())?;
     }
     if let Some(plot) = &args.plot {
         let (title, parameter) = (format!("{}: roll-out", source.name), source.parameter());
-        let energy = watch.invariant(network).map_or("energy", Invariant::charge);
+        let energy = watch.invariant(model).map_or("energy", Invariant::charge);
         let texts = Texts { title: &title, parameter: &parameter, energy, units: &source.units };
         watch.plot(plot, &texts, tube.as_ref())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
-        output::note(&format!("{}; what comes after is a guess", leaving.text()));
+        output::note(&format!("{}; the motion after that is extrapolated", leaving.text()));
     }
     if let Some(stop) = &result.stop {
         if let Some(table) = table.filter(|table| !args.json && !table.rows.is_empty()) {
-            args.tell(&events::text(&table))?;
+            args.print(&events::text(&table))?;
         }
-        let names = network.manifold().map_or(&[][..], |manifold| manifold.names());
-        return Err(args.ended_early(stop, result.samples, (columns, names)));
+        let names = model.manifold().map_or(&[][..], |manifold| manifold.names());
+        return Err(args.ended_early(stop, result.samples, (&source.columns, names)));
     }
-    let charges = sampled.map(|motion| args.charges(&motion)).transpose()?;
-    args.say((&source, &watch), &result, driven.is_some(), (charges.as_ref(), tube.as_ref(), table.as_ref()))
+    let charges = kept.map(|motion| args.charges(&motion)).transpose()?;
+    args.summarize((&source, &watch), &result, force.is_some(), (charges.as_ref(), tube.as_ref(), table.as_ref()))
+}
+
+/// The motion of a model from a state, under a force if there is one; its samples are taken as they come.
+fn integrate(
+    model: &dyn EulerLagrange<f64>,
+    force: Option<&KnownForce>,
+    (q, v): (&[f64], &[f64]),
+    options: &Options<f64>,
+    samples: &mut Samples<'_>,
+) -> Result<Ending<f64>, CliError> {
+    let (stop, mut failed) = (interrupt::flag()?, None);
+    let moving = Interruptible::new(model, &stop);
+    let mut take = |piece: &Trajectory<f64>| {
+        failed = samples.take(piece).err();
+        let is_over = failed.is_some() || stop.load(Ordering::Relaxed);
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let result = match force {
+        Some(force) => Driven::new(&moving, force).rollout_in_pieces(q, v, options, &mut take),
+        None => rollout_in_pieces(&moving, q, v, options, &mut take),
+    };
+    match (failed, &result.stop) {
+        (Some(error), _) => Err(error),
+        (_, Some(error @ (RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. }))) => Err(refused(error)),
+        _ => Ok(result),
+    }
 }
 
 impl Args {
@@ -272,9 +272,9 @@ impl Args {
     }
 
     /// Prints a summary of the motion.
-    fn say(
+    fn summarize(
         &self,
-        (source, watch): (&MotionSource, &Watch),
+        (source, watch): (&MotionSource, &MotionRecord),
         result: &Ending<f64>,
         is_driven: bool,
         (charges, tube, table): (Option<&Charges>, Option<&MotionTube>, Option<&DataTable>),
@@ -300,7 +300,7 @@ impl Args {
             impacts: balance.filter(|_| source.events.iter().any(Event::is_impact)).map(|balance| balance.impacts),
             energy_defect: balance.map(EnergyBalance::defect),
             events: table.map(DataTable::objects),
-            conserved: invariant.map(|invariant| Kept::new(invariant, watch.energy)),
+            conserved: invariant.map(|invariant| Conserved::new(invariant, watch.energy)),
             left_training_range: watch.leaving.as_ref(),
             charges,
             tube: tube.map(MotionTube::facts),
@@ -310,11 +310,11 @@ impl Args {
             return output::print(&facts.json()?);
         }
         let events = table.map_or_else(String::new, events::text);
-        self.tell(&(facts.text() + &tube.map_or_else(String::new, MotionTube::text) + &events))
+        self.print(&(facts.text() + &tube.map_or_else(String::new, MotionTube::text) + &events))
     }
 
-    /// Prints a text where the samples are not.
-    fn tell(&self, text: &str) -> Result<(), CliError> {
+    /// Prints a text: on standard error if the samples go to standard output.
+    fn print(&self, text: &str) -> Result<(), CliError> {
         if input::is_standard(&self.out) {
             text.lines().for_each(output::note);
             return Ok(());
@@ -329,7 +329,7 @@ fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     // The motion itself reports failures.
     let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
     let open = ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix);
-    let open = open.map_or(0, |reduced| reduced.null_directions(1024.0).len());
+    let open = open.map_or(0, |reduced| reduced.null_directions(ROUNDINGS_OF_ZERO).len());
     let directions = pluralize(open, "direction", "directions");
     output::note(&format!(
         "least norm: the mass matrix is singular along {directions} at the start, and the motion does not follow them"
@@ -346,14 +346,9 @@ fn refused(error: &RolloutError) -> CliError {
     }
     let RolloutError::Invalid { what, problem } = error else { return CliError::usage(error) };
     let option = match *what {
-        "t_end" => "--t-end",
-        "dt" => "--dt",
-        "rtol" => "--rtol",
-        "atol" => "--atol",
-        "step" => "--step",
-        "method" => "--method",
-        "q" | "v" => "--state",
-        other => other,
+        "q" | "v" => "--state".to_string(),
+        "t_end" | "dt" | "rtol" | "atol" | "step" | "method" => format!("--{}", what.replace('_', "-")),
+        other => other.to_string(),
     };
     CliError::usage(format_args!("{option}: {problem}"))
 }
@@ -362,11 +357,11 @@ fn refused(error: &RolloutError) -> CliError {
 fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), method: Integrator) -> String {
     let fixed = method.is_structure_preserving();
     match stop {
-        RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
-            "left the training range at t = {t}: {} reached {}, trained on [{lower}, {upper}]; --beyond-range goes on",
-            columns.get(*component).map_or("a component", String::as_str),
-            rounded(*value, 6)
-        ),
+        RolloutError::LeftDomain { t, component, value, lower, upper, .. } => {
+            let column = columns.get(*component).map_or("a component", String::as_str).to_string();
+            let leaving = Leaving { t: *t, column, value: *value, trained_on: [*lower, *upper] };
+            format!("{}; --beyond-range continues", leaving.text())
+        }
         RolloutError::DependentConstraint { t, constraint, .. } => format!(
             "the constraint `{}` depends on the others at t = {t}: the load cannot be divided among them",
             constraints.get(*constraint).map_or("?", String::as_str)

@@ -2,7 +2,7 @@
 
 use crate::CliError;
 use crate::layers::Layers;
-use crate::number::{positive, seconds, thread_count, whole};
+use crate::number::{positive_up_to, seconds, thread_count, whole};
 use crate::print_config::PrintFormat;
 use lnn::configuration::{Config, Known, MOST_EPOCHS, MOST_RATE};
 use lnn::network::Structure;
@@ -23,7 +23,7 @@ pub struct RunArgs {
         conflicts_with = "resume")]
     pub print_config: Option<PrintFormat>,
     /// Learning rate of the first phase; the rates of later phases and all lowest rates are scaled in proportion.
-    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = learning_rate)]
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = positive_up_to(MOST_RATE))]
     pub learning_rate: Option<f64>,
     /// Epochs of all phases together; the schedule is scaled, including the periods of its rates.
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_EPOCHS))]
@@ -48,12 +48,6 @@ pub struct RunArgs {
     /// Print summary.json instead of tables.
     #[arg(long)]
     pub json: bool,
-}
-
-/// A learning rate.
-fn learning_rate(text: &str) -> Result<f64, String> {
-    let refused = || format!("expected a number above 0, at most {MOST_RATE}");
-    positive(text).ok().filter(|rate| *rate <= MOST_RATE).ok_or_else(refused)
 }
 
 /// Interval of checkpoints: `10` epochs, `90s`.
@@ -103,10 +97,10 @@ pub fn fill_periods(config: &mut Config, layers: &Layers, path: &str) {
     }
 }
 
-/// Adds the values that options of the training's network, at `path`, imply for other keys.
-pub fn imply(layers: &mut Layers, path: &str, timed: bool) {
+/// Adds the values that options of the training's network, at `path`, add_implied for other keys.
+pub fn add_implied(layers: &mut Layers, path: &str, timed: bool) {
     let at = |key: &str, value: Value| (format!("{path}{key}"), value);
-    layers.imply(&format!("{path}network.structure"), |structure| {
+    layers.add_implied(&format!("{path}network.structure"), |structure| {
         let mut model = Config::default();
         model.network.time_like = timed.then(String::new);
         let structure = Structure::ALL.into_iter().find(|known| structure.as_str() == Some(known.name()));
@@ -121,7 +115,7 @@ pub fn imply(layers: &mut Layers, path: &str, timed: bool) {
         also
     });
     // A known part has its own kinetic energy, and the output of the network beside it starts near zero.
-    layers.imply(&format!("{path}network.known"), |_| {
+    layers.add_implied(&format!("{path}network.known"), |_| {
         vec![at("network.alpha", 0.0.into()), at("network.initialization", "near-zero".into())]
     });
 }

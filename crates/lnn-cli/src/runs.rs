@@ -83,7 +83,7 @@ pub fn perform(all: Vec<Work>, orders: &Orders) -> Result<(), CliError> {
             require_same(work, "--overwrite replaces it, or choose another --out")?;
         }
     }
-    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let stop = interrupt::flag()?;
     for work in shares {
         let folder = ExperimentDirectory::new(&work.path);
         let (threads, watch) = (threads(orders.threads), watch(&stop));
@@ -112,7 +112,7 @@ pub fn merge(all: Vec<Work>, json: bool) -> Result<(), CliError> {
         work.require_writable()?;
         require_same(work, "give the options of the runs, including --scale and --seeds")?;
     }
-    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let stop = interrupt::flag()?;
     let mut left_out = Vec::new();
     for work in all {
         let folder = ExperimentDirectory::new(&work.path);
@@ -131,8 +131,7 @@ pub fn merge(all: Vec<Work>, json: bool) -> Result<(), CliError> {
     match left_out.split_first() {
         None => Ok(()),
         Some((first, more)) => {
-            let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
-            Err(CliError::data(format_args!("{first}{more}; the tables leave out the damaged runs")))
+            Err(CliError::data(format_args!("{first}{}; the tables leave out the damaged runs", and_more(more.len()))))
         }
     }
 }
@@ -157,9 +156,13 @@ fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
         }
     }
     let Some((first, more)) = others.split_first() else { return Ok(()) };
-    let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
-    let problem = format!("this is a finished run of another configuration{more}; {hint}");
+    let problem = format!("this is a finished run of another configuration{}; {hint}", and_more(more.len()));
     Err(CliError::file(&work.path.join(first), problem))
+}
+
+/// How many others there are.
+fn and_more(count: usize) -> String {
+    if count == 0 { String::new() } else { format!(" (and {count} more)") }
 }
 
 /// Runs with unreadable files: each file and its problem.

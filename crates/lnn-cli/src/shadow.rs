@@ -1,13 +1,14 @@
 //! `lnn shadow`: rays of light through a metric, as a picture of the shadow and the sky around it.
 
-use crate::files::OutputFile;
+use crate::files::{OutputFile, file_ending};
 use crate::learned::{Learned, model_file};
-use crate::number::{number, thread_count, threads, weight, whole};
+use crate::number::{index_of, number, one_of, thread_count, threads, weight, whole};
 use crate::progress::Progress;
 use crate::source::{Source, parameter};
+use crate::thresholds::{FARTHEST, MOST_EDGES, NEAREST, PIXEL_BYTES, SKY_OF_EXACT, SKY_OF_LEARNED};
 use crate::{CliError, interrupt, system_arg};
 use lnn::lagrangian::{EulerLagrange, MechanicsError};
-use lnn::names::{pluralize, unknown};
+use lnn::names::pluralize;
 use lnn::pipeline::memory;
 use lnn::relativity::{
     Camera, Chart, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, picture, time_moves_alone,
@@ -17,19 +18,13 @@ use lnn::report::png;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Distances that a camera and the sky may have, in the unit of the coordinates.
-const NEAREST: f64 = 1e-12;
-const FARTHEST: f64 = 1e15;
-/// Bytes of a pixel of a metric while its picture is made, about: its ray twice, its colours.
-const PIXEL_BYTES: u64 = 112;
-
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A system by name (`lnn systems` lists them), or by the file that describes it: the exact metric.
     #[arg(long, value_name = "NAME|FILE", required_unless_present = "model")]
     system: Option<String>,
-    /// A trained model, a file or the directory of a run: the learned metric, beside the exact one if that is given.
+    /// A trained model, a file or the directory of a run: the learned metric, shown beside the exact one of --system if that is given.
     #[arg(long, value_name = "MODEL")]
     model: Option<PathBuf>,
     /// A parameter of the system; may be repeated.
@@ -53,8 +48,8 @@ pub struct Args {
     #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = number(-360.0, 360.0))]
     azimuth: f64,
     /// Motion of the camera.
-    #[arg(long, value_enum, value_name = "NAME", default_value = "rest")]
-    observer: ObserverName,
+    #[arg(long, value_parser = one_of(&OBSERVERS), value_name = "NAME", default_value = "rest")]
+    observer: Observer,
     /// Angle between the left and the right end of the picture, in degrees, 179 at most.
     #[arg(long, value_name = "DEGREES", default_value = "70", allow_hyphen_values = true, value_parser = number(1e-6, 179.0))]
     field_of_view: f64,
@@ -78,7 +73,7 @@ pub struct Args {
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Picture; with two metrics it shows the exact one, the learned one, and their difference.
-    #[arg(long, value_name = "FILE.png", value_parser = image_file)]
+    #[arg(long, value_name = "FILE.png", value_parser = file_ending(&["png"]))]
     out: PathBuf,
     /// Replace the file.
     #[arg(long)]
@@ -88,25 +83,20 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum ObserverName {
-    /// At rest.
-    Rest,
-    /// Along the normal of the slices of equal time; in coordinates of Kerr and Schild it falls.
-    Normal,
-}
+/// Motions of the camera.
+const OBSERVERS: [(&str, Observer, &str); 2] = [
+    ("rest", Observer::Rest, "At rest"),
+    (
+        "normal",
+        Observer::Normal,
+        "Along the normal of the slices of equal time; in Kerr-Schild coordinates this observer falls inwards",
+    ),
+];
 
 /// Directions around the centre.
 fn edges(text: &str) -> Result<usize, String> {
-    let number = weight(text).ok().filter(|x| x % 4.0 == 0.0 && *x <= 4096.0);
-    number.map(|x| x as usize).ok_or_else(|| "expected a multiple of four from 0 to 4096".to_string())
-}
-
-/// A file that ends in `.png`.
-fn image_file(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    let known = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
-    if known { Ok(path) } else { Err("expected a file that ends in .png".to_string()) }
+    let number = weight(text).ok().filter(|x| x % 4.0 == 0.0 && *x <= MOST_EDGES);
+    number.map(|x| x as usize).ok_or_else(|| format!("expected a multiple of four from 0 to {MOST_EDGES}"))
 }
 
 /// The metrics to look through, with the names of their coordinates.
@@ -151,12 +141,7 @@ impl Args {
     }
 
     fn chart(&self, coordinates: &[String]) -> Result<Chart, CliError> {
-        let place = |option: &str, name: &str| {
-            coordinates.iter().position(|coordinate| coordinate == name.trim()).ok_or_else(|| {
-                let problem = unknown("coordinate", name, coordinates.iter().map(String::as_str));
-                CliError::usage(format_args!("{option}: {problem}"))
-            })
-        };
+        let place = |option: &str, name: &str| index_of(option, "coordinate", name.trim(), coordinates);
         let time = place("--time", &self.time)?;
         let cartesian = ["x", "y", "z"].map(String::from);
         let others: Vec<String> = coordinates.iter().filter(|name| **name != self.time).cloned().collect();
@@ -174,7 +159,7 @@ impl Args {
 
     /// Distance of the sky.
     fn far(&self) -> f64 {
-        self.far.unwrap_or(self.distance * if self.model.is_none() { FAR } else { LEARNED_FAR })
+        self.far.unwrap_or(self.distance * if self.model.is_none() { SKY_OF_EXACT } else { SKY_OF_LEARNED })
     }
 
     /// The camera in Cartesian coordinates and its choices; the metrics of wormholes are brought into such coordinates.
@@ -201,10 +186,7 @@ impl Args {
         Camera {
             chart,
             azimuth: self.azimuth.to_radians(),
-            observer: match self.observer {
-                ObserverName::Rest => Observer::Rest,
-                ObserverName::Normal => Observer::Normal,
-            },
+            observer: self.observer,
             field_of_view: self.field_of_view.to_radians(),
             width: self.width,
             height: self.height.unwrap_or(self.width),
@@ -234,7 +216,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let pixels = pixels * models.len();
     memory::require("the picture", (pixels as u64).checked_mul(PIXEL_BYTES))?;
-    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let stop = interrupt::flag()?;
     let (progress, done) = (Progress::new(pixels as u64, "rays"), AtomicU64::new(0));
     let advance = |rays: usize| {
         let rays = rays as u64;
@@ -267,26 +249,16 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Distance of the sky of an exact metric, relative to that of the camera.
-const FAR: f64 = 100.0;
-/// Such a distance for a learned metric, which was trained that far.
-const LEARNED_FAR: f64 = 2.0;
-
 /// An error with the option that helps.
 fn refused(error: RelativityError) -> CliError {
     match &error {
-        RelativityError::Invalid { what, expected, .. } => {
-            let option = match *what {
-                "distance" => "--distance",
-                "inclination" => return CliError::usage("--inclination: expected 0 to 180 degrees"),
-                "azimuth" => "--azimuth",
-                "field of view" => return CliError::usage("--field-of-view: expected an angle below 180 degrees"),
-                "tolerance" => "--tolerance",
-                "far distance" => "--far",
-                _ => return CliError::usage(error),
-            };
-            CliError::usage(format_args!("{option}: expected {expected}"))
-        }
+        RelativityError::Invalid { what, expected, .. } => match *what {
+            "distance" | "azimuth" | "tolerance" => CliError::usage(format_args!("--{what}: expected {expected}")),
+            "far distance" => CliError::usage(format_args!("--far: expected {expected}")),
+            "inclination" => CliError::usage("--inclination: expected 0 to 180 degrees"),
+            "field of view" => CliError::usage("--field-of-view: expected an angle below 180 degrees"),
+            _ => CliError::usage(error),
+        },
         RelativityError::NothingRests => {
             CliError::usage(format_args!("--observer rest: {error}; --observer normal may be there"))
         }
@@ -313,6 +285,5 @@ mod tests {
     fn words_are_read() {
         assert_eq!((edges("0"), edges(" 64 ")), (Ok(0), Ok(64)));
         assert!(["3", "-4", "4100", "x", ""].iter().all(|bad| edges(bad).is_err()));
-        assert!(image_file("a.PNG").is_ok() && image_file("a.svg").is_err() && image_file("png").is_err());
     }
 }

@@ -1,14 +1,12 @@
 //! Recorded motion from standard input goes through a temporary file, because arrays are read in several passes.
 
 use crate::input;
+use crate::thresholds::SPOOL_ATTEMPTS;
 use lnn::recording::LoadedRecording;
 use lnn::recording::read::{DataError, Problem};
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// Attempts to find an unused name.
-const ATTEMPTS: usize = 100;
 
 /// A temporary file, removed at the end.
 struct Spool(PathBuf);
@@ -16,7 +14,7 @@ struct Spool(PathBuf);
 impl Spool {
     /// Copies standard input to its end.
     fn of_standard_input() -> io::Result<Self> {
-        for attempt in 0..ATTEMPTS {
+        for attempt in 0..SPOOL_ATTEMPTS {
             let path = std::env::temp_dir().join(format!("lnn-{}-{attempt}.spool", std::process::id()));
             match OpenOptions::new().write(true).create_new(true).open(&path) {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}

@@ -5,9 +5,6 @@ use lnn::recording::read::{Separator, comment, line_end, names_in, split};
 use lnn::scalar::Scalar;
 use thiserror::Error;
 
-/// Largest file of states that is read, in bytes.
-pub const MAX_BYTES: u64 = 1 << 28;
-
 /// States of a file, in its order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct States<S> {

@@ -4,6 +4,7 @@ use crate::error::argument_error;
 use crate::number::{thread_count, whole};
 use crate::runs::{Orders, Work, merge, perform, print_list};
 use crate::shard::Shard;
+use crate::thresholds::MOST_RUNS;
 use crate::{CliError, train_config};
 use clap::Parser;
 use lnn::configuration::Config;
@@ -12,9 +13,6 @@ use lnn::names::pluralize;
 use lnn::pipeline::Sweep;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-
-/// Runs of a sweep at most.
-const MOST_RUNS: usize = 10_000;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]

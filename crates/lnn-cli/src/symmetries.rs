@@ -1,8 +1,9 @@
 //! `lnn symmetries`: symmetries and conserved quantities of a Lagrangian.
 
-use crate::format::TableOrJson;
+use crate::format::FormatArgs;
 use crate::probe::{Bound, Probe, bound, tolerance};
 use crate::source::SystemOrModel;
+use crate::thresholds::{LONG_SEARCH, MOST_QUADRATIC_UNKNOWNS};
 use crate::{CliError, number, output};
 use lnn::symmetry::{Degrees, EXACT, MOST_UNKNOWNS, SymmetrySummary, quadratic, quadratic_unknowns, unknowns};
 
@@ -11,33 +12,28 @@ use lnn::symmetry::{Degrees, EXACT, MOST_UNKNOWNS, SymmetrySummary, quadratic, q
 pub struct Args {
     #[command(flatten)]
     subject: SystemOrModel,
-    /// Functions that fields are made of, by family and total degree: polynomial, trigonometric, hyperbolic; chosen by the
-    /// coordinates if not given.
+    /// Functions that fields are made of, by family and total degree: polynomial, trigonometric, hyperbolic; by
+    /// default they suit the coordinates.
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
     basis: Option<Degrees>,
-    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or the middle of
-    /// those the model was trained on, if not given.
+    /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3 [default: those of the system, or the middle of the
+    /// training range of the model].
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are examined; two for every unknown coefficient, at least 400 for a system
-    /// and 1000 for a model, if not given.
+    /// Number of states that are examined [default: two for every unknown coefficient, at least 400 for a system and 1000 for a model].
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.
     #[arg(long, value_name = "N", default_value = "0", value_parser = number::seed)]
     seed: u64,
-    /// Singular values up to this one count as zero, 0.1 at most; 1e-8 for a system, the largest gap for a model, if not given.
+    /// Singular values up to this one count as zero, at most 0.1 [default: 1e-8 for a system, up to the largest gap for a model].
     #[arg(long, value_name = "T", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Look for conserved quantities of second degree in the momenta as well.
     #[arg(long)]
     quadratic: bool,
-    /// Text, or one JSON object.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
-    format: TableOrJson,
-    /// The same as --format json.
-    #[arg(long, conflicts_with = "format")]
-    json: bool,
+    #[command(flatten)]
+    format: FormatArgs,
 }
 
 /// Degrees of families of functions.
@@ -60,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let own = unknowns(n, basis.len());
     // For quadratic quantities, cyclic coordinates leave fewer functions than this.
     let second = |most: usize| if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(most)) } else { own };
-    let points = probe.points(args.points, probe.enough(second(MOST)), second(MOST_UNKNOWNS))?;
+    let points = probe.points(args.points, probe.enough(second(MOST_QUADRATIC_UNKNOWNS)), second(MOST_UNKNOWNS))?;
     announce(own, points, args.quadratic);
     let (q, v) = probe.states(points, args.seed)?;
     let tolerance = args.tolerance.or(probe.exact.then_some(EXACT));
@@ -70,19 +66,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         true => Some(quadratic(model, &found.basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?),
         false => None,
     };
-    let found = found.summary(&probe.name, families, args.seed, second);
-    let json = args.json || args.format == TableOrJson::Json;
-    output::print(&output::shown(&found, json, SymmetrySummary::findings)?)
+    args.format.print(&found.summary(&probe.name, families, args.seed, second), SymmetrySummary::findings)
 }
-
-/// Largest number of unknown coefficients of quadratic quantities for which states are drawn.
-const MOST: usize = 1300;
-/// Unknown coefficients squared times states from which a search takes some seconds.
-const LONG: f64 = 3e9;
 
 /// Announces a long search, which is otherwise silent.
 fn announce(unknowns: usize, points: usize, quadratic: bool) {
-    if (unknowns as f64).powi(2) * points as f64 > LONG {
+    if (unknowns as f64).powi(2) * points as f64 > LONG_SEARCH {
         let more = if quadratic { ", and more for quadratic quantities" } else { "" };
         output::note(&format!(
             "{unknowns} unknown coefficients at {points} states{more}: this takes a while; a smaller --basis is faster"

@@ -1,5 +1,7 @@
 //! The system of a command: one of the catalogue by its name, or another one by its file.
 
+use crate::files::ends_in;
+use crate::thresholds::MAX_ROBOT_BYTES;
 use crate::{CliError, config, output};
 use lnn::lagrangian::system::System;
 use lnn::lagrangian::{SystemInstance, find, resolve};
@@ -8,13 +10,9 @@ use lnn::pipeline::{is_robot, parse_robot, parse_system};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Largest file of a robot that is read, in bytes.
-const MAX_ROBOT: u64 = 1 << 24;
-
 /// `true` if an argument is the file of a system, not a name of the catalogue.
 pub fn is_file(system: &str) -> bool {
-    let path = Path::new(system);
-    is_robot(path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
+    is_robot(Path::new(system)) || ends_in(Path::new(system), &["toml"])
 }
 
 /// The system of a name, or of a file whose name ends in `.toml`, or in `.urdf` or `.xml` for a robot.
@@ -48,7 +46,7 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
 /// # Errors
 /// A usage error with file and line, a data error for a file that cannot be read.
 pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, String)>) -> Result<T, CliError> {
-    let (name, text) = config::read_text_within(path, MAX_ROBOT)?;
+    let (name, text) = config::read_text_within(path, MAX_ROBOT_BYTES)?;
     make(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
 }
 

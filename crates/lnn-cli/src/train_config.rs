@@ -2,9 +2,9 @@
 
 use crate::flags::Flags;
 use crate::layers::{Entry, Layers, Mistake};
-use crate::number::finite;
+use crate::number::{finite, one_of};
 use crate::print_config::{PrintFormat, commented, training_reference};
-use crate::run_args::{RunArgs, fill_periods, imply, structure};
+use crate::run_args::{RunArgs, add_implied, fill_periods, structure};
 use crate::{CliError, output, source, system_arg};
 use lnn::configuration::Config;
 use lnn::data::SamplingError;
@@ -26,8 +26,8 @@ pub struct Args {
     #[arg(required_unless_present_any = ["config", "resume", "from"])]
     system: Option<String>,
     /// A configuration that ships with the program [default: quick].
-    #[arg(long, value_enum, value_name = "NAME")]
-    preset: Option<PresetName>,
+    #[arg(long, value_parser = one_of(&PRESETS), value_name = "NAME")]
+    preset: Option<Preset>,
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
     param: Vec<(String, String)>,
@@ -37,15 +37,12 @@ pub struct Args {
     pub run: RunArgs,
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum PresetName {
-    /// A minute on two cores.
-    Quick,
-    /// Wider and longer: five minutes on two cores.
-    Best,
-    /// The paper's budget and choices: hours.
-    Paper,
-}
+/// The configurations that ship with the program.
+const PRESETS: [(&str, Preset, &str); 3] = [
+    ("quick", Preset::Quick, "A minute on two cores"),
+    ("best", Preset::Best, "Wider layers and more epochs: five minutes on two cores"),
+    ("paper", Preset::Paper, "The paper's budget and choices: hours"),
+];
 
 impl Args {
     /// The configuration: the preset's or the model's, the file's and the options' over it, every value in range. A `saved` configuration
@@ -62,7 +59,7 @@ impl Args {
         let mut layers = Layers::new(Config::KEYS, self.run.config.as_deref(), options)?;
         let start = layers.text("from").map(Start::read).transpose()?;
         let goes_on = saved.filter(|_| self.run.config.is_none() && self.preset.is_none() && start.is_none());
-        let Named { name, description } = self.named(&layers, start.as_ref(), saved)?;
+        let NamedSystem { name, description } = self.named(&layers, start.as_ref(), saved)?;
         if let Some(saved) = goes_on.filter(|saved| saved.system != name) {
             return Ok((Config { system: name, ..saved.clone() }, self.check(saved)?));
         }
@@ -85,18 +82,14 @@ impl Args {
             Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
             Err(error) => return Err(CliError::usage(error)),
         };
-        let configured = if mistakes.is_empty() { &parameters } else { &BTreeMap::new() };
-        let configured = configure_values::<f64>(usable.clone(), configured).or_else(|error| {
-            mistakes.extend(wrong_parameters(&usable, &parameters, &error));
-            configure_values::<f64>(usable.clone(), &BTreeMap::new())
-        });
-        let (system, known) = (configured.map_err(CliError::usage)?, mistakes.is_empty());
+        let system = instance(&usable, &parameters, &mut mistakes)?;
+        let known = mistakes.is_empty();
         let base = match goes_on {
             Some(saved) => saved.clone(),
             None => self.base(&system, &layers, start.as_ref())?,
         };
         let timed = layers.has("network.time_like") || base.network.time_like.is_some();
-        imply(&mut layers, "", timed);
+        add_implied(&mut layers, "", timed);
         let (mut config, wrong) = layers.over(&base)?;
         (config.system, config.description) = (name, description);
         fill_periods(&mut config, &layers, "");
@@ -120,16 +113,13 @@ impl Args {
 
     /// The configuration below all layers: the preset's, in the shape of a model to start from.
     fn base(&self, system: &SystemInstance<f64>, layers: &Layers, start: Option<&Start>) -> Result<Config, CliError> {
-        let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
-            PresetName::Quick => (Preset::Quick, "quick"),
-            PresetName::Best => (Preset::Best, "best"),
-            PresetName::Paper => (Preset::Paper, "paper"),
-        };
+        let preset = self.preset.unwrap_or(Preset::Quick);
         let config = match structure(layers, "") {
             Some(structure) => preset.config_of(system, structure),
             None => preset.config(system),
         };
         let mut config = config.ok_or_else(|| {
+            let known = PRESETS.iter().find(|(_, known, _)| *known == preset).map_or("", |(name, ..)| name);
             let name = &system.system.name;
             CliError::usage(format_args!("--preset {known}: {name} has no such preset, use quick or --config"))
         })?;
@@ -150,14 +140,14 @@ impl Args {
     }
 
     /// The system in the arguments; whether it exists is checked later.
-    fn requested(&self) -> Result<Option<Named>, CliError> {
+    fn requested(&self) -> Result<Option<NamedSystem>, CliError> {
         let Some(argument) = self.system.as_deref() else { return Ok(None) };
         if !system_arg::is_file(argument) {
-            return Ok(Some(Named { name: argument.to_string(), description: None }));
+            return Ok(Some(NamedSystem { name: argument.to_string(), description: None }));
         }
         let system = system_arg::system(argument)?;
         let description = system.described.as_ref().map(|described| described.description.clone());
-        Ok(Some(Named { name: system.name.to_string(), description }))
+        Ok(Some(NamedSystem { name: system.name.to_string(), description }))
     }
 
     /// The configuration's system; every value is in range.
@@ -190,7 +180,7 @@ impl Args {
     }
 
     /// The system: the argument's, the file's, the model's or the checkpoint's.
-    fn named(&self, layers: &Layers, start: Option<&Start>, saved: Option<&Config>) -> Result<Named, CliError> {
+    fn named(&self, layers: &Layers, start: Option<&Start>, saved: Option<&Config>) -> Result<NamedSystem, CliError> {
         let place = || self.run.config.as_deref().map_or("the configuration".to_string(), crate::input::name);
         let requested = self.requested()?;
         let in_file = layers.text("system");
@@ -221,13 +211,13 @@ impl Args {
         let known = start.and_then(|start| start.header.description.clone());
         let candidates = [written, known, saved.and_then(|saved| saved.description.clone())];
         let description = requested.or(candidates.into_iter().flatten().find(|description| description.name == name));
-        Ok(Named { name, description })
+        Ok(NamedSystem { name, description })
     }
 }
 
 /// The requested system, by name or with its description.
 #[derive(Debug)]
-struct Named {
+struct NamedSystem {
     name: String,
     description: Option<Description>,
 }
@@ -249,6 +239,21 @@ impl Unusable {
             Self::Description(error) => Mistake::new(format!("description.{}", error.key), &error.problem),
         }
     }
+}
+
+/// A system with these parameters; with its defaults if there are mistakes, to which those in the parameters are added.
+fn instance(
+    system: &Cow<'static, System>,
+    parameters: &BTreeMap<String, f64>,
+    mistakes: &mut Vec<Mistake>,
+) -> Result<SystemInstance<f64>, CliError> {
+    let defaults = BTreeMap::new();
+    let chosen = if mistakes.is_empty() { parameters } else { &defaults };
+    let configured = configure_values(system.clone(), chosen).or_else(|error| {
+        mistakes.extend(wrong_parameters(system, parameters, &error));
+        configure_values(system.clone(), &defaults)
+    });
+    configured.map_err(CliError::usage)
 }
 
 /// Mistakes in the parameters of a system, each of them by itself.

@@ -4,30 +4,26 @@ use crate::config::parse;
 use crate::learned::model_file;
 use crate::number::{number, threads};
 use crate::recording_args::read;
+use crate::thresholds::MAX_RESULT_BYTES;
 use crate::{CliError, input};
 use lnn::analysis::{Tube, TubeError, Window, predict_by_motion};
 use lnn::data::{Split, StateEstimate};
 use lnn::lagrangian::EulerLagrange;
 use lnn::pipeline::{FitConfig, FitOptions, PreparedFit};
-use lnn::rollout::{Trajectory, quoted};
-use lnn::scalar::Scalar;
 use lnn::storage::read_regular;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Largest configuration that is read, in bytes.
-const MAX_BYTES: u64 = 1 << 26;
-
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct TubeArgs {
-    /// A tube around the coordinates that holds this share of whole motions, from the errors of motion that the model has not
-    /// learned from: what `lnn fit` held out, or --tube-data. The CSV has two more columns per coordinate, NAME_low and
+    /// A tube around the coordinates that holds this share of whole motions, estimated from the errors on motion that the model has not
+    /// seen: what `lnn fit` held out, or --tube-data. The CSV has two more columns per coordinate, NAME_low and
     /// NAME_high.
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true, requires = "model", value_parser = number(0.01, 0.999))]
     tube: Option<f64>,
-    /// Recordings of other motions from which the tube is taken, with the columns of the data that the model was fitted to.
+    /// Recordings of other motions from which the tube is estimated, with the columns of the data that the model was fitted to.
     #[arg(long, value_name = "DATA,..", value_delimiter = ',', requires = "tube")]
     tube_data: Vec<PathBuf>,
 }
@@ -93,7 +89,7 @@ impl TubeArgs {
     /// The beginning of every motion that was not used for training and lasts this long.
     fn windows(&self, path: &Path, coordinates: &[String], seconds: f64) -> Result<Vec<Window>, CliError> {
         let place = model_file(path)?.with_file_name("config.toml");
-        let text = read_regular(&place, MAX_BYTES).map_err(|e| {
+        let text = read_regular(&place, MAX_RESULT_BYTES).map_err(|e| {
             CliError::file(&place, format_args!("--tube needs the configuration of the fit beside the model: {e}"))
         })?;
         let config: FitConfig = parse(&String::from_utf8_lossy(&text))
@@ -111,13 +107,11 @@ impl TubeArgs {
         }
         let reading = read(&files, &config.recording.meaning())?;
         let mut options = FitOptions::from(&config);
-        if self.tube_data.is_empty() {
-            let prepared = PreparedFit::new(&reading, &options).map_err(CliError::data)?;
-            return Ok(beginnings(&prepared.measured.test, seconds));
+        if !self.tube_data.is_empty() {
+            options.held_out = 0.0;
         }
-        options.held_out = 0.0;
-        let prepared = PreparedFit::new(&reading, &options).map_err(CliError::data)?;
-        Ok(beginnings(&prepared.measured.training, seconds))
+        let measured = PreparedFit::new(&reading, &options).map_err(CliError::data)?.measured;
+        Ok(beginnings(if self.tube_data.is_empty() { &measured.test } else { &measured.training }, seconds))
     }
 }
 
@@ -142,26 +136,6 @@ impl MotionTube {
     /// Names of the columns, low and high for every coordinate.
     pub fn names(&self) -> impl Iterator<Item = String> {
         self.coordinates.iter().flat_map(|name| ["low", "high"].map(|end| format!("{name}_{end}")))
-    }
-
-    /// A line of names with the names of the tube at its end.
-    pub fn header(&self, line: &str) -> String {
-        let names: Vec<String> = self.names().map(|name| quoted(&name)).collect();
-        format!("{},{}\n", line.trim_end(), names.join(","))
-    }
-
-    /// Rows of samples with the ends of the tube.
-    pub fn rows(&self, piece: &Trajectory<f64>) -> String {
-        let mut text = String::new();
-        for (k, row) in piece.csv_rows().lines().enumerate() {
-            text += row;
-            for x in self.ends(piece.t[k], piece.state(k).0).flatten() {
-                text.push(',');
-                text += &x.to_text();
-            }
-            text.push('\n');
-        }
-        text
     }
 
     /// The JSON form.

@@ -63,5 +63,5 @@ pub fn watch(stop: &Arc<AtomicBool>) -> Watch {
 /// # Errors
 /// Signals that cannot be watched for.
 pub fn search() -> Result<Cancellation, CliError> {
-    Ok(watch(&interrupt::flag().map_err(CliError::signals)?).cancellation())
+    Ok(watch(&interrupt::flag()?).cancellation())
 }

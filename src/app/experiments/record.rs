@@ -51,7 +51,7 @@ pub enum Outcome {
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Checksum of its configuration, so that a record in the place of another run is found out.
+    /// Checksum of its configuration, so that a record in the directory of another run is detected.
     pub run: String,
     /// Its outcome.
     #[serde(flatten)]

@@ -1,13 +1,9 @@
 //! Pictures of a motion under constraints: the motion on its surface, the forces of constraint, and its distance from the constraints.
 
 use crate::lagrangian::{EulerLagrange, ManifoldRows, Request, Terms};
+use crate::pipeline::thresholds::{CONSTRAINT_SAMPLES, MOST_PLANES_AND_CONSTRAINTS};
 use crate::report::{Figure, LinePlot, Series, Trace, figure, file_part, line_plot, trace_plot, with_unit};
 use crate::rollout::{Options, Trajectory, rollout};
-
-/// Samples of a motion.
-const SAMPLES: f64 = 600.0;
-/// Planes, and constraints, that are shown at most.
-const MOST: (usize, usize) = (3, 7);
 
 /// The motion of a model from a state on its constraints over some time; nothing of a model without constraints, or of a motion that does not
 /// begin.
@@ -18,13 +14,13 @@ pub(crate) fn constraint_figures(
     (coordinates, time): (&[String], &str),
 ) -> Vec<Figure> {
     let Some(manifold) = model.manifold() else { return Vec::new() };
-    let options = Options { energy: false, ..Options::new(seconds, seconds / SAMPLES) };
+    let options = Options { energy: false, ..Options::new(seconds, seconds / CONSTRAINT_SAMPLES) };
     let motion = rollout(model, q, v, &options).trajectory;
     if motion.len() < 2 {
         return Vec::new();
     }
     let mut figures = paths(&motion, coordinates, time);
-    let names = &manifold.names()[..manifold.names().len().min(MOST.1)];
+    let names = &manifold.names()[..manifold.names().len().min(MOST_PLANES_AND_CONSTRAINTS.1)];
     let (mut loads, mut strays) = (vec![Vec::new(); names.len()], vec![Vec::new(); names.len()]);
     let (mut rows, mut terms) = (ManifoldRows::default(), Terms::default());
     for k in 0..motion.len() {
@@ -79,5 +75,5 @@ fn paths(motion: &Trajectory<f64>, names: &[String], time: &str) -> Vec<Figure> 
         let caption = format!("The predicted motion from dark (0 {time}, dot) to bright ({end:.3} {time}).");
         figure(&file, format!("The motion on its constraints: {a} and {b}"), trace_plot(&trace), caption)
     };
-    pairs.iter().take(MOST.0).filter_map(one).collect()
+    pairs.iter().take(MOST_PLANES_AND_CONSTRAINTS.0).filter_map(one).collect()
 }

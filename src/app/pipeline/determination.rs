@@ -11,6 +11,7 @@ use crate::names::{number, percent};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::PipelineError;
 use crate::pipeline::hold_out::HoldOut;
+use crate::pipeline::thresholds::{DETERMINED, MISFIT_OF_ENERGY, MOST_OUTSIDE, MOSTLY_OUTSIDE};
 use crate::recording::Targets;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -67,26 +68,17 @@ pub struct Determined {
     decay: Option<Decay>,
 }
 
-/// Largest misfit of a model whose loss of energy is meaningful for the motion.
-const MISFIT_OF_ENERGY: f64 = 0.5;
-/// Share of held-out states outside the learned ones that is worth a remark.
-const OUTSIDE: f64 = 0.1;
-/// Such a share at and above which held-out motion differs from the learned motion and judges nothing.
-const MOSTLY: f64 = 0.5;
 /// Names of quantities and of statements about them.
 const ENERGY: &str = "rms E about its mean";
 const UNIT: &str = "the unit";
 const NOT: &str = "not";
-
-/// Largest half-width of a range, over the size, at which a quantity counts as determined, in words.
-const WORDS: [(f64, &str); 3] = [(0.1, "well"), (0.5, "roughly"), (1.0, "poorly")];
 
 impl Quantity {
     /// A quantity that is compared with a `size`, and cannot be negative if `positive`.
     fn new(name: String, estimate: &Estimate, size: f64, positive: bool) -> Self {
         let Estimate { value: learned, low, high } = *estimate;
         let relative = 0.5 * (high - low) / size;
-        let determined = WORDS.iter().find(|(most, _)| relative <= *most).map_or(NOT, |(_, word)| word);
+        let determined = DETERMINED.iter().find(|(most, _)| relative <= *most).map_or(NOT, |(_, word)| word);
         let low = if positive && low.is_finite() { low.max(0.0) } else { low };
         Self { name, mass: false, learned, low, high, determined }
     }
@@ -210,7 +202,7 @@ impl Determined {
 
     /// Share of the held-out states that the learned ones do not surround, if it is most of them.
     pub(crate) fn mostly_outside(&self) -> Option<f64> {
-        self.outside.filter(|share| *share > MOSTLY)
+        self.outside.filter(|share| *share > MOSTLY_OUTSIDE)
     }
 
     /// A remark on standard error, if the data indicate friction.
@@ -289,7 +281,7 @@ impl Determined {
 
     /// A remark on held-out states that the learned ones do not surround.
     fn beyond(&self) -> Option<String> {
-        let share = self.outside.filter(|share| *share > OUTSIDE)?;
+        let share = self.outside.filter(|share| *share > MOST_OUTSIDE)?;
         Some(format!(
             "{} of the held-out states lie outside the learned ones; these figures do not hold there.",
             percent(share)

@@ -2,13 +2,11 @@
 
 use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::pipeline::thresholds::STATES_AT_ONCE;
 use crate::recording::{RecordedTrajectory, Smoothed};
 use crate::report::{Figure, LinePlot, Series, figure, line_plot, median_of};
 use crate::rollout::{Driven, Trajectory};
 use serde::Serialize;
-
-/// States evaluated at once.
-const CHUNK: usize = 4096;
 
 /// Energy along held-out trajectories, means over the trajectories in the unit of the learned `L`, which is J only where
 /// forces were given: `change = work - friction + defect`.
@@ -53,7 +51,7 @@ impl EnergyPath {
         let (times, q, v) = (&states.times[rows.clone()], of(&states.q), of(&states.v));
         let force = if track.force.is_empty() { vec![0.0; q.len()] } else { of(&track.force) };
         let (mut energy, mut kinetic, mut power, mut terms) = (Vec::new(), Vec::new(), Vec::new(), Terms::default());
-        let size = CHUNK * n;
+        let size = STATES_AT_ONCE * n;
         for ((q, v), force) in q.chunks(size).zip(v.chunks(size)).zip(force.chunks(size)) {
             model.terms(q, v, Request::ENERGY | Request::FORCE, &mut terms).ok()?;
             energy.extend_from_slice(&terms.energy);
@@ -139,7 +137,7 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> 
         sums.friction += balance.dissipated;
         sums.defect += balance.defect();
         sums.defect_rms += balance.defect().powi(2);
-        for (q, v) in trajectory.q.chunks(CHUNK * n).zip(trajectory.v.chunks(CHUNK * n)) {
+        for (q, v) in trajectory.q.chunks(STATES_AT_ONCE * n).zip(trajectory.v.chunks(STATES_AT_ONCE * n)) {
             let _ = model.terms(q, v, Request::MOMENTUM, &mut terms);
             sums.kinetic += 0.5 * terms.momentum.iter().zip(v).map(|(p, v)| p * v).sum::<f64>();
             samples += (q.len() / n) as f64;

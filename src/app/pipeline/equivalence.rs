@@ -2,6 +2,7 @@
 
 use crate::lagrangian::EulerLagrange;
 use crate::names::percent;
+use crate::pipeline::thresholds::EQUIVALENCE_STATES;
 use crate::symmetry::{Basis, Chart, SymmetryError, compare};
 use serde::Serialize;
 
@@ -28,13 +29,10 @@ pub struct Equivalence {
     pub states: usize,
 }
 
-/// States that are compared at the least.
-const STATES: usize = 400;
-
 /// Functions that gauge functions are made of, and how many states are compared for them.
 pub(crate) fn gauge_functions(names: &[String], charts: &[Chart]) -> (Basis, usize) {
     let (basis, _) = Basis::usual(names, charts);
-    let states = STATES.max(basis.len());
+    let states = EQUIVALENCE_STATES.max(basis.len());
     (basis, states)
 }
 

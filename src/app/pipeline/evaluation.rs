@@ -1,9 +1,9 @@
 //! Evaluation of a model: accelerations, trajectories and pictures against the hand-written system.
 
 use crate::analysis::{
-    Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
-    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error,
-    mass_matrix_error_within, nearest_factor, statistics, wrong_signatures,
+    Axis, ErrorDistribution, Grid, MassMatrixError, Portrait, StartBox, Statistics, TrajectoryRun, TrajectorySummary,
+    TrajectoryTest, ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid,
+    mass_matrix_error, mass_matrix_error_within, nearest_factor, statistics, wrong_signatures,
 };
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
@@ -13,25 +13,15 @@ use crate::network::NetworkLagrangian;
 use crate::pipeline::constraint_figures::constraint_figures;
 use crate::pipeline::judging::Judging;
 use crate::pipeline::physics::{Physics, Subject};
+use crate::pipeline::thresholds::{
+    DRAWN_STARTS, EVALUATION_PIECES, FAST_VELOCITY, FRESH_STATES, GRID_POINTS, RTOL, STARTS,
+};
 use crate::pipeline::{PipelineError, Watch, memory};
 use crate::random::RngStream;
 use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures, units};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Points of a grid along each axis.
-const GRID: usize = 81;
-/// Relative tolerance of the learned motion in the paper's test.
-pub const RTOL: f64 = 1e-6;
-/// Fresh states on which accelerations are compared.
-const STATES: usize = 12_000;
-/// Starts of the trajectory test, as in the paper.
-pub(crate) const STARTS: usize = 4;
-/// Starts whose motion is drawn.
-const DRAWN: usize = 4;
-/// Velocities of the fast map of `det M`, in upper bounds of the validation states.
-const FAST: f64 = 0.99;
 
 /// Numbers of an evaluation, all in physical units.
 #[derive(Clone, Debug, Serialize)]
@@ -84,6 +74,16 @@ pub struct Motion {
     pub left_training_range: Option<String>,
 }
 
+impl Motion {
+    fn of(run: &TrajectoryRun<f64>, system: &SystemInstance<f64>, trained: &Domain<f64>) -> Self {
+        Self {
+            summary: run.summary(),
+            conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
+            left_training_range: leaving(&run.learned.trajectory, trained, &system.system.columns(system.coordinates)),
+        }
+    }
+}
+
 /// States and starts of an evaluation, and how the learned motion is integrated.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -116,15 +116,12 @@ impl EvaluationOptions {
         let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
         let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
         let mut random = RngStream::Test.generator(seed);
-        let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random)?;
+        let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), FRESH_STATES, &mut random)?;
         let states = (states.q().to_vec(), states.v().to_vec());
         let span = system.system.trajectory(system.coordinates);
         Ok(Self { states, starts: STARTS, span, rtol: RTOL, trained, constraints: None, seed, threads: 1 })
     }
 }
-
-/// Pieces of work of an evaluation: accelerations, motions, pictures, mass matrices.
-const PIECES: usize = 4;
 
 /// Compares a model with the system it learned. Comparisons made before the flag ended it are kept: see [`Evaluation::interrupted`].
 ///
@@ -136,19 +133,16 @@ pub fn evaluate(
     options: EvaluationOptions,
     watch: &Watch,
 ) -> Result<Evaluation, PipelineError> {
-    let (plan, judging) = (options, &Judging::new(watch, PIECES));
-    let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
-    let n = system.coordinates;
+    let judging = &Judging::new(watch, EVALUATION_PIECES);
+    let (n, span) = (system.coordinates, &options.span);
     system.require_states()?;
     let exact = system.build()?;
-    let learned = held(system, network, plan.constraints.as_ref())?;
+    let learned = constrained(system, network, options.constraints.as_ref())?;
     let (exact, learned) = (judging.watched(exact.as_ref()), judging.watched(learned.as_ref()));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
-    let coordinates = system.system.coordinates(n);
-    let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
-    let Span { start, t_end, dt } = plan.span;
-    // Exact and learned.
-    memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
+    let motions = memory::motions((options.starts as u64).saturating_mul(2), span.t_end / span.dt, n, 0);
+    memory::require("the evaluation", motions)?;
+    let (q, v) = (options.states.0.as_slice(), options.states.1.as_slice());
     let accelerations = acceleration_errors(exact, learned, q, v);
     let wrong_signature = wrong_signatures(exact, learned, q, v);
     let mass_matrix = match exact.manifold() {
@@ -157,99 +151,125 @@ pub fn evaluate(
     };
     judging.check()?;
     judging.advance(1);
-
-    let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
-    // Steps grow with the time, and with the fifth root of the accuracy.
-    let longer = (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
-    let test = TrajectoryTest {
-        starts: plan.starts,
-        seed: plan.seed,
-        t_end,
-        dt,
-        rtol: plan.rtol,
-        atol: 1e-2 * plan.rtol,
-        max_steps: (longer * defaults.max_steps as f64) as usize,
-        lyapunov: true,
-        threads: plan.threads,
-        ..defaults
-    };
+    let test = trajectory_test(system, &options);
     let mut runs = test.run_constrained(system, exact, learned)?;
     runs.retain(|run| !run.is_interrupted());
     judging.advance(1);
-    let motion = |run: &TrajectoryRun<f64>| Motion {
-        summary: run.summary(),
-        conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
-        left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
-    };
-
-    let (mut portraits, mut figures) = (Vec::new(), Vec::new());
-    if !judging.is_interrupted() {
-        portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
-        figures = evaluation_figures(&runs, &portraits, system);
-        if learned.manifold().is_some() {
-            // Off the constraints, where a grid over coordinates lies, a meaning off the constraints.
-            let start = runs.iter().find(|run| !run.exact.trajectory.is_empty());
-            let names = system.system.columns(n);
-            let (names, unit) = (&names[..n], system.system.time_unit.as_ref());
-            let motion = start.map(|run| run.exact.trajectory.state(0));
-            figures.extend(motion.into_iter().flat_map(|at| constraint_figures(learned, at, t_end, (names, unit))));
-        } else {
-            match grids(system, exact, learned, &mass_matrix.factors) {
-                Err(_) if judging.is_interrupted() => {}
-                drawn => figures.extend(drawn?),
-            }
-        }
-    }
-    if judging.is_interrupted() {
-        // They would show where the models were ended.
-        (portraits, figures) = (Vec::new(), Vec::new());
-    }
+    let (portraits, figures) = pictures(system, (exact, learned), &test, &runs, &mass_matrix, judging)?;
     judging.advance(1);
-    let subject = Subject {
-        network,
-        trained: &plan.trained,
-        system: Some(system),
-        columns: system.system.columns(n),
-        labels: system.system.labels(n),
-        motion: portraits.first().map(|portrait| &portrait.learned),
-        recorded: None,
-        determined: None,
-        threads: plan.threads,
-    };
-    let free = exact.manifold().or(learned.manifold()).is_none();
-    let mut physics = if free { Physics::nothing(&subject) } else { Physics::under_constraints(&subject) };
-    let found = if free { physics.find(&subject, &|| judging.check()) } else { judging.check() };
-    let interrupted = match found {
-        Ok(()) => None,
-        Err(PipelineError::Interrupted) => {
-            physics.left_out.push("whatever is not here: interrupted".to_string());
-            Some(format!("{} of {}", runs.len(), pluralize(plan.starts, "start", "starts")))
-        }
-        Err(error) => return Err(error),
-    };
+    let subject = subject(system, network, &options, portraits.first());
+    let is_free = exact.manifold().or(learned.manifold()).is_none();
+    let (physics, is_interrupted) = physics(&subject, is_free, judging)?;
     judging.advance(1);
+    let starts = || format!("{} of {}", runs.len(), pluralize(options.starts, "start", "starts"));
+    let time_unit = system.system.time_unit.to_string();
+    let coordinates = system.system.coordinates(n);
     Ok(Evaluation {
         accelerations,
         wrong_signature,
         mass_matrix,
         valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
-        trajectories: runs.iter().map(motion).collect(),
+        trajectories: runs.iter().map(|run| Motion::of(run, system, &options.trained)).collect(),
         physics,
-        interrupted,
-        coordinates: coordinates
-            .iter()
-            .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
-            .collect(),
+        interrupted: is_interrupted.then(starts),
+        coordinates: coordinates.iter().map(|c| format!("{} [{}/{time_unit}^2]", c.name, c.unit)).collect(),
         units: units(system),
-        tested: t_end,
-        time_unit: system.system.time_unit.to_string(),
+        tested: span.t_end,
+        time_unit,
         conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
     })
 }
 
+/// The trajectory test of these options.
+fn trajectory_test(system: &SystemInstance<f64>, options: &EvaluationOptions) -> TrajectoryTest<f64> {
+    let n = system.coordinates;
+    let periodic = system.system.coordinates(n).iter().map(|c| c.periodic).collect();
+    let Span { start, t_end, dt } = options.span.clone();
+    let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
+    // Steps grow with the time, and with the fifth root of the accuracy.
+    let longer =
+        (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / options.rtol).max(1.0).powf(0.2);
+    TrajectoryTest {
+        starts: options.starts,
+        seed: options.seed,
+        t_end,
+        dt,
+        rtol: options.rtol,
+        atol: 1e-2 * options.rtol,
+        max_steps: (longer * defaults.max_steps as f64) as usize,
+        lyapunov: true,
+        threads: options.threads,
+        ..defaults
+    }
+}
+
+/// The drawn motions, and pictures of motions and of learned functions; none after an interruption, which they would show.
+fn pictures(
+    system: &SystemInstance<f64>,
+    (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
+    test: &TrajectoryTest<f64>,
+    runs: &[TrajectoryRun<f64>],
+    mass_matrix: &MassMatrixError,
+    judging: &Judging<'_>,
+) -> Result<(Vec<Portrait<f64>>, Vec<Figure>), PipelineError> {
+    if judging.is_interrupted() {
+        return Ok(Default::default());
+    }
+    let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN_STARTS)]);
+    let mut figures = evaluation_figures(runs, &portraits, system);
+    if learned.manifold().is_some() {
+        // A grid over coordinates would lie off the constraints, where L has no meaning.
+        let start = runs.iter().find(|run| !run.exact.trajectory.is_empty());
+        let columns = system.system.columns(system.coordinates);
+        let names = (&columns[..system.coordinates], system.system.time_unit.as_ref());
+        let motion = start.map(|run| run.exact.trajectory.state(0));
+        figures.extend(motion.into_iter().flat_map(|at| constraint_figures(learned, at, test.t_end, names)));
+    } else {
+        match grids(system, exact, learned, &mass_matrix.factors) {
+            Err(_) if judging.is_interrupted() => {}
+            drawn => figures.extend(drawn?),
+        }
+    }
+    Ok(if judging.is_interrupted() { Default::default() } else { (portraits, figures) })
+}
+
+/// The model whose physics is described; `portrait` is of one of its motions.
+fn subject<'a>(
+    system: &'a SystemInstance<f64>,
+    network: &'a NetworkLagrangian<f64>,
+    options: &'a EvaluationOptions,
+    portrait: Option<&'a Portrait<f64>>,
+) -> Subject<'a> {
+    Subject {
+        network,
+        trained: &options.trained,
+        system: Some(system),
+        columns: system.system.columns(system.coordinates),
+        labels: system.system.labels(system.coordinates),
+        motion: portrait.map(|portrait| &portrait.learned),
+        recorded: None,
+        determined: None,
+        threads: options.threads,
+    }
+}
+
+/// Curvature, symmetries and signature; `true` if an interruption left some out.
+fn physics(subject: &Subject<'_>, is_free: bool, judging: &Judging<'_>) -> Result<(Physics, bool), PipelineError> {
+    let mut physics = if is_free { Physics::nothing(subject) } else { Physics::under_constraints(subject) };
+    let found = if is_free { physics.find(subject, &|| judging.check()) } else { judging.check() };
+    match found {
+        Ok(()) => Ok((physics, false)),
+        Err(PipelineError::Interrupted) => {
+            physics.left_out.push("everything that is missing here: interrupted".to_string());
+            Ok((physics, true))
+        }
+        Err(error) => Err(error),
+    }
+}
+
 /// The learned motion under its constraints: these formulas, or those of the system.
-fn held<'a>(
+fn constrained<'a>(
     system: &SystemInstance<f64>,
     network: &'a NetworkLagrangian<f64>,
     constraints: Option<&BTreeMap<String, String>>,
@@ -286,82 +306,76 @@ fn grids(
     factors: &[f64],
 ) -> Result<Vec<Figure>, PipelineError> {
     let n = system.coordinates;
-    let bounds = system.system.validation(n);
-    let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
-    // At rest a total time derivative in the learned L vanishes: only a factor and a constant remain.
-    let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
-    // A mass shell lets nothing rest in time.
-    system.impose_constraint(&middle, &mut rest)?;
-    let fast = bounds.velocities.iter().map(|(_, high)| FAST * high).collect();
-    let (rest, fast) = ([middle.clone(), rest].concat(), [middle, fast].concat());
-    let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
-    let labels = system.system.labels(n);
-    // A spacetime is shown over its spatial coordinates, if it has two.
-    let shown = if system.system.time_like == Some(0) && n > 2 { [1, n - 1] } else { [0, 1] };
-    let axes =
-        shown.map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
-
+    let ([rest, fast], axes) = grid_states(system)?;
     // L is -1/2 everywhere on a mass shell and would show nothing there. M is compared on the shell, where it was trained.
     let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
     let lagrangian = |model: &dyn EulerLagrange<f64>| lagrangian_grid(model, &rest, axes);
     let determinant = |model: &dyn EulerLagrange<f64>, state: &[f64]| determinant_grid(model, state, axes, impose);
-    let heading = if n > 1 {
-        "The Lagrangian at rest, \u{2212}V: learned beside exact"
-    } else {
-        "The Lagrangian: learned beside exact"
+    // On a mass shell f(L) gives det M another factor.
+    let determinant_fit = |[exact, learned]: [&Grid; 2]| match system.constrained_coordinate() {
+        Some(_) => {
+            let factor = nearest_factor(1, &exact.values, &learned.values);
+            Fit::Factor(factor, format!("times its best factor {}", number(factor)))
+        }
+        None => determinant_factor(factors),
     };
-    let mut pairs = vec![
-        (["L", "lagrangian", heading], fixed(system, &rest, axes, false), lagrangian(exact), lagrangian(learned)),
-        (
-            ["det M", "det_mass_matrix", "The determinant of the mass matrix: learned beside exact"],
-            fixed(system, &rest, axes, true),
-            determinant(exact, &rest),
-            determinant(learned, &rest),
-        ),
+    let labels = system.system.labels(n);
+    let comparison = |[quantity, file, heading]: [&str; 3], fixed, [exact, learned]: [Grid; 2]| GridComparison {
+        quantity: quantity.to_string(),
+        heading: heading.to_string(),
+        file: file.to_string(),
+        x_label: labels[axes[0].component].clone(),
+        y_label: labels[axes[1].component].clone(),
+        fit: if quantity == "L" { Fit::Affine } else { determinant_fit([&exact, &learned]) },
+        signs: quantity != "L",
+        exact,
+        learned,
+        fixed,
+    };
+    let at_rest = if n > 1 { " at rest, \u{2212}V" } else { "" };
+    let heading = format!("The Lagrangian{at_rest}: learned beside exact");
+    let of_l = ["L", "lagrangian", &heading];
+    let of_m = ["det M", "det_mass_matrix", "The determinant of the mass matrix: learned beside exact"];
+    let of_fast = ["Fast det M", "det_mass_matrix_fast", "The determinant of the mass matrix at high velocities"];
+    let mut all = vec![
+        comparison(of_l, fixed(system, &rest, axes, false), [lagrangian(exact)?, lagrangian(learned)?]),
+        comparison(of_m, fixed(system, &rest, axes, true), [determinant(exact, &rest)?, determinant(learned, &rest)?]),
     ];
     if n > 1 {
-        pairs.push((
-            ["Fast det M", "det_mass_matrix_fast", "The determinant of the mass matrix at high velocities"],
-            fixed(system, &fast, axes, true),
-            determinant(exact, &fast),
-            determinant(learned, &fast),
-        ));
+        let grids = [determinant(exact, &fast)?, determinant(learned, &fast)?];
+        all.push(comparison(of_fast, fixed(system, &fast, axes, true), grids));
     }
-    let mut figures = Vec::new();
-    for ([quantity, file, heading], fixed, exact, learned) in pairs {
-        let (exact, learned) = (exact?, learned?);
-        let fit = match quantity {
-            "L" => Fit::Affine,
-            // On a mass shell f(L) gives det M another factor.
-            _ if system.constrained_coordinate().is_some() => {
-                let factor = nearest_factor(1, &exact.values, &learned.values);
-                Fit::Factor(factor, format!("times its best factor {}", number(factor)))
-            }
-            _ => determinant_factor(factors),
-        };
-        let comparison = GridComparison {
-            quantity: quantity.to_string(),
-            heading: heading.to_string(),
-            file: file.to_string(),
-            x_label: labels[shown[0]].clone(),
-            y_label: labels[shown[1]].clone(),
-            exact,
-            learned,
-            fixed,
-            fit,
-            signs: quantity != "L",
-        };
-        // A model that is nowhere finite on the grid has no picture; the tables report this.
-        figures.extend(grid_figures(&comparison).map(|mut figure| {
-            figure.caption += match &*system.system.time_unit {
-                "s" => " SI units.",
-                "m" => " Geometric units.",
-                _ => "",
-            };
-            figure
-        }));
-    }
+    let units = match &*system.system.time_unit {
+        "s" => " SI units.",
+        "m" => " Geometric units.",
+        _ => "",
+    };
+    // A model that is nowhere finite on the grid has no picture; the tables report this.
+    let mut figures: Vec<Figure> = all.iter().flat_map(grid_figures).collect();
+    figures.iter_mut().for_each(|figure| figure.caption += units);
     Ok(figures)
+}
+
+/// Where grids lie: the middle of the validation bounds at rest, and at high velocities, `q` before `v`; and the axes of the grids.
+fn grid_states(system: &SystemInstance<f64>) -> Result<([Vec<f64>; 2], [Axis; 2]), PipelineError> {
+    let n = system.coordinates;
+    let bounds = system.system.validation(n);
+    let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
+    // At rest a total time derivative in the learned L vanishes: only a factor and a constant remain.
+    let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
+    // On a mass shell the velocity of the time cannot vanish.
+    system.impose_constraint(&middle, &mut rest)?;
+    let fast = bounds.velocities.iter().map(|(_, high)| FAST_VELOCITY * high).collect();
+    let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
+    // A spacetime is shown over its spatial coordinates, if it has two.
+    let shown = if system.system.time_like == Some(0) && n > 2 { [1, n - 1] } else { [0, 1] };
+    let axes = shown.map(|component| Axis {
+        component,
+        from: ranges[component].0,
+        to: ranges[component].1,
+        points: GRID_POINTS,
+    });
+    Ok(([[middle.clone(), rest].concat(), [middle, fast].concat()], axes))
 }
 
 /// The factor of `det M` that follows from those of the coordinates.

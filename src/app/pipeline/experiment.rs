@@ -1,13 +1,13 @@
-//! Experiments: their runs side by side, finished ones not again, and the tables made of their records.
+//! Experiments: performs their runs, several at a time and without repeating finished ones, and makes tables of their records.
 
 use crate::configuration::Config;
 use crate::data::SamplingError;
 use crate::experiments::{Outcome, Record, Run};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::checkpoints::Begin;
-use crate::pipeline::evaluation::STARTS;
 use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory};
 use crate::pipeline::experiment_report::{Additions, ExperimentReport, Results, conclude};
+use crate::pipeline::thresholds::STARTS;
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Command, Event, Output, PipelineError, RECORD, Watch, from_table};
 use crate::storage::container::text_checksum;

@@ -1,15 +1,11 @@
 //! Directory of an experiment: the files of its tables, and one directory per run, in which one process works at a time.
 
+use crate::pipeline::thresholds::{CHECKPOINT_SECONDS, MAX_RESULT_BYTES};
 use crate::pipeline::{Checkpoints, Directory, LEARNED, Output, PipelineError};
 use crate::storage::{Acquired, DirectoryLock, Disk, LockOwner, read_regular, remove_leftovers};
 use crate::training::CheckpointInterval;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-
-/// Longest file that is read back, in bytes.
-const MAX_BYTES: u64 = 1 << 26;
-/// Seconds between two checkpoints of a run.
-const CHECKPOINT_SECONDS: f64 = 60.0;
 
 /// Directory of an experiment, created when something is written.
 #[derive(Clone, Debug)]
@@ -30,7 +26,7 @@ impl ExperimentDirectory {
 
     /// The bytes of a file of a run, if it is there.
     pub fn read(&self, run: &str, name: &str) -> Option<Vec<u8>> {
-        read_regular(&self.run(run).join(name), MAX_BYTES).ok()
+        read_regular(&self.run(run).join(name), MAX_RESULT_BYTES).ok()
     }
 
     /// Names of the files of a run.

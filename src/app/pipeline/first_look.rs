@@ -5,21 +5,12 @@ use crate::configuration::Precision;
 use crate::constraints::{ConstraintSearch, ConstraintSearchError, FoundConstraints, MotionSamples, find_constraints};
 use crate::findings::Findings;
 use crate::formula::{FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_motion};
+use crate::pipeline::thresholds::{FIRST_LOOK_COORDINATES, FIRST_LOOK_LEAST, FIRST_LOOK_SAMPLES, FIRST_LOOK_TIME};
 use crate::pipeline::{FitOptions, PipelineError, PreparedFit};
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::survey::{Survey, SurveyOptions, survey};
 use crate::recording::{ColumnGuess, LoadedRecording, RecordedTrajectory, Recording};
 use serde::{Serialize, Serializer};
-use std::time::Duration;
-
-/// Largest number of samples in which laws are sought: seconds of searching.
-const SAMPLES: usize = 2000;
-/// Samples that a trajectory keeps at least.
-const LEAST: usize = 200;
-/// Largest number of coordinates for which a formula is sought: the number of terms grows with their fourth power.
-const COORDINATES: usize = 4;
-/// Longest time for which a formula is sought.
-const LIMIT: Duration = Duration::from_secs(2);
 
 /// What to do next with recorded motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -147,7 +138,10 @@ impl FirstLook {
             }
         }
         if self.unfinished {
-            laws.push(format!("no formula was found within {} s; a longer search may find one", LIMIT.as_secs()));
+            laws.push(format!(
+                "no formula was found within {} s; a longer search may find one",
+                FIRST_LOOK_TIME.as_secs()
+            ));
         }
         if !laws.is_empty() && self.searched < self.survey.samples {
             laws.push(format!("laws were looked for in {} of the {} samples", self.searched, self.survey.samples));
@@ -163,7 +157,7 @@ impl FirstLook {
 
 /// The beginnings of the trajectories, as many samples of each as all together may have.
 fn part(recording: &Recording) -> Recording {
-    let most = (SAMPLES / recording.tracks.len().max(1)).max(LEAST);
+    let most = (FIRST_LOOK_SAMPLES / recording.tracks.len().max(1)).max(FIRST_LOOK_LEAST);
     let n = recording.n();
     let cut = |track: &RecordedTrajectory| {
         let samples = track.len().min(most);
@@ -177,7 +171,7 @@ fn part(recording: &Recording) -> Recording {
             force: of(&track.force),
         }
     };
-    let tracks = recording.tracks.iter().take(SAMPLES / LEAST).map(cut).collect();
+    let tracks = recording.tracks.iter().take(FIRST_LOOK_SAMPLES / FIRST_LOOK_LEAST).map(cut).collect();
     Recording { tracks, ..recording.clone() }
 }
 
@@ -195,10 +189,10 @@ fn constraints(recording: &Recording, stop: &Cancellation) -> Result<Option<Foun
 
 /// A formula that explains motion of few coordinates, with friction if it has some, and whether the search ran out of time.
 fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFormula>, bool), PipelineError> {
-    if recording.n() > COORDINATES {
+    if recording.n() > FIRST_LOOK_COORDINATES {
         return Ok((None, false));
     }
-    let cancellation = stop.within(LIMIT);
+    let cancellation = stop.within(FIRST_LOOK_TIME);
     let options = FormulaOptions {
         friction: true,
         friction_of_position: false,

@@ -4,26 +4,13 @@ use crate::configuration::table::{Below, count, table};
 use crate::configuration::{Config, ConfigError, Faults, Known, Ranges as _};
 use crate::data::PrepareOptions;
 use crate::network::Initialization;
+use crate::pipeline::thresholds::{HELD_OUT, MOST_MEMBERS, MOST_WINDOW_SAMPLES, RESIDUAL_DECAY, RESIDUAL_WIDTH};
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::{Columns, Targets};
 use crate::rollout::Between;
 use crate::shooting::Shooting;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// Share of the samples that is held out by default.
-pub const HELD_OUT: f64 = 0.2;
-
-/// Width of the network beside a known part, and its weight decay: small, since effects that network and constants share are not
-/// identifiable and should go to the constants.
-const RESIDUAL_WIDTH: usize = 8;
-const RESIDUAL_DECAY: f64 = 0.01;
-
-/// Networks of a fit at most.
-const MOST_MEMBERS: usize = 32;
-
-/// Samples of a smoothing window at most.
-const MOST_WINDOW: usize = 1_000_001;
 
 table! {
     /// Everything that determines a fit.
@@ -36,7 +23,7 @@ table! {
         #[key("0 to below 1", example = "0.2", flag = "hold-out", check = |x| (0.0..1.0).contains(x))]
         pub held_out: f64 = HELD_OUT,
         /// Length of the smoothing windows; chosen unless set.
-        #[key("an odd number of samples", example = "21", flag = "window", check = count(MOST_WINDOW))]
+        #[key("an odd number of samples", example = "21", flag = "window", check = count(MOST_WINDOW_SAMPLES))]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub window: Option<usize> = None,
         /// Standard deviation of the noise of every coordinate; estimated unless set.
@@ -47,19 +34,19 @@ table! {
         #[key("above 0, in s", example = "0.5", flag = "horizon", check = positive)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub horizon: Option<f64> = None,
-        /// Known forces between the samples, where motion is learned from or predicted.
+        /// Interpolation of the known forces between the samples, for learning from motion and for predictions.
         #[key("held, linear, cubic, band-limited", example = "\"band-limited\"", flag = "between")]
         #[serde(skip_serializing_if = "is_linear")]
         pub between: Between = Between::Linear,
-        /// Constraints between the coordinates: none, those that find reads off the motion, or formulas by name that vanish, from the
-        /// table `constraints` of a file.
+        /// Constraints between the coordinates: none, find to look for them in the motion, or a file whose table `constraints` has
+        /// formulas that vanish.
         #[key("none, find, or a file", example = "\"find\"", flag = "constraints")]
         pub constraints: FitConstraints = FitConstraints::None,
-        /// Whether a formula of the Lagrangian is looked for in the training motion, with friction if the model has it: minutes.
+        /// Whether to look for a formula of the Lagrangian in the training motion, with friction if the model has it; this takes minutes.
         #[key("true, false", flag = "formula")]
         pub formula: bool = false,
-        /// Networks that are trained, one after another, on the same recording, by the seed and those that follow it; what they say
-        /// differently is what the recording leaves open, or the training.
+        /// Number of networks that are trained on the same recording, with this seed and those that follow it; where they differ, the
+        /// recording or the training does not determine the model.
         #[key("1 to 32", example = "5", flag = "members", check = count(MOST_MEMBERS))]
         #[serde(skip_serializing_if = "is_one")]
         pub members: usize = 1,
@@ -198,47 +185,21 @@ pub fn unit(text: &str) -> Option<(String, String)> {
 impl FitColumns {
     /// The meaning of the columns.
     pub fn meaning(&self) -> Columns {
-        let Self {
-            coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, units, columns, ..
-        } = self.clone();
-        let units = units.iter().filter_map(|text| unit(text)).collect();
-        let names = (!columns.is_empty()).then_some(columns);
-        Columns {
-            coords,
-            velocity,
-            acceleration,
-            force,
-            time,
-            rate,
-            trajectory,
-            wide,
-            periodic,
-            units,
-            names,
-            ..Columns::default()
-        }
+        let Self { coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, .. } = self.clone();
+        let units = self.units.iter().filter_map(|text| unit(text)).collect();
+        let names = (!self.columns.is_empty()).then(|| self.columns.clone());
+        let columns = Columns { coords, velocity, acceleration, force, periodic, ..Columns::default() };
+        Columns { time, rate, trajectory, wide, units, names, ..columns }
     }
 }
 
 impl From<&Columns> for FitColumns {
-    fn from(columns: &Columns) -> Self {
-        let Columns {
-            coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, units, names, ..
-        } = columns.clone();
-        Self {
-            files: Vec::new(),
-            coords,
-            velocity,
-            acceleration,
-            force,
-            time,
-            rate,
-            trajectory,
-            wide,
-            periodic,
-            units: units.iter().map(|(column, unit)| format!("{column}={unit}")).collect(),
-            columns: names.unwrap_or_default(),
-        }
+    fn from(given: &Columns) -> Self {
+        let Columns { coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, .. } =
+            given.clone();
+        let units = given.units.iter().map(|(column, unit)| format!("{column}={unit}")).collect();
+        let columns = Self { coords, velocity, acceleration, force, periodic, ..Self::default() };
+        Self { time, rate, trajectory, wide, units, columns: given.names.clone().unwrap_or_default(), ..columns }
     }
 }
 

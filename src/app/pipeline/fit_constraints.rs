@@ -6,6 +6,7 @@ use crate::lagrangian::FormulaConstraints;
 use crate::names::{pluralize, rounded};
 use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitConstraints, FitOptions};
+use crate::pipeline::thresholds::CONSTRAINT_STATES;
 use crate::recording::smooth::Smoothed;
 
 /// Constraints on recorded motion.
@@ -65,8 +66,14 @@ impl FitHeld {
         };
         let constraints =
             FormulaConstraints::new(&recording.coordinates, formulas).map_err(PipelineError::constraints)?;
-        let every =
-            measured.training.states.iter().map(|states| states.times.len()).sum::<usize>().div_ceil(STATES).max(1);
+        let every = measured
+            .training
+            .states
+            .iter()
+            .map(|states| states.times.len())
+            .sum::<usize>()
+            .div_ceil(CONSTRAINT_STATES)
+            .max(1);
         let n = recording.n();
         let some = |of: fn(&Smoothed) -> &Vec<f64>| -> Vec<f64> {
             let rows = measured.training.states.iter().flat_map(|states| of(states).chunks_exact(n));
@@ -109,6 +116,3 @@ impl FitHeld {
         )))
     }
 }
-
-/// States at which constraints are compared with each other.
-const STATES: usize = 24;

@@ -238,27 +238,10 @@ impl<'a, S: Scalar> Found<'a, S> {
 impl Summary<'_> {
     /// Data, losses and times of the run in words, with the table of smoothing errors.
     fn opening(&self, recording: &Recording) -> Findings {
-        let [training, validation, test] = self.samples;
-        let way = match self.targets {
-            Targets::Measured => "measured accelerations",
-            Targets::Smoothed => "smoothed accelerations",
-            Targets::Forces => "known forces",
-            Targets::Motion => "the motion itself (multiple shooting)",
-        };
-        let judged = match self.held_out {
-            HeldOut::Nothing => "best epoch chosen on the same samples, judged by nothing".to_string(),
-            held => {
-                let held = held.describe(recording);
-                format!("best epoch chosen on {validation} samples, judged on {test} that were held out: {held}")
-            }
-        };
         let mut findings = Findings::default();
-        let (samples, trajectories) = (pluralize(training, "sample", "samples"), self.trajectories[0]);
-        let trajectories = pluralize(trajectories, "trajectory", "trajectories");
-        findings.heading("Data and training").line(format!("learned from {way}: {samples} of {trajectories}"));
-        findings.lines(self.time_steps.lines()).line(judged).gap();
+        findings.heading("Data and training").line(self.learned_from());
+        findings.lines(self.time_steps.lines()).line(self.judged_on(recording)).gap();
         let row = |c: &Coordinate| {
-            let lost = "no larger than its error".to_string();
             let error = c.acceleration_error_relative;
             vec![
                 c.name.clone(),
@@ -266,26 +249,11 @@ impl Summary<'_> {
                 number(c.window_seconds),
                 c.window_samples.to_string(),
                 number(c.acceleration_error),
-                if error.is_finite() { percentage(error) } else { lost },
+                if error.is_finite() { percentage(error) } else { "no larger than its error".to_string() },
             ]
         };
         findings.table(&SMOOTHING, self.coordinates.iter().map(row)).gap();
-        findings.line(format!(
-            "loss (paper) against those {}: validation {}{}; {}, {}, seed {}",
-            if self.targets == Targets::Forces {
-                "forces, each over the error to expect of it"
-            } else {
-                "accelerations"
-            },
-            number(self.validation_loss),
-            self.test_loss.map_or(String::new(), |loss| match loss {
-                x if x.is_finite() => format!(", held out {}", number(x)),
-                _ => ", held out not finite".to_string(),
-            }),
-            pluralize(self.epochs, "epoch", "epochs"),
-            pluralize(self.weights, "weight", "weights"),
-            self.seed
-        ));
+        findings.line(self.losses());
         if let Some(shooting) = &self.shooting {
             findings.line(format!(
                 "mean squared residual of predictions, in units of the noise: {} before, {} after {} over {} (1 is noise alone)",
@@ -314,5 +282,48 @@ impl Summary<'_> {
         }
         findings.line(format!("{:.1} s of training, {:.1} s in all", self.training_seconds, self.wall_seconds));
         findings
+    }
+
+    /// What the network learned from.
+    fn learned_from(&self) -> String {
+        let source = match self.targets {
+            Targets::Measured => "measured accelerations",
+            Targets::Smoothed => "smoothed accelerations",
+            Targets::Forces => "known forces",
+            Targets::Motion => "the motion itself (multiple shooting)",
+        };
+        let samples = pluralize(self.samples[0], "sample", "samples");
+        format!("learned from {source}: {samples} of {}", pluralize(self.trajectories[0], "trajectory", "trajectories"))
+    }
+
+    /// What chose the epoch, and what tested the model.
+    fn judged_on(&self, recording: &Recording) -> String {
+        let [_, validation, test] = self.samples;
+        match self.held_out {
+            HeldOut::Nothing => "best epoch chosen on the same samples; nothing was held out for a test".to_string(),
+            held => {
+                let held = held.describe(recording);
+                format!("best epoch chosen on {validation} samples, judged on {test} that were held out: {held}")
+            }
+        }
+    }
+
+    /// Losses, epochs and weights.
+    fn losses(&self) -> String {
+        let of = match self.targets {
+            Targets::Forces => "forces, each divided by its expected error",
+            _ => "accelerations",
+        };
+        let held_out = self.test_loss.map_or(String::new(), |loss| match loss {
+            x if x.is_finite() => format!(", held out {}", number(x)),
+            _ => ", held out not finite".to_string(),
+        });
+        format!(
+            "loss (paper) against those {of}: validation {}{held_out}; {}, {}, seed {}",
+            number(self.validation_loss),
+            pluralize(self.epochs, "epoch", "epochs"),
+            pluralize(self.weights, "weight", "weights"),
+            self.seed
+        )
     }
 }

@@ -4,11 +4,8 @@ use crate::data::{Dataset, force_spreads};
 use crate::lagrangian::{MechanicsError, inverse_dynamics};
 use crate::names::{number, percentage};
 use crate::network::NetworkLagrangian;
+use crate::pipeline::thresholds::{FAILED_FORCE, WELL_LEARNED_FORCE};
 use serde::Serialize;
-
-/// Largest mean squared error of a force, over its variance, at which it is well learned, and at which it is learned at all.
-const WELL: f64 = 0.05;
-const FAILED: f64 = 0.3;
 
 /// Error of the force of one coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -35,7 +32,7 @@ impl ForceError {
 
     /// `true` for a force that the model does not reproduce.
     pub(crate) fn is_lost(&self) -> bool {
-        self.nmse.is_nan() || self.nmse > FAILED
+        self.nmse.is_nan() || self.nmse > FAILED_FORCE
     }
 }
 
@@ -64,7 +61,7 @@ pub(crate) fn judged(errors: &[ForceError]) -> String {
     let lost: Vec<&str> = errors.iter().filter(|e| e.is_lost()).map(|e| e.name.as_str()).collect();
     let worst = errors.iter().map(|e| e.nmse).fold(0.0, |worst: f64, x| if x.is_nan() { x } else { worst.max(x) });
     let verdict = match lost.len() {
-        0 if worst <= WELL => {
+        0 if worst <= WELL_LEARNED_FORCE => {
             "good: the learned Lagrangian gives the forces of motion that it has not seen".to_string()
         }
         0 => "limited: the learned Lagrangian gives the forces of motion that it has not seen roughly".to_string(),

@@ -10,16 +10,7 @@ use crate::pipeline::determination::Determined;
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::force_errors::{ForceError, judged as judged_by_forces};
 use crate::pipeline::hold_out::{HoldOut, factor, is_better};
-
-/// Share of states of wrong signature at and above which it is worth a remark.
-const MOST_WRONG: f64 = 0.01;
-/// Lyapunov times at and above which predictions of chaotic motion are good: errors grew e^3 = 20 times.
-const MANY_TIMES: f64 = 3.0;
-/// Share of the tested time below which predictions of non-chaotic motion are bad.
-const FEW: f64 = 0.01;
-
-/// Energy that may be lost or gained without a force or friction, over the mean kinetic energy.
-const LOST: f64 = 0.1;
+use crate::pipeline::thresholds::{BAD_SHARE_OF_TIME, GOOD_LYAPUNOV_TIMES, MOST_WRONG_SIGNATURES, UNACCOUNTED_ENERGY};
 
 /// A headline.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,7 +74,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     };
     let predicts = found.valid_time.as_ref().map(|valid| predicted(valid, found.tested, spoken(&found.time_unit)));
     let wrong = match found.wrong_signature {
-        share if share > MOST_WRONG => {
+        share if share > MOST_WRONG_SIGNATURES => {
             format!(" At {} of the states its mass matrix has the wrong signature.", percent(share))
         }
         _ => String::new(),
@@ -122,10 +113,10 @@ fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
         return format!("good: the learned Lagrangian predicts the motion for all of the {tested} that were tested");
     }
     match valid.lyapunov_times {
-        Some(times) if times >= MANY_TIMES => {
+        Some(times) if times >= GOOD_LYAPUNOV_TIMES => {
             format!("good: the learned Lagrangian predicts the chaotic motion for {time}, of {tested} that were tested")
         }
-        times if times.map_or(valid.median < FEW * until, |times| times < 1.0) => {
+        times if times.map_or(valid.median < BAD_SHARE_OF_TIME * until, |times| times < 1.0) => {
             format!("bad: predictions are useful for no more than {time}; {tested} were tested")
         }
         _ => format!("limited: useful for {time} of prediction, and wrong beyond; {tested} were tested"),
@@ -177,7 +168,7 @@ fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
         all.push(format!("{} of the held-out states lie outside the learned ones", percent(share)));
     }
     match found.energy.map(|balance| balance.unaccounted()) {
-        Some(share) if share <= LOST => {}
+        Some(share) if share <= UNACCOUNTED_ENERGY => {}
         Some(share) if share.is_finite() => {
             all.push(format!("energy of {} of the mean kinetic energy is not accounted for", percent(share)));
         }
@@ -321,18 +312,14 @@ mod tests {
     use crate::pipeline::hold_out::{CoordinatePredictions, UsefulTime};
     use crate::report::Report;
 
+    fn valid(median: f64, at_least: bool) -> ValidTimes {
+        let (lyapunov_times, lyapunov_at_least) = (None, false);
+        ValidTimes { threshold: VALID, median, at_least, starts: 4, lyapunov_times, lyapunov_at_least, chaotic: 0 }
+    }
+
     #[test]
     fn headlines_of_predictions_say_good_or_bad() {
         let error = |median: f64| PredictionError { seconds: 0.5, rms: 1.0, median, p90: 2.0, windows: 9, missing: 0 };
-        let valid = |median, at_least| ValidTimes {
-            threshold: VALID,
-            median,
-            at_least,
-            starts: 4,
-            lyapunov_times: None,
-            lyapunov_at_least: false,
-            chaotic: 0,
-        };
         let said = |model: f64, seconds: f64, at_least: bool, (until, open): (f64, bool)| {
             let found = HoldOut {
                 error_unit: "rad",
@@ -340,15 +327,8 @@ mod tests {
                 constant_velocity: vec![error(1.0)],
                 valid_time: Some(valid(until, open)),
                 useful_time: Some(UsefulTime { seconds, at_least }),
-                fastest_period: Some(0.5),
-                by_coordinate: Vec::new(),
-                given_up: String::new(),
                 wrong_signature: 0.0,
-                energy: None,
-                force_errors: Vec::new(),
-                figures: Vec::new(),
-                predicted: Default::default(),
-                error_scales: Default::default(),
+                ..HoldOut::nothing()
             };
             of_network("swing", &found, &[]).sentence
         };
@@ -416,15 +396,7 @@ mod tests {
 
     #[test]
     fn valid_times_say_what_they_are() {
-        let plain = ValidTimes {
-            threshold: VALID,
-            median: 12.34,
-            at_least: false,
-            starts: 4,
-            lyapunov_times: None,
-            lyapunov_at_least: false,
-            chaotic: 0,
-        };
+        let plain = valid(12.34, false);
         assert_eq!(valid_time(&plain, "s"), "12.3 s");
         assert_eq!(valid_time(&ValidTimes { median: 100.0, at_least: true, ..plain }, "m"), "at least 100 m");
         let chaotic = ValidTimes { lyapunov_times: Some(8.41), ..plain };

@@ -4,7 +4,7 @@ use crate::analysis::{
     PredictionError, Predictions, ValidTimes, Window, coordinate_errors, predict_by_constant_velocity,
     prediction_error, spread, window_valid_times,
 };
-use crate::data::Split;
+use crate::data::{Split, StateEstimate};
 use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use crate::linalg::{SignatureBuffers, has_signature};
@@ -14,22 +14,17 @@ use crate::pipeline::energy::{Balance, balance, energy_figure};
 use crate::pipeline::force_errors::ForceError;
 use crate::pipeline::judging::Judging;
 use crate::pipeline::prediction::HeldOutPredictions;
+use crate::pipeline::thresholds::{
+    BETTER_THAN_CONSTANT_VELOCITY, CURVE_TIMES, MOST_WINDOWS, SAMPLES_AHEAD, SIGNATURE_STATES, STATES_AT_ONCE,
+    TABLE_TIMES,
+};
 use crate::pipeline::{PipelineError, Watch};
-use crate::recording::Smoothed;
+use crate::recording::{Recording, Smoothed};
 use crate::report::{Figure, LinePlot, Polar, Series, Turn, figure, line_plot, median_of, trace_plot, with_unit};
 use crate::rollout::SampledForce;
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::slice;
-
-/// Windows that are predicted at most; of more, evenly spaced ones.
-const WINDOWS: usize = 500;
-/// Samples ahead that are predicted by default.
-const AHEAD: f64 = 200.0;
-/// Points of a curve of prediction errors.
-const POINTS: usize = 40;
-/// Times ahead of a table of them.
-const TIMES: usize = 4;
 
 /// Held-out motion that tests a model, and the test's settings.
 #[derive(Clone, Copy, Debug)]
@@ -120,91 +115,131 @@ pub fn evaluate_hold_out(
     options: &HoldOutOptions<'_>,
     watch: &Watch,
 ) -> Result<HoldOut, PipelineError> {
-    let (judging, plan) = (&Judging::new(watch, WINDOWS), options);
-    let (n, recording) = (model.coordinates(), &plan.part.recording);
+    let (judging, part) = (&Judging::new(watch, MOST_WINDOWS), options.part);
+    let recording = &part.recording;
     if recording.tracks.is_empty() {
         return Ok(HoldOut::nothing());
     }
-    let periodic = &recording.periodic;
-    let positions: Vec<f64> = recording.tracks.iter().flat_map(|track| track.q.iter().copied()).collect();
-    let spread = spread(&positions, periodic);
-    let units = periodic.iter().map(|angle| if *angle { "rad" } else { "SI" }).collect::<Vec<_>>();
-    let unlike = units.iter().any(|unit| *unit != units[0]);
-    let (unit, scales) =
-        if unlike { ("of the spread of the motion", spread.clone()) } else { (units[0], vec![1.0; n]) };
-    let period = fastest_period(plan.part);
-    let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part, period));
-    let mut windows: Vec<Window> = plan
-        .part
-        .estimated()
-        .iter()
-        .zip(&plan.part.states)
-        .flat_map(|(e, states)| {
-            let samples = states.interior().start..e.track.len();
-            Window::unseen(*e, &states.reach, (samples, n), horizon)
-        })
-        .collect();
-    let stride = windows.len().div_ceil(WINDOWS).max(1);
-    windows = windows.into_iter().step_by(stride).collect();
-    if let Some(manifold) = model.manifold() {
-        // A start without a way to the constraints is one whose prediction is given up.
-        for Window { q, v, .. } in &mut windows {
-            let _ = project(manifold, q, v);
-        }
-    }
+    let period = fastest_period(part);
+    let horizon = options.horizon.unwrap_or_else(|| horizon(part, period));
+    let windows = windows(model, part, horizon);
     let watched = judging.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
-    let predicted = HeldOutPredictions::new(model, windows, plan.threads, judging)?;
+    let predicted = HeldOutPredictions::new(model, windows, options.threads, judging)?;
+    let measures = ErrorMeasures::of(part, horizon);
     let (windows, motion) = (&predicted.windows, &predicted.predictions);
     let straight = predict_by_constant_velocity(windows);
-    let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
-        let times = (1..=count).map(|k| horizon * k as f64 / count as f64);
-        times.map(|t| prediction_error(windows, predictions, (periodic, &scales), t)).collect()
-    };
-    let valid = window_valid_times(windows, motion, periodic, &spread);
+    let valid = window_valid_times(windows, motion, &recording.periodic, &measures.spread);
     let valid_time = ValidTimes::of(&valid.into_iter().map(|valid| (valid, None)).collect::<Vec<_>>());
     let mut figures = Vec::new();
     let mut useful_time = None;
     if !windows.is_empty() {
-        figures = example_figures(plan, &predicted, (&scales, horizon));
-        let curves = [("model", errors(motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
+        figures = example_figures(options, &predicted, (&measures.scales, horizon));
+        let errors = |predictions| measures.errors(windows, predictions, CURVE_TIMES);
+        let curves = [("model", errors(motion)), ("constant velocity", errors(&straight))];
         useful_time = valid_time.as_ref().map(|valid| UsefulTime::new(valid, [&curves[0].1, &curves[1].1]));
-        let heading = "How the error of the prediction grows";
-        figures.extend(figure("prediction_error.svg", heading, line_plot(&error_plot(&curves, unit)), ERROR_CAPTION));
+        let (heading, drawn) =
+            ("How the error of the prediction grows", line_plot(&error_plot(&curves, measures.unit)));
+        figures.extend(figure("prediction_error.svg", heading, drawn, ERROR_CAPTION));
     }
-    figures.extend(energy_figure(model, plan.part));
+    figures.extend(energy_figure(model, part));
     if let Some(window) = windows.first() {
         figures.extend(constraint_figures(model, (&window.q, &window.v), horizon, (&recording.coordinates, "s")));
     }
-    let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, TIMES) };
-    let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
+    let (wrong_signature, energy) = (wrong_signature(model, part, options.time), balance(model, part));
     judging.check()?;
-    let (model, constant_velocity) = (tabled(motion), tabled(&straight));
-    let apart = |predictions: &Predictions| -> Vec<Vec<f64>> {
-        model.iter().map(|error| coordinate_errors(windows, predictions, periodic, error.seconds)).collect()
-    };
-    let (by_model, by_velocity) = (apart(motion), apart(&straight));
-    let column = |errors: &[Vec<f64>], i: usize| errors.iter().map(|row| row[i]).collect();
-    let coordinates = recording.coordinates.iter().zip(units).enumerate().map(|(i, (name, unit))| {
-        let (name, model, constant_velocity) = (name.clone(), column(&by_model, i), column(&by_velocity, i));
-        CoordinatePredictions { name, unit, model, constant_velocity }
-    });
+    let table_times = if windows.is_empty() { 0 } else { TABLE_TIMES };
+    let [model, constant_velocity] = [motion, &straight].map(|all| measures.errors(windows, all, table_times));
+    let times: Vec<f64> = model.iter().map(|error| error.seconds).collect();
     Ok(HoldOut {
-        error_unit: unit,
+        error_unit: measures.unit,
         model,
         valid_time,
         useful_time,
         fastest_period: period,
-        by_coordinate: coordinates.collect(),
+        by_coordinate: measures.by_coordinate(windows, [motion, &straight], &times),
         constant_velocity,
         given_up: predicted.remarks(),
         wrong_signature,
         energy,
         force_errors: Vec::new(),
         figures,
-        error_scales: (periodic.clone(), scales),
+        error_scales: (recording.periodic.clone(), measures.scales),
         predicted,
     })
+}
+
+/// The windows to predict, whose starts satisfy the constraints of the model; of too many, evenly spaced ones.
+fn windows(model: &dyn EulerLagrange<f64>, part: &Split, horizon: f64) -> Vec<Window> {
+    let estimated = part.estimated();
+    let of = |(estimate, states): (&StateEstimate<'_>, &Smoothed)| {
+        let samples = states.interior().start..estimate.track.len();
+        Window::unseen(*estimate, &states.reach, (samples, part.recording.n()), horizon)
+    };
+    let all: Vec<Window> = estimated.iter().zip(&part.states).flat_map(of).collect();
+    let stride = all.len().div_ceil(MOST_WINDOWS).max(1);
+    let mut windows: Vec<Window> = all.into_iter().step_by(stride).collect();
+    if let Some(manifold) = model.manifold() {
+        // The prediction from a start that cannot be projected onto the constraints is given up.
+        for Window { q, v, .. } in &mut windows {
+            let _ = project(manifold, q, v);
+        }
+    }
+    windows
+}
+
+/// How errors of predictions are measured.
+struct ErrorMeasures<'a> {
+    recording: &'a Recording,
+    /// Time of the longest predictions.
+    horizon: f64,
+    /// Spread of the motion of every coordinate.
+    spread: Vec<f64>,
+    /// Unit of the errors of every coordinate, and of all of them together.
+    units: Vec<&'static str>,
+    unit: &'static str,
+    /// By which the errors of the coordinates are divided before they are joined.
+    scales: Vec<f64>,
+}
+
+impl<'a> ErrorMeasures<'a> {
+    fn of(part: &'a Split, horizon: f64) -> Self {
+        let recording = &part.recording;
+        let positions: Vec<f64> = recording.tracks.iter().flat_map(|track| track.q.iter().copied()).collect();
+        let spread = spread(&positions, &recording.periodic);
+        let units: Vec<_> = recording.periodic.iter().map(|angle| if *angle { "rad" } else { "SI" }).collect();
+        let (unit, scales) = match units.iter().any(|unit| *unit != units[0]) {
+            true => ("of the spread of the motion", spread.clone()),
+            false => (units[0], vec![1.0; recording.n()]),
+        };
+        Self { recording, horizon, spread, units, unit, scales }
+    }
+
+    /// Errors at `count` evenly spaced times ahead.
+    fn errors(&self, windows: &[Window], predictions: &Predictions, count: usize) -> Vec<PredictionError> {
+        let times = (1..=count).map(|k| self.horizon * k as f64 / count as f64);
+        let measures = (&self.recording.periodic[..], &self.scales[..]);
+        times.map(|t| prediction_error(windows, predictions, measures, t)).collect()
+    }
+
+    /// Errors of every coordinate at these times, of the model and of constant velocity.
+    fn by_coordinate(
+        &self,
+        windows: &[Window],
+        predictions: [&Predictions; 2],
+        times: &[f64],
+    ) -> Vec<CoordinatePredictions> {
+        let [model, straight] = predictions.map(|all| -> Vec<Vec<f64>> {
+            times.iter().map(|t| coordinate_errors(windows, all, &self.recording.periodic, *t)).collect()
+        });
+        let column = |errors: &[Vec<f64>], i: usize| errors.iter().map(|row| row[i]).collect();
+        let coordinates = self.recording.coordinates.iter().zip(&self.units).enumerate();
+        let of = |(i, (name, unit)): (usize, (&String, &&'static str))| {
+            let (name, model, constant_velocity) = (name.clone(), column(&model, i), column(&straight, i));
+            CoordinatePredictions { name, unit, model, constant_velocity }
+        };
+        coordinates.map(of).collect()
+    }
 }
 
 const ERROR_CAPTION: &str = "Median over the held-out windows of the error of the predicted coordinates (root mean square over the coordinates), by \
@@ -238,7 +273,7 @@ fn fastest_period(part: &Split) -> Option<f64> {
     (0..n).map(of).filter(|period| *period <= longest).reduce(f64::min)
 }
 
-/// A quarter of the shortest of the long trajectories, at most [`AHEAD`] samples or one `period`. Half the time belongs to trajectories of a length or
+/// A quarter of the shortest of the long trajectories, at most [`SAMPLES_AHEAD`] samples or one `period`. Half the time belongs to trajectories of a length or
 /// longer ones; long is half as much: pieces between gaps do not shorten the horizon of the others.
 fn horizon(part: &Split, period: Option<f64>) -> f64 {
     let times = part.states.iter().map(|states| &states.times[states.interior()]);
@@ -254,7 +289,8 @@ fn horizon(part: &Split, period: Option<f64>) -> f64 {
     let long = usual.map_or(0.0, |(span, _)| 0.5 * span);
     let horizons = spans.iter().filter(|(span, _)| *span >= long);
     let period = period.unwrap_or(0.0);
-    let horizons = horizons.map(|(span, steps)| (0.25 * span).min((AHEAD * span / (*steps).max(1) as f64).max(period)));
+    let horizons =
+        horizons.map(|(span, steps)| (0.25 * span).min((SAMPLES_AHEAD * span / (*steps).max(1) as f64).max(period)));
     horizons.fold(f64::INFINITY, f64::min)
 }
 
@@ -316,11 +352,7 @@ fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, y_la
     let (measured, predicted) = (column(&window.measured), column(predicted));
     let all = measured.iter().chain(&predicted).map(|p| p.0);
     let turn = if periodic[i] { Turn::of(all) } else { None };
-    let line = |label: &str, path: Vec<(f64, f64)>| {
-        let path = turn.map_or_else(|| path.clone(), |turn| turn.fold(&path));
-        Series { points: path.into_iter().map(|(x, t)| (t, x)).collect(), ..Series::new(label, &[], &[]) }
-    };
-    let series = vec![line("measured", measured), line("predicted", predicted).over()];
+    let series = vec![Series::folded("measured", measured, turn), Series::folded("predicted", predicted, turn).over()];
     LinePlot { x_label: "time ahead [s]".into(), y_label, series, turn, ..LinePlot::default() }
 }
 
@@ -337,25 +369,19 @@ fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> Lin
     LinePlot { x_label, y_label, series, ..LinePlot::default() }
 }
 
-/// States evaluated at once.
-const CHUNK: usize = 4096;
-
-/// States whose mass matrix is examined, about; of more, evenly spaced ones.
-const STATES: usize = 20_000;
-
 /// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.
 fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<usize>) -> f64 {
     let n = model.coordinates();
     let (mut wrong, mut count) = (0, 0);
     let (mut terms, mut buffers) = (Terms::default(), SignatureBuffers::default());
-    let stride = part.recording.samples().div_ceil(STATES).max(1);
+    let stride = part.recording.samples().div_ceil(SIGNATURE_STATES).max(1);
     for states in &part.states {
         let rows = states.interior();
         let some = |values: &[f64]| -> Vec<f64> {
             values[rows.start * n..rows.end * n].chunks_exact(n).step_by(stride).flatten().copied().collect()
         };
         let (q, v) = (some(&states.q), some(&states.v));
-        for (q, v) in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
+        for (q, v) in q.chunks(STATES_AT_ONCE * n).zip(v.chunks(STATES_AT_ONCE * n)) {
             // Failures of single states leave matrices that are not finite.
             let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
             count += q.len() / n;
@@ -380,7 +406,7 @@ pub(crate) fn factor(model: &PredictionError, straight: &PredictionError) -> Opt
 
 /// `true` if the error of a prediction is at least a twentieth smaller than that of constant velocity.
 pub(crate) fn is_better(model: f64, straight: f64) -> bool {
-    straight / model >= 1.05
+    straight / model >= BETTER_THAN_CONSTANT_VELOCITY
 }
 
 impl UsefulTime {
@@ -514,15 +540,9 @@ mod tests {
             medians.into_iter().enumerate().map(error).collect()
         };
         let useful = |model, straight, median, at_least| {
-            let valid = ValidTimes {
-                threshold: crate::analysis::VALID,
-                median,
-                at_least,
-                starts: 9,
-                lyapunov_times: None,
-                lyapunov_at_least: false,
-                chaotic: 0,
-            };
+            let (threshold, lyapunov_times, lyapunov_at_least) = (crate::analysis::VALID, None, false);
+            let valid =
+                ValidTimes { threshold, median, at_least, starts: 9, lyapunov_times, lyapunov_at_least, chaotic: 0 };
             UsefulTime::new(&valid, [&errors(model), &errors(straight)])
         };
         let straight = [1.0, 2.0, 3.0, 4.0];

@@ -3,6 +3,7 @@
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Terms};
 use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
+use crate::pipeline::thresholds::EVALUATIONS_PER_REPORT;
 use crate::pipeline::{Event, PipelineError, Watch};
 use crate::training::{Epoch, StopReason};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -19,9 +20,6 @@ pub struct Unjudged {
     /// Why learning ended.
     pub stop: StopReason,
 }
-
-/// Evaluations between two reports.
-const OFTEN: u64 = 1024;
 
 /// Reports progress and honours the flag.
 #[derive(Debug)]
@@ -81,7 +79,7 @@ impl EulerLagrange<f64> for Watched<'_> {
     fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
         let Judging { watch, evaluations, .. } = self.judging;
         let before = evaluations.fetch_add(1, Ordering::Relaxed);
-        if before % OFTEN == 0 {
+        if before % EVALUATIONS_PER_REPORT == 0 {
             watch.say(Event::Evaluations(before));
         }
         if self.judging.is_interrupted() {

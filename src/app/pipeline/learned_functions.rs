@@ -5,24 +5,12 @@
 use crate::analysis::{Axis, Grid, MetricComponent, element_factor, grid_points, metric_grids};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::pipeline::determination::Determined;
+use crate::pipeline::thresholds::{
+    FUNCTION_POINTS, MOMENTUM_STEP, MOST_MAPS, MOST_MARKS, NEAR_MAP, SHOWN_OFF_DIAGONAL, WHOLE_TURN,
+};
 use crate::recording::Recording;
 use crate::report::{Figure, LinePlot, QuantityMap, Series, figure, file_part, line_plot, quantity_figure};
 use std::f64::consts::{PI, TAU};
-
-/// Points of a curve.
-const CURVE: usize = 161;
-/// Step of the differences of momenta over the range of a coordinate.
-const STEP: f64 = 1e-4;
-/// Largest number of components of a matrix that are drawn.
-pub(super) const MAPS: usize = 10;
-/// Off-diagonal components are drawn if their root mean square exceeds this part of that on the diagonal.
-const SHOWN: f64 = 0.02;
-/// Share of a turn at and above which an angle is shown over all of it.
-const WHOLE_TURN: f64 = 0.9;
-/// Largest number of recorded positions that are marked in a map.
-const MARKS: usize = 400;
-/// Share of the range of a coordinate within which a recorded position counts as near.
-const NEAR: f64 = 0.1;
 
 /// A learned model, next to the exact one if that is known.
 #[derive(Clone, Copy)]
@@ -74,7 +62,7 @@ impl Picturing<'_> {
         if x == y {
             return Self { ranges, ..self };
         }
-        let stride = recording.samples().div_ceil(MARKS).max(1);
+        let stride = recording.samples().div_ceil(MOST_MARKS).max(1);
         let places = recording.tracks.iter().flat_map(|track| track.q.chunks_exact(n).step_by(stride));
         let marks = places.map(|q| (folds[x](q[x]), folds[y](q[y]))).collect();
         Self { ranges, marks, ..self }
@@ -126,7 +114,7 @@ impl Picturing<'_> {
         if self.marks.is_empty() {
             return (Vec::new(), String::new());
         }
-        let [near_x, near_y] = self.shown.map(|i| NEAR * (self.ranges[i][1] - self.ranges[i][0]));
+        let [near_x, near_y] = self.shown.map(|i| NEAR_MAP * (self.ranges[i][1] - self.ranges[i][0]));
         let near = |(x, y): (f64, f64), (u, w): &(f64, f64)| ((x - u) / near_x).hypot((y - w) / near_y) <= 1.0;
         let place = |k: usize| !self.marks.iter().any(|mark| near(grid.point(k), mark));
         let open: Vec<bool> = (0..grid.values.len()).map(place).collect();
@@ -149,7 +137,7 @@ impl Picturing<'_> {
         open: Option<String>,
     ) -> Option<Figure> {
         let [from, to] = self.ranges[i];
-        let x = Axis { component: i, from, to, points: CURVE }.values();
+        let x = Axis { component: i, from, to, points: FUNCTION_POINTS }.values();
         let middle = self.middle();
         let q: Vec<f64> =
             x.iter().flat_map(|x| middle.iter().enumerate().map(move |(k, m)| if k == i { *x } else { *m })).collect();
@@ -212,7 +200,7 @@ impl Picturing<'_> {
         let diagonal = |i: usize| components.iter().find(|c| c.indices == [i; 2]).map_or(0.0, size);
         let matters = |component: &MetricComponent| {
             let [i, j] = component.indices;
-            i == j || size(component) > SHOWN * (diagonal(i) * diagonal(j)).sqrt()
+            i == j || size(component) > SHOWN_OFF_DIAGONAL * (diagonal(i) * diagonal(j)).sqrt()
         };
         let grids = |model: &dyn EulerLagrange<f64>| metric_grids(model, &self.middle(), self.axes(side)).into_iter();
         let (learned, mut exact) = (grids(pair.learned), pair.exact.map(grids));
@@ -230,10 +218,10 @@ impl Picturing<'_> {
                 maps.push((texts, learned.map(|m| element_factor(row, column) * m), exact, open));
             }
         }
-        let more = maps.len().saturating_sub(MAPS);
+        let more = maps.len().saturating_sub(MOST_MAPS);
         let drawn = maps
             .into_iter()
-            .take(MAPS)
+            .take(MOST_MAPS)
             .filter_map(|(texts, learned, exact, open)| self.map(texts, learned, exact, open));
         (drawn.collect(), more)
     }
@@ -241,7 +229,7 @@ impl Picturing<'_> {
     /// The gyroscopic field, such as that of a magnet or a rotating frame; none for a model whose momenta vanish at rest.
     pub fn gyroscopic(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
         let n = self.names.len();
-        let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).take(MAPS);
+        let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).take(MOST_MAPS);
         let drawn = pairs.filter_map(|[i, j]| {
             let grid = |model| self.grid(side, |q| self.field(model, q, [i, j]));
             let (learned, exact) = (grid(pair.learned).map(|f| pair.factor * f), pair.exact.map(grid));
@@ -259,7 +247,7 @@ impl Picturing<'_> {
         let n = self.names.len();
         let difference = |along: usize, of: usize| -> Vec<f64> {
             let [low, high] = self.ranges[along];
-            let step = STEP * (high - low);
+            let step = MOMENTUM_STEP * (high - low);
             let [before, after] = [-step, step].map(|step| {
                 let mut moved = q.to_vec();
                 moved.iter_mut().skip(along).step_by(n).for_each(|x| *x += step);
@@ -284,7 +272,7 @@ impl Picturing<'_> {
         };
         let drawn = (0..n).filter_map(|i| {
             let [from, to] = velocities[i];
-            let x = Axis { component: i, from, to, points: CURVE }.values();
+            let x = Axis { component: i, from, to, points: FUNCTION_POINTS }.values();
             let learned: Vec<f64> = of(pair.learned, i, &x).iter().map(|f| pair.factor * f).collect();
             let exact = pair.exact.map(|exact| of(exact, i, &x)).filter(|exact| !exact.is_empty());
             if learned.is_empty() && exact.is_none() {
@@ -343,7 +331,7 @@ fn aligned(learned: Vec<f64>, exact: Option<Vec<f64>>) -> (Vec<f64>, Option<Vec<
     (shifted(&learned, mean), Some(exact))
 }
 
-/// `true` for values that are one number but for rounding.
+/// `true` for values that are equal up to rounding.
 fn is_flat(values: &[f64]) -> bool {
     values.iter().filter(|x| x.is_finite()).all(|x| x.abs() <= 1e-12)
 }

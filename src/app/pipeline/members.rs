@@ -12,6 +12,7 @@ use crate::pipeline::fit::{FitReport, judge};
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::prepared_fit::PreparedFit;
+use crate::pipeline::thresholds::MAX_RESULT_BYTES;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{Event, InMemory, MODEL, Output, PipelineError, SUMMARY, Watch, fit};
 use crate::storage::read_regular;
@@ -19,9 +20,6 @@ use crate::symmetry::{Chart, SymmetryError};
 use crate::training::StopReason;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// Longest file that is read of an earlier run, in bytes.
-const MAX_BYTES: u64 = 1 << 26;
 
 /// One of the networks.
 #[derive(Clone, Debug, Serialize)]
@@ -219,7 +217,7 @@ pub(crate) fn kept_members(directory: &Path, config: &FitConfig) -> Vec<ModelFil
     struct Trained {
         each: Vec<serde::de::IgnoredAny>,
     }
-    let text = |name: &str| String::from_utf8(read_regular(&directory.join(name), MAX_BYTES).ok()?).ok();
+    let text = |name: &str| String::from_utf8(read_regular(&directory.join(name), MAX_RESULT_BYTES).ok()?).ok();
     let same = || toml::from_str::<FitConfig>(&text("config.toml")?).ok().map(|old| old.without_files());
     let found = text(SUMMARY).and_then(|text| serde_json::from_str::<Summary>(&text).ok());
     match found {

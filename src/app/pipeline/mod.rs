@@ -85,6 +85,7 @@ mod sweep;
 mod tables;
 #[doc(hidden)]
 pub mod text;
+mod thresholds;
 mod time_steps;
 mod train;
 mod watch;
@@ -110,7 +111,6 @@ pub use watch::{Event, Watch};
 #[doc(hidden)]
 pub use {
     checkpoints::{Begin, Checkpoints},
-    evaluation::RTOL,
     experiment::{Experiment, KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment},
     experiment_directory::{ExperimentDirectory, LockedDirectory},
     experiment_report::{Additions, ExperimentReport, Results},
@@ -123,4 +123,5 @@ pub use {
     run_file::Command,
     start::StartModel,
     tables::from_table,
+    thresholds::RTOL,
 };

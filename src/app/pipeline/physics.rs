@@ -16,30 +16,17 @@ use crate::network::{NetworkLagrangian, Structure};
 use crate::pipeline::PipelineError;
 use crate::pipeline::determination::Determined;
 use crate::pipeline::equivalence::{Equivalence, gauge_functions};
-use crate::pipeline::learned_functions::{MAPS, Pair, Picturing};
+use crate::pipeline::learned_functions::{Pair, Picturing};
+use crate::pipeline::thresholds::{
+    CERTIFICATE_BOXES, CERTIFICATE_WORK, CURVATURE_POINTS, CURVATURE_WORK, LEAST_MAP_POINTS, METRIC_POINTS,
+    METRIC_WORK, MOST_MAPS, PHYSICS_SEED,
+};
 use crate::recording::Recording;
 use crate::report::Figure;
 use crate::rollout::{Domain, Trajectory};
 use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Largest number of points for the curvature, and of points along each axis of its map.
-const POINTS: (usize, usize) = (100, 21);
-/// Largest number of points along each axis of a map of the metric.
-const METRIC_POINTS: usize = 41;
-/// Points of a map along each axis that are worth a picture.
-const WORTH: usize = 8;
-/// Largest product of weights, `n` and points of the maps of a metric: a second or so.
-const METRIC_WORK: usize = 150_000_000;
-/// Largest product of weights, `n^3` and points of the curvature: a second or so.
-const CURVATURE_WORK: usize = 100_000_000;
-/// Largest product of weights, `n^2` and boxes of a certificate: a second or so.
-const BOXES_WORK: usize = 80_000_000;
-/// Largest number of boxes of a certificate.
-const BOXES: usize = 2000;
-/// Seed of the states that are examined.
-const SEED: u64 = 0;
 
 /// Curvature scalar of the learned metric at rest, times the factor up to which a Lagrangian is determined.
 #[derive(Clone, Debug, Serialize)]
@@ -114,7 +101,7 @@ pub struct ProvenSignature {
 }
 
 /// Physics of a model over a region of states.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Physics {
     /// Bounds of the states that were examined, by column.
     pub region: BTreeMap<String, [f64; 2]>,
@@ -189,21 +176,12 @@ impl Physics {
         let ranges = region.position.iter().chain(&region.velocity).copied();
         Self {
             region: subject.columns.iter().cloned().zip(ranges).collect(),
-            equivalence: None,
-            metric: Vec::new(),
-            curvature_scalar: None,
-            symmetries: None,
-            exact_symmetries: None,
-            charges: Vec::new(),
-            charges_until: 0.0,
-            signature: None,
-            left_out: Vec::new(),
             coordinates: subject.columns[..subject.network.coordinates()].to_vec(),
-            figures: Vec::new(),
+            ..Self::default()
         }
     }
 
-    /// Computes part after part; the parts before an error are complete.
+    /// Computes one part after another; parts before an error are complete.
     ///
     /// # Errors
     /// Those of [`Physics::new`].
@@ -237,7 +215,7 @@ impl Physics {
     /// Functions of the Lagrangian, of geodesics the metric and its curvature.
     fn find_geometry(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
-        let (q, v) = subject.states(region, POINTS.0);
+        let (q, v) = subject.states(region, CURVATURE_POINTS.0);
         if q.is_empty() {
             return;
         }
@@ -274,7 +252,7 @@ impl Physics {
         let points = METRIC_WORK / (network.weights().len() * n).max(1);
         let side = points.isqrt().min(METRIC_POINTS);
         let time = subject.time_like();
-        if side < WORTH {
+        if side < LEAST_MAP_POINTS {
             self.left_out.push("maps of the learned functions: too many weights for pictures in a second".into());
         } else {
             // The Lagrangian at rest of a known system has a map of its own.
@@ -286,10 +264,10 @@ impl Physics {
             self.figures.extend(maps);
             if more > 0 {
                 let what = if metric { "metric" } else { "mass matrix" };
-                self.left_out.push(format!("maps of {more} components of the {what} beyond the first {MAPS}"));
+                self.left_out.push(format!("maps of {more} components of the {what} beyond the first {MOST_MAPS}"));
             }
             if !metric && time.is_none() {
-                self.figures.extend(picturing.gyroscopic(pair, (side / 2).max(WORTH)));
+                self.figures.extend(picturing.gyroscopic(pair, (side / 2).max(LEAST_MAP_POINTS)));
             }
             self.figures.extend(picturing.friction(pair, &region.velocity));
         }
@@ -326,8 +304,8 @@ impl Physics {
             learned: Spread::of(&scaled(curvature_scalars(learned, q))),
             exact: exact.map(|exact| Spread::of(&curvature_scalars(exact, q))),
         });
-        let side = most.saturating_sub(q.len() / n).isqrt().min(POINTS.1);
-        if side < WORTH {
+        let side = most.saturating_sub(q.len() / n).isqrt().min(CURVATURE_POINTS.1);
+        if side < LEAST_MAP_POINTS {
             self.left_out.push("map of the curvature scalar: too many weights for a picture in a second".into());
             return;
         }
@@ -390,10 +368,10 @@ impl Physics {
         let network = subject.network;
         let n = network.coordinates();
         let signature = Signature::of(n, subject.time_like().is_some());
-        let boxes = BOXES_WORK / (network.weights().len() * n.pow(2)).max(1);
+        let boxes = CERTIFICATE_WORK / (network.weights().len() * n.pow(2)).max(1);
         let options = Options {
             seconds: f64::INFINITY,
-            boxes: boxes.clamp(1, BOXES),
+            boxes: boxes.clamp(1, CERTIFICATE_BOXES),
             threads: subject.threads,
             ..Options::new(signature)
         };
@@ -471,7 +449,7 @@ impl Subject<'_> {
                 |system: &SystemInstance<f64>| system.check_domain(q).is_ok() && system.impose_constraint(q, v).is_ok();
             self.system.is_none_or(fits)
         };
-        region.states(states, SEED, inside)
+        region.states(states, PHYSICS_SEED, inside)
     }
 
     fn charts(&self, region: &Region) -> Vec<Chart> {

@@ -4,14 +4,9 @@ use crate::analysis::{Predictions, Window, follow};
 use crate::lagrangian::EulerLagrange;
 use crate::pipeline::PipelineError;
 use crate::pipeline::judging::Judging;
+use crate::pipeline::thresholds::{PILOT_WINDOWS, WINDOWS_AT_ONCE};
 use crate::rollout::RolloutError;
 use std::collections::BTreeMap;
-
-/// Windows that are tried first, evenly spaced: if more than half of them are given up, the rest would be too, each after
-/// as many steps as are allowed.
-const PILOT: usize = 40;
-/// Windows between two looks at the bar; a multiple of the motions that are integrated together.
-const PART: usize = 32;
 
 /// Windows with the predictions of a model.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +33,7 @@ impl HeldOutPredictions {
         judging: &Judging<'_>,
     ) -> Result<Self, PipelineError> {
         let all = windows.len();
-        let stride = all.div_ceil(PILOT).max(1);
+        let stride = all.div_ceil(PILOT_WINDOWS).max(1);
         let mut found = Self { windows: Vec::new(), predictions: Vec::new(), all, given_up: BTreeMap::new() };
         if stride > 1 {
             let pilot: Vec<Window> = windows.iter().step_by(stride).cloned().collect();
@@ -88,7 +83,7 @@ fn in_parts(
     judging: &Judging<'_>,
 ) -> Result<(Predictions, Vec<Option<RolloutError>>), PipelineError> {
     let (mut predictions, mut stops) = (Vec::with_capacity(windows.len()), Vec::with_capacity(windows.len()));
-    for part in windows.chunks(PART) {
+    for part in windows.chunks(WINDOWS_AT_ONCE) {
         let (foretold, ended) = follow(model, part, threads);
         judging.advance(part.len());
         judging.check()?;
@@ -130,7 +125,7 @@ mod tests {
         let watch = Watch::default();
         let judging = Judging::new(&watch, 1);
         let found = HeldOutPredictions::new(&SINGULAR, windows(400), 2, &judging).unwrap();
-        assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT, PILOT, 400));
+        assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT_WINDOWS, PILOT_WINDOWS, 400));
         let remarks = found.remarks();
         assert!(remarks.starts_with("40 of 40 predictions were given up: 40 by a singular mass matrix"), "{remarks}");
         assert!(remarks.contains("only 40 of 400 windows"), "{remarks}");

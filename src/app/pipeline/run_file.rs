@@ -1,12 +1,10 @@
 //! `run.json`: the command that fills a directory.
 
+use crate::pipeline::thresholds::MAX_RUN_BYTES;
 use crate::pipeline::{Output, PipelineError, RUN};
 use crate::storage::read_regular;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// Size in bytes of the longest `run.json` that is read.
-const MAX_BYTES: u64 = 1 << 12;
 
 /// Command that fills a directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -66,7 +64,7 @@ impl Command {
     /// # Errors
     /// What is wrong with the file, in words.
     pub fn of(directory: &Path) -> Result<Self, String> {
-        let bytes = read_regular(&directory.join(RUN), MAX_BYTES).map_err(|error| format!("{RUN}: {error}"))?;
+        let bytes = read_regular(&directory.join(RUN), MAX_RUN_BYTES).map_err(|error| format!("{RUN}: {error}"))?;
         serde_json::from_slice::<RunFile>(&bytes).map(|file| file.command).map_err(|error| format!("{RUN}: {error}"))
     }
 }

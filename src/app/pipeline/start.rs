@@ -104,6 +104,6 @@ fn differences(asked: &Architecture, model: &Architecture) -> Vec<String> {
     let shown = |value: &Value| if value.is_null() { "none".to_string() } else { value.to_string() };
     let differing = all.iter().filter(|name| asked[name.as_str()] != model[name.as_str()]);
     differing
-        .map(|name| format!("{name} {} asked for, {} in the model", shown(&asked[name]), shown(&model[name])))
+        .map(|name| format!("{name} {} requested, {} in the model", shown(&asked[name]), shown(&model[name])))
         .collect()
 }

@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 use toml::Value;
 
-/// A value from a table. Everything is read from tables, not from texts, so that the code of every type is compiled for one format.
+/// A value from a table. Types are read only from tables, not from text, so that their code is compiled for a single format.
 ///
 /// # Errors
 /// The path of the rejected key, such as `phase[0].rate`, and what is wrong there.

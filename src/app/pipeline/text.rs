@@ -69,7 +69,7 @@ pub fn lines(text: &str) -> Lines {
     found
 }
 
-/// Notes the lines of the keys of a table.
+/// Records the lines of the keys of a table.
 fn note_lines(table: &DeTable<'_>, before: &str, line: &dyn Fn(usize) -> usize, found: &mut Lines) {
     for (key, value) in table {
         let name: &str = key.get_ref();

@@ -2,6 +2,7 @@
 
 use crate::data::Split;
 use crate::names::{percent, pluralize};
+use crate::pipeline::thresholds::ROUNDING_OF_TIME_STEPS;
 use crate::recording::{Bridged, Clock, LoadedRecording, Targets};
 use serde::Serialize;
 
@@ -49,7 +50,7 @@ impl TimeSteps {
         if self.cuts > 0 {
             parts.push(format!("{} trajectories", pluralize(self.cuts, "long gap cuts", "long gaps cut")));
         }
-        if self.jitter > ROUNDING {
+        if self.jitter > ROUNDING_OF_TIME_STEPS {
             parts.push(format!("time steps vary by {}", percent(self.jitter)));
         }
         if parts.is_empty() {
@@ -64,6 +65,3 @@ impl TimeSteps {
         vec![parts.join("; "), lost]
     }
 }
-
-/// Jitter up to this size is rounding of the times.
-const ROUNDING: f64 = 1e-6;

@@ -1,22 +1,23 @@
 //! A training from its configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
-use crate::configuration::{Config, Phase, Precision};
-use crate::data::{Dataset, Datasets, sample_all_until};
+use crate::configuration::{Config, Penalty, Phase, Precision, Regularizer};
+use crate::data::{Dataset, Datasets, sample_all, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
 use crate::findings::Findings;
-use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
-use crate::names::{number, pluralize};
+use crate::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
+use crate::names::{number, percent, pluralize};
 use crate::network::file::{Header, ModelFile};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
-use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
+use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, evaluate};
 use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{
     ended, history, parameter_table, training_pictures, write_page, write_report_and_figures,
 };
-use crate::pipeline::{Command, MODEL, Output, PipelineError, SUMMARY, Unjudged, Watch, memory, start};
+use crate::pipeline::thresholds::{PENALTY_STATES, RTOL, STARTS};
+use crate::pipeline::{Command, Event, MODEL, Output, PipelineError, SUMMARY, Unjudged, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resume, training_memory};
@@ -192,6 +193,9 @@ pub fn train(
     output: &dyn Output,
     watch: &Watch,
 ) -> Result<TrainReport, PipelineError> {
+    if let Some(note) = penalty_note(config, system) {
+        watch.say(Event::Note(&note));
+    }
     match config.precision {
         Precision::F32 => train_in::<f32>(config, system, options, output, watch),
         Precision::F64 => train_in::<f64>(config, system, options, output, watch),
@@ -358,4 +362,51 @@ fn header(
 pub(crate) fn write_model<S: Scalar>(output: &dyn Output, model: &ModelFile<S>) -> Result<(), PipelineError> {
     let bytes = model.to_bytes().map_err(|source| PipelineError::Model { path: MODEL.into(), source })?;
     output.write(MODEL, &bytes)
+}
+
+/// A note for a penalty that the exact metric violates at some of the training states.
+fn penalty_note(config: &Config, system: &SystemInstance<f64>) -> Option<String> {
+    let Regularizer::LorentzianSylvester { time, .. } = &config.penalty else { return None };
+    let share = percent(forbidden_share(config, system).filter(|share| *share > 0.0)?);
+    let advice = "as inside a horizon or an ergosphere: choose the penalty signature, or other bounds";
+    Some(format!("the penalty acts against g_{time}{time} > 0, which {share} of the states have, {advice}"))
+}
+
+/// Share of the training states at which the exact metric violates a penalty; `None` without such a penalty, or if it is unknown.
+fn forbidden_share(config: &Config, system: &SystemInstance<f64>) -> Option<f64> {
+    let Penalty::Sylvester { time: Some(time), .. } = config.penalty().ok()? else { return None };
+    let mut few = config.clone();
+    (few.data.training, few.data.validation, few.data.test) = (PENALTY_STATES, 1, 1);
+    let (data, _) = sample_all::<f64>(&few, system).ok()?;
+    let (set, n, mut terms) = (&data.training[0], system.coordinates, Terms::default());
+    system.build().ok()?.terms(set.q(), set.v(), Request::MASS_MATRIX, &mut terms).ok()?;
+    let forbidden = terms.mass_matrix.chunks_exact(n * n).filter(|g| g[time * n + time] > 0.0).count();
+    Some(forbidden as f64 / set.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+    use crate::network::Structure;
+    use crate::presets::Preset;
+
+    #[test]
+    fn a_penalty_is_known_to_forbid_the_inside_of_a_horizon() {
+        let share = |name: &str, radius: [f64; 2]| {
+            let system = configure::<f64>(name, &[]).unwrap();
+            let mut config = Preset::Quick.config(&system).unwrap();
+            config.take_structure(Structure::BlackBox);
+            config.penalty = Regularizer::LorentzianSylvester { lambda: 1.0, time: "t".to_string() };
+            config.data.shell_radius = config.data.shell_radius.map(|_| radius);
+            forbidden_share(&config, &system)
+        };
+        // The horizon of mass 1 is at 2.
+        assert_eq!(share("schwarzschild-cartesian", [3.0, 20.0]), Some(0.0));
+        assert_eq!(share("schwarzschild-cartesian", [1.0, 1.9]), Some(1.0));
+        assert!(share("schwarzschild-cartesian", [1.0, 4.0]).is_some_and(|share| (0.3..0.7).contains(&share)));
+        assert_eq!(share("ads4-geodesic", [0.0; 2]), Some(0.0));
+        let system = configure::<f64>("kepler", &[]).unwrap();
+        assert_eq!(forbidden_share(&Preset::Quick.config(&system).unwrap(), &system), None);
+    }
 }

@@ -200,10 +200,7 @@ fn over_time_of<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: 
         let angle = coordinate.periodic && k < n;
         let turn = if angle { Turn::of(values.iter().flatten().copied()) } else { None };
         let line = |((label, trajectory), values): ((&str, &Trajectory<S>), &Vec<f64>)| {
-            let swapped: Vec<(f64, f64)> = values.iter().copied().zip(times(trajectory)).collect();
-            let folded = turn.map_or_else(|| swapped.clone(), |turn| turn.fold(&swapped));
-            let points = folded.into_iter().map(|(x, t)| (t, x)).collect();
-            Series { points, ..Series::new(label, &[], &[]) }
+            Series::folded(label, values.iter().copied().zip(times(trajectory)).collect(), turn)
         };
         let [exact, learned] = [line((pair[0], &values[0])), line((pair[1], &values[1])).over()];
         let plot = over_time(system, &labels[k], false, vec![exact, learned]);

@@ -95,7 +95,7 @@ pub struct QuantityMap {
     pub quantity: String,
     /// Heading of the picture, such as `Curvature scalar R of the metric`.
     pub about: String,
-    /// Beginning of the file name, made fit for one.
+    /// Beginning of the file name; characters that file names cannot have are replaced.
     pub file: String,
     /// Labels of the horizontal and of the vertical axis, with units.
     pub labels: [String; 2],

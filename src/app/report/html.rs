@@ -151,7 +151,7 @@ impl Report {
         self.figure(("image/png", png), "", texts)
     }
 
-    /// Adds a picture from the bytes of an SVG file, with its heading and its caption, which can do nothing but be seen.
+    /// Adds a picture from the bytes of an SVG file, with its heading and its caption, embedded as an image, so that no script in it can run.
     #[must_use]
     pub fn image(self, svg: &[u8], texts: [&str; 2]) -> Self {
         // Panels that cannot wrap scroll if there is no room for them.

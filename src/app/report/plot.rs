@@ -48,6 +48,12 @@ impl Series {
         Self { name: name.into(), points: x.iter().copied().zip(y.iter().copied()).collect(), over: false }
     }
 
+    /// A line through points `(angle, other)`, the angle upwards and, if there is a turn, brought into it.
+    pub(crate) fn folded(name: &str, path: Vec<(f64, f64)>, turn: Option<Turn>) -> Self {
+        let path = turn.map_or_else(|| path.clone(), |turn| turn.fold(&path));
+        Self { name: name.into(), points: path.into_iter().map(|(x, other)| (other, x)).collect(), over: false }
+    }
+
     /// This line, drawn thin over the others.
     #[must_use]
     pub fn over(self) -> Self {

@@ -49,10 +49,10 @@ fn a_training_starts_from_a_model() {
     let refused = |more: &[&str], code, parts: &[&str]| {
         lnn(&[&["train", "--from", &file, "--out", &out("never")], more].concat()).refused(code, parts);
     };
-    let other = ["--from", "hidden [8] asked for, [16,16] in the model", "activation \"tanh\""];
+    let other = ["--from", "hidden [8] requested, [16,16] in the model", "activation \"tanh\""];
     refused(&["--hidden", "8", "--activation", "tanh"], 2, &other);
-    refused(&["triple-pendulum"], 2, &["another shape", "coordinates 3 asked for, 2 in the model"]);
-    refused(&["double-pendulum"], 2, &["periodic [true,true] asked for, [false,true] in the model"]);
+    refused(&["triple-pendulum"], 2, &["another shape", "coordinates 3 requested, 2 in the model"]);
+    refused(&["double-pendulum"], 2, &["periodic [true,true] requested, [false,true] in the model"]);
     lnn(&["train", "--from", &out("nowhere")]).refused(1, &["nowhere", "no such file"]);
     assert!(!folder.path("never").exists());
 }
@@ -91,7 +91,7 @@ fn a_fit_starts_from_a_model_and_holds_nothing_out() {
         (run.stdout, summary)
     };
     let (text, summary) = fit("all", &["--hold-out", "0", "--hidden", "8,8"]);
-    assert!(text.contains("judged by nothing") && text.contains("--hold-out 0"), "{text}");
+    assert!(text.contains("nothing was held out for a test") && text.contains("--hold-out 0"), "{text}");
     assert_eq!((&summary["held_out"], &summary["samples"]), (&"nothing".into(), &serde_json::json!([400, 400, 0])));
     assert!(summary["test_loss"].is_null() && summary["wrong_signature"].is_null() && summary["energy"].is_null());
     assert_eq!(summary["model"], serde_json::json!([]));
@@ -106,7 +106,7 @@ fn a_fit_starts_from_a_model_and_holds_nothing_out() {
     let other = lnn(&other);
     let told = other.stderr.lines().last().unwrap();
     assert!(other.code == Some(2) && told.starts_with("error: --from"), "{told}");
-    assert!(told.ends_with("hidden [4] asked for, [8,8] in the model"), "{told}");
+    assert!(told.ends_with("hidden [4] requested, [8,8] in the model"), "{told}");
 }
 
 #[test]

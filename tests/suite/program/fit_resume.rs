@@ -60,7 +60,7 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     assert!(folder.path("out/model.safetensors").is_file());
     lnn(&["train", "--resume", &out]).refused(1, &["this is a run of lnn fit, not of lnn train"]);
     let resume = |more: &[&str]| lnn(&[&["fit", "--resume", &out], more].concat());
-    resume(&["--seed", "4"]).refused(2, &["--resume", "training.seed", "4 asked for"]);
+    resume(&["--seed", "4"]).refused(2, &["--resume", "training.seed", "4 requested"]);
     resume(&["--out", &whole]).refused(2, &["--resume"]);
     let anew = lnn(&[&base[..], &["--out", &out]].concat());
     assert!(

@@ -118,7 +118,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
     assert!(folder.path("stopped").join(LATEST).exists());
 
     // Another configuration is refused, and so is beginning anew on top of what is there.
-    refused(&folder.resume("stopped", &["--seed", "5"]), 2, &["seed: 0 in the checkpoint, 5 asked for"]);
+    refused(&folder.resume("stopped", &["--seed", "5"]), 2, &["seed: 0 in the checkpoint, 5 requested"]);
     refused(
         &folder.resume("stopped", &["--epochs", "7"]),
         2,

@@ -58,7 +58,7 @@ fn a_run_goes_on_with_its_own_system_alone() {
     let resume = |file: &str| lnn(&["train", "--resume", &run, file]);
     resume(&file).succeeded();
     let changed = folder.file("my.toml", PENDULUM.replace("cos(theta)", "sin(theta)"));
-    resume(&changed).refused(2, &["--resume", "description.lagrangian", "asked for"]);
+    resume(&changed).refused(2, &["--resume", "description.lagrangian", "requested"]);
     // A comment changes nothing.
     resume(&folder.file("same.toml", format!("# the same\n{PENDULUM}"))).succeeded();
     // Its configuration with another file.

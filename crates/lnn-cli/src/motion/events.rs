@@ -2,15 +2,13 @@
 
 use crate::CliError;
 use crate::motion_source::MotionSource;
+use crate::thresholds::SHOWN_EVENTS;
 use lnn::findings::text_table;
 use lnn::names::{pluralize, rounded};
 use lnn::report::DataTable;
 use lnn::rollout::{Event, Occurrence};
 use serde_json::{Value, json};
 use std::path::Path;
-
-/// Rows that are printed; a file has all of them.
-const SHOWN: usize = 20;
 
 /// Columns of the energies of impacts.
 const ENERGIES: [&str; 3] = ["energy_before", "energy_after", "energy_lost"];
@@ -62,8 +60,8 @@ pub fn text(table: &DataTable) -> String {
         number => rounded(number.as_f64().unwrap_or(f64::NAN), 10),
     };
     let rows: Vec<Vec<String>> =
-        table.rows.iter().take(SHOWN).map(|row| row[..width].iter().map(cell).collect()).collect();
-    let more = match count.saturating_sub(SHOWN) {
+        table.rows.iter().take(SHOWN_EVENTS).map(|row| row[..width].iter().map(cell).collect()).collect();
+    let more = match count.saturating_sub(SHOWN_EVENTS) {
         0 => String::new(),
         more => format!("and {more} more, which --events writes\n"),
     };

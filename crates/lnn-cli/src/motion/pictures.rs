@@ -1,8 +1,8 @@
 //! Pictures of a roll-out: its coordinates over time, or a page.
 
-use super::Watch;
+use super::MotionRecord;
 use crate::CliError;
-use crate::files::cannot_write;
+use crate::files::{cannot_write, ends_in};
 use crate::tube::MotionTube;
 use lnn::report::{
     LinePlot, Picture, PlotError, Polar, Report, Series, by_unit, figure, line_plot, trace_plot, with_unit,
@@ -26,7 +26,7 @@ pub struct Texts<'a> {
     pub units: &'a [String],
 }
 
-impl Watch {
+impl MotionRecord {
     /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, depending on the extension of
     /// the file; with the limits of a tube around the coordinates, and with the path in the plane of polar coordinates.
     ///
@@ -42,7 +42,7 @@ impl Watch {
             units.extend(q.iter().flat_map(|unit| [unit.clone(), unit.clone()]));
         }
         let coordinates = self.picture((&names, &units), &positions, texts.parameter)?;
-        let bytes = if is_page(path) {
+        let bytes = if ends_in(path, &EXTENSIONS[1..]) {
             let mut report = Report::new(texts.title);
             if let Some(leaving) = &self.leaving {
                 report = report.paragraph(&format!("The motion {}.", leaving.text()));
@@ -117,17 +117,8 @@ fn capitalized(text: &str) -> String {
     text.chars().take(1).flat_map(char::to_uppercase).chain(text.chars().skip(1)).collect()
 }
 
-/// `true` if a picture's file is to be a page.
-fn is_page(path: &Path) -> bool {
-    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("html") || end.eq_ignore_ascii_case("htm"))
-}
-
-/// A file for a picture: SVG or HTML.
-pub fn picture_file(text: &str) -> Result<std::path::PathBuf, String> {
-    let path = std::path::PathBuf::from(text);
-    let known = is_page(&path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("svg"));
-    if known { Ok(path) } else { Err("expected a file that ends in .svg or .html".to_string()) }
-}
+/// Extensions of pictures; all but the first are those of pages.
+pub const EXTENSIONS: [&str; 3] = ["svg", "html", "htm"];
 
 #[cfg(test)]
 mod tests {
@@ -138,7 +129,7 @@ mod tests {
     fn unlike_units_have_panels_of_their_own() {
         let columns = ["r", "phi", "z", "h", "r_dot", "phi_dot", "z_dot", "h_dot"].map(String::from);
         let units = ["m", "rad", "m", "K", "m/s", "rad/s", "m/s", "K/s"].map(String::from);
-        let mut watch = Watch::new(Domain::new(vec![None; 8]), &columns);
+        let mut watch = MotionRecord::new(Domain::new(vec![None; 8]), &columns);
         let q = [1.0, 0.5, 2.0, 0.0];
         let later = q.map(|q| 2.0 * q);
         let (t, v) = (vec![0.0, 1.0], [1.0, 0.5, 2.0, 0.0].repeat(2));
@@ -161,8 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_known_by_their_ends() {
-        assert!(picture_file("a.SVG").is_ok() && picture_file("a.png").is_err() && picture_file("a").is_err());
+    fn words_begin_with_a_capital() {
         assert_eq!([capitalized("energy"), capitalized("p.v - L")], ["Energy", "p.v - L"]);
     }
 }

@@ -3,8 +3,6 @@
 use crate::CliError;
 use crate::motion_source::MotionSource;
 use lnn::lagrangian::{FormulaReading, Request, SystemInstance, Terms};
-use lnn::rollout::{Trajectory, quoted};
-use lnn::scalar::Scalar;
 
 /// Columns of the quantities in `[measured]` that are not coordinates themselves.
 pub struct ReadingColumns<'a> {
@@ -30,30 +28,17 @@ impl<'a> ReadingColumns<'a> {
         Ok((!readings.is_empty()).then_some(Self { source, instance, readings }))
     }
 
-    /// A line of names with the names of the quantities at its end.
-    pub fn header(&self, line: &str) -> String {
-        let names: Vec<String> = self.readings.iter().map(|reading| quoted(&reading.name)).collect();
-        format!("{},{}\n", line.trim_end(), names.join(","))
+    /// Names of the quantities.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        self.readings.iter().map(|reading| reading.name.clone())
     }
 
-    /// Lines of samples with the quantities at their ends; empty where a state has no accelerations.
-    pub fn rows(&self, lines: &str, piece: &Trajectory<f64>) -> String {
-        let mut text = String::new();
+    /// The quantities at a sample; not finite where the state has no accelerations.
+    pub fn at(&self, t: f64, (q, v): (&[f64], &[f64])) -> impl Iterator<Item = f64> {
         let mut terms = Terms::default();
-        for (k, line) in lines.lines().enumerate() {
-            text += line;
-            let (q, v) = piece.state(k);
-            let t = piece.t[k];
-            let solved = self.source.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut terms).is_ok();
-            let a = if solved { terms.acceleration.clone() } else { vec![f64::NAN; q.len()] };
-            let known = self.source.known(t);
-            for reading in &self.readings {
-                let value = reading.value(&self.instance.parameters, (q, v, &a), &known);
-                text.push(',');
-                text += &if value.is_finite() { value.to_text() } else { String::new() };
-            }
-            text.push('\n');
-        }
-        text
+        let solved = self.source.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut terms).is_ok();
+        let a = if solved { terms.acceleration } else { vec![f64::NAN; q.len()] };
+        let known = self.source.known(t);
+        self.readings.iter().map(move |reading| reading.value(&self.instance.parameters, (q, v, &a), &known))
     }
 }

@@ -4,10 +4,8 @@ use super::mjcf::Styled;
 use super::rigid::{Body, Place, turned};
 use super::xml::{Fault, fault};
 use crate::lagrangian::{Matrix, Vector, transposed};
+use crate::pipeline::thresholds::DEFAULT_DENSITY;
 use std::f64::consts::PI;
-
-/// Density in kg/m^3 if none is given.
-const DENSITY: f64 = 1000.0;
 
 fn length(x: Vector<f64>) -> f64 {
     x[0].hypot(x[1]).hypot(x[2])
@@ -62,7 +60,7 @@ pub(super) fn onto(z: Vector<f64>) -> Option<Matrix<f64>> {
 pub(super) fn body(geom: &Styled<'_, '_, '_>) -> Result<Body, Fault> {
     let kind = geom.text("type").unwrap_or("sphere");
     let mass = geom.numbers("mass", &[1])?.map(|mass| mass[0]);
-    let density = geom.numbers("density", &[1])?.map_or(DENSITY, |density| density[0]);
+    let density = geom.numbers("density", &[1])?.map_or(DEFAULT_DENSITY, |density| density[0]);
     if mass == Some(0.0) || mass.is_none() && density == 0.0 || kind == "plane" {
         return Ok(Body::default());
     }

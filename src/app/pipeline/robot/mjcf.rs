@@ -6,13 +6,12 @@ use super::rigid::{Body, Place, turned as rotated};
 use super::xml::{Fault, child, fault, list, numbers};
 use super::{Link, Part, Robot};
 use crate::lagrangian::turned;
+use crate::pipeline::thresholds::MAX_ELEMENTS;
 use roxmltree::Node;
 use std::collections::BTreeMap;
 
 type Outcome<T> = Result<T, Fault>;
 
-/// Most elements below the world.
-const MAX_ELEMENTS: usize = 4096;
 /// Elements of the world that are read or say nothing of motion.
 const READ: [&str; 8] = ["body", "joint", "geom", "inertial", "site", "camera", "light", "freejoint"];
 /// Elements of the root that are read or say nothing of motion.

@@ -13,18 +13,12 @@ mod xml;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, find, inertia_symbols, is_free_name, loss_symbols};
 use crate::pipeline::from_table;
+use crate::pipeline::thresholds::{DEFAULT_BOUNDS, DEFAULT_SPEED, MAX_LINKS};
 use rigid::{Body, Place};
 use std::path::Path;
 use toml::{Table, Value};
 pub use write::rewrite_robot;
 use xml::Fault;
-
-/// Most links that move.
-const MAX_LINKS: usize = 64;
-/// Bounds of joints without bounds, in rad and m.
-const USUAL: (f64, f64) = (std::f64::consts::PI, 1.0);
-/// Bound of speeds without a bound, in rad/s or m/s.
-const USUAL_SPEED: f64 = 3.0;
 
 /// A robot: its moving links, each after the one that carries it.
 #[derive(Debug)]
@@ -193,8 +187,8 @@ impl Robot {
             }
             let mut table = Table::new();
             let pair = |(low, high): (f64, f64)| Value::Array(vec![low.into(), high.into()]);
-            let usual = if link.slides { USUAL.1 } else { USUAL.0 };
-            let speed = link.speed.unwrap_or(USUAL_SPEED);
+            let usual = if link.slides { DEFAULT_BOUNDS.1 } else { DEFAULT_BOUNDS.0 };
+            let speed = link.speed.unwrap_or(DEFAULT_SPEED);
             table.insert("name".into(), name.clone().into());
             table.insert("unit".into(), if link.slides { "m" } else { "rad" }.into());
             table.insert("periodic".into(), link.is_free.into());

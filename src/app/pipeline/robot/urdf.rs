@@ -5,13 +5,10 @@ use super::xml::{Fault, child, children, fault, list, number, required, triple};
 use super::{Link, Part, Robot};
 use crate::lagrangian::turned;
 use crate::names::unknown;
+use crate::pipeline::thresholds::{GRAVITY, MAX_ELEMENTS};
 use roxmltree::Node;
 use std::collections::BTreeMap;
 
-/// Acceleration of gravity in m/s^2: z points upwards.
-const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-/// Largest number of links and joints, including fixed ones.
-const MAX_ELEMENTS: usize = 4096;
 /// Elements that say nothing of motion.
 const OF_LOOKS: [&str; 3] = ["visual", "collision", "material"];
 /// Elements that are read: of the robot, of a link, of a joint.

@@ -5,14 +5,9 @@ use super::urdf::origin;
 use super::xml::{Fault, child, children, fault};
 use super::{Link, read, xml};
 use crate::lagrangian::{applied, inertia_symbols, loss_symbols};
+use crate::pipeline::thresholds::{SAME_NUMBER, WRITTEN_ROUNDING};
 use roxmltree::Node;
 use std::ops::Range;
-
-/// Largest difference, over the size of a link's constants, between the written constants and those read back.
-const ROUNDING: f64 = 1e-9;
-
-/// Largest relative difference at which a number counts as the one already written.
-const REPRINTED: f64 = 1e-14;
 
 /// Ranges of a text with their replacements.
 struct Edits(Vec<(Range<usize>, String)>);
@@ -64,7 +59,7 @@ pub fn rewrite_robot(text: &str, values: &[(&str, f64)]) -> Result<String, Fault
     let (again, line) = read(&written)?;
     for (link, whole) in again.links.iter().zip(&expected) {
         let size = whole.0.iter().fold(0f64, |most, x| most.max(x.abs()));
-        let is_same = link.body.0.iter().zip(whole.0).all(|(a, b)| (a - b).abs() <= ROUNDING * size);
+        let is_same = link.body.0.iter().zip(whole.0).all(|(a, b)| (a - b).abs() <= WRITTEN_ROUNDING * size);
         if !is_same {
             return Err((
                 line,
@@ -200,7 +195,7 @@ fn is_same(before: &str, after: &str) -> bool {
     let numbers = |text: &str| text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
     let (Some(before), Some(after)) = (numbers(before), numbers(after)) else { return false };
     let size = before.iter().fold(0f64, |most, x| most.max(x.abs()));
-    before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() <= REPRINTED * size)
+    before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() <= SAME_NUMBER * size)
 }
 
 /// An element without content.

@@ -1,9 +1,7 @@
 //! Elements of a robot file: their numbers, their names, and where a mistake is.
 
+use crate::pipeline::thresholds::{MAX_NODES, SHOWN_ITEMS};
 use roxmltree::{Document, Node, ParsingOptions};
-
-/// Most elements, texts and comments.
-const MAX_NODES: u32 = 1 << 20;
 
 /// Line, from 1, and what is wrong there.
 pub(super) type Fault = (usize, String);
@@ -76,9 +74,8 @@ pub(super) fn triple(node: Node<'_, '_>, key: &str, usual: [f64; 3]) -> Result<[
 
 /// Items separated by commas, shortened if there are too many to read.
 pub(super) fn list(items: &[String]) -> String {
-    const SHOWN: usize = 8;
     match items.len() {
-        count if count > SHOWN => format!("{} and {} more", items[..SHOWN].join(", "), count - SHOWN),
+        count if count > SHOWN_ITEMS => format!("{} and {} more", items[..SHOWN_ITEMS].join(", "), count - SHOWN_ITEMS),
         _ => items.join(", "),
     }
 }

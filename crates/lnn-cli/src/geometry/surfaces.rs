@@ -1,10 +1,11 @@
 //! `lnn geometry --surface`: ergosurfaces, horizons and changes of signature on a line of coordinates.
 
+use crate::number::index_of;
 use crate::source::Source;
 use crate::{CliError, json, output};
 use lnn::findings::text_table;
 use lnn::geometry::{Change, Surface, surfaces};
-use lnn::names::{pluralize, unknown};
+use lnn::names::pluralize;
 use lnn::scalar::Scalar;
 
 /// A block of the metric and the line on which its determinant is followed.
@@ -30,10 +31,7 @@ impl<S: Scalar> Line<'_, S> {
             if self.block[..k].contains(name) {
                 return Err(CliError::usage(format_args!("--surface: coordinate {name} is given twice")));
             }
-            names.iter().position(|known| known == name).ok_or_else(|| {
-                let problem = unknown("coordinate", name, names.iter().map(String::as_str));
-                CliError::usage(format_args!("--surface: {problem}"))
-            })
+            index_of("--surface", "coordinate", name, names)
         });
         let block = block.collect::<Result<Vec<usize>, CliError>>()?;
         let found = surfaces(&*source.model, &block, self.ends, self.velocity, self.steps).map_err(CliError::data)?;
