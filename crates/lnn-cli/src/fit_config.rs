@@ -158,7 +158,7 @@ impl<'a> Plan<'a> {
         let FitColumns { files, coords, .. } = &config.recording;
         for (key, list) in [("recording.files", files), ("recording.coords", coords)] {
             if list.is_empty() {
-                plan.layers.check(vec![Mistake::new(key, "expected it here or as an argument")])?;
+                plan.layers.check(vec![Mistake::new(key, "expected a value here or as an argument")])?;
             }
         }
         Ok(Self { config, ..plan })

@@ -91,7 +91,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let format = args.format.unwrap_or(Format::Json);
     let more = args.inverse || args.linearize || args.least_norm || args.canonical.is_some();
     if source.model.is_timed() && (more || args.constraints.is_some()) {
-        return Err(CliError::usage("the system depends on the time: its states have their terms and nothing else"));
+        return Err(CliError::usage("the system depends on the time: only the terms of its states can be printed"));
     }
     if args.inverse {
         return inverse(file, format, &source, &args.drives);

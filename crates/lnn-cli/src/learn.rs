@@ -5,7 +5,7 @@ use crate::learned::model_file;
 use crate::number::threads;
 use crate::output_dir::{self, Wanted};
 use crate::results::Writer;
-use crate::resume::{forget, how_to_go_on, keeping};
+use crate::resume::{continuation_hint, remove_finished, with_continuation};
 use crate::run_args::RunArgs;
 use crate::watch::watch;
 use crate::{CliError, interrupt, output};
@@ -87,15 +87,15 @@ impl<'a> Session<'a> {
         let LearnedRun { json, findings, stop, epochs, unfinished } = match learned {
             Ok(learned) => learned,
             Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
-                let on = how_to_go_on(path);
+                let on = continuation_hint(path);
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
             // There is neither a model nor anything to continue from.
-            Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
-            Err(error) => return Err(keeping(path)(error.into())),
+            Err(error) if is_empty(&error) => return Err(remove_finished(path).err().unwrap_or_else(|| error.into())),
+            Err(error) => return Err(with_continuation(path)(error.into())),
         };
         if stop != StopReason::Interrupted {
-            forget(path)?;
+            remove_finished(path)?;
         }
         if self.args.json {
             output::print(&json)?;
@@ -106,7 +106,7 @@ impl<'a> Session<'a> {
         match stop {
             StopReason::Interrupted => {
                 let what = unfinished.map_or(String::new(), |what| format!("{what}; "));
-                Err(CliError::interrupted(format_args!("interrupted, {what}{kept}{}", how_to_go_on(path))))
+                Err(CliError::interrupted(format_args!("interrupted, {what}{kept}{}", continuation_hint(path))))
             }
             StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
             _ => Ok(()),

@@ -133,7 +133,7 @@ pub fn command(directory: &Path) -> String {
 }
 
 /// The end of a message about a run that was stopped.
-pub fn how_to_go_on(directory: &Path) -> String {
+pub fn continuation_hint(directory: &Path) -> String {
     if has_checkpoint(directory) {
         format!("; continue with: {}", command(directory))
     } else {
@@ -142,7 +142,7 @@ pub fn how_to_go_on(directory: &Path) -> String {
 }
 
 /// An error that ended a run with results, such as a full disk: its checkpoint is still there, and the message says so.
-pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
+pub fn with_continuation(directory: &Path) -> impl Fn(CliError) -> CliError {
     |error| {
         if error.kind() == Kind::Data && has_checkpoint(directory) {
             let learned = "the model so far is kept; when the cause is removed";
@@ -157,7 +157,7 @@ pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
 ///
 /// # Errors
 /// A data error naming the directory.
-pub fn forget(directory: &Path) -> Result<(), CliError> {
+pub fn remove_finished(directory: &Path) -> Result<(), CliError> {
     let cannot = |e| CliError::file(directory, format_args!("cannot remove checkpoints: {e}"));
     remove_checkpoints(&Disk, directory).map_err(cannot)
 }

@@ -151,7 +151,7 @@ impl Args {
         let beside = [("--plot", &self.plot), ("--events", &self.events)];
         for (option, file) in beside.iter().filter_map(|(option, file)| Some((option, file.as_ref()?))) {
             if *file == self.out || (self.plot == self.events && *option == "--events") {
-                return Err(CliError::usage(format_args!("{option}: another result goes into this file")));
+                return Err(CliError::usage(format_args!("{option}: another option already writes to this file")));
             }
             OutputFile::claim(file, &inputs, self.overwrite)?;
         }

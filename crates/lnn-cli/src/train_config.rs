@@ -188,7 +188,11 @@ impl Args {
         let written = layers.get("description").and_then(|value| Description::deserialize(value.clone()).ok());
         let name = match (&requested, in_file) {
             (Some(requested), Some(found)) if requested.name != found => {
-                return Err(CliError::usage(format_args!("{} is about {found:?}, not {:?}", place(), requested.name)));
+                return Err(CliError::usage(format_args!(
+                    "{} is for the system {found:?}, not {:?}",
+                    place(),
+                    requested.name
+                )));
             }
             (Some(requested), _) => requested.name.clone(),
             (None, Some(name)) => name.to_string(),
