@@ -7,7 +7,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use lnn::lagrangian::{Accelerations, EulerLagrange, Lagrangian, Linearizer, Mechanics, Request, Terms};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::{Real, vectorized};
 use lnn::tape::{Function, ScalarFunction, hessian};
 use std::hint::black_box;
@@ -222,7 +222,7 @@ fn rods(n: usize) -> Box<dyn EulerLagrange<f64>> {
 
 /// The end of a short motion of a model under constraints.
 fn moved(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> f64 {
-    let found = rollout(model, black_box(q), v, &Options::new(0.02, 0.02));
+    let found = rollout(model, black_box(q), v, &RolloutOptions::new(0.02, 0.02));
     found.complete().expect("independent rods").q[q.len()]
 }
 

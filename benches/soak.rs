@@ -7,7 +7,7 @@ use clap::Parser;
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
-use lnn::rollout::{Integrator, Options, rollout_many, rollout_together};
+use lnn::rollout::{Integrator, RolloutOptions, rollout_many, rollout_together};
 use lnn::training::{Hooks, run};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -29,7 +29,7 @@ fn round(seed: u64) {
     let outcome = run::<f64>(&config(seed), 2, &Hooks::default()).expect("a training");
     let starts: Vec<_> = (0..8).map(|k| (vec![0.1 * k as f64, 0.2], vec![0.0, 0.1])).collect();
     for method in Integrator::ALL {
-        let options = Options { method, step: Some(0.02), max_steps: 2000, ..Options::new(1.0, 0.1) };
+        let options = RolloutOptions::new(1.0, 0.1).method(method).step(0.02).max_steps(2000);
         black_box(rollout_many(&outcome.model, &starts, &options, 2));
         black_box(rollout_together(&outcome.model, &starts, &options, 2));
     }

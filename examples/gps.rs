@@ -12,7 +12,7 @@ use lnn::lagrangian::{SystemInstance, configure_system};
 use lnn::pipeline::parse_system;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -208,7 +208,7 @@ pub fn made() -> Outcome<()> {
         let q = place(radius * phase.cos(), radius * phase.sin());
         let mut v = place(-speed * phase.sin(), speed * phase.cos());
         (v[0], v[1]) = (v[0] + turning * q[1], v[1] - turning * q[0]);
-        let options = Options { energy: false, ..Options::reference(85_500.0, 900.0) };
+        let options = RolloutOptions::reference(85_500.0, 900.0).energy(false);
         let motion = rollout(model.as_ref(), &q, &v, &options).complete()?;
         let q = motion.q.iter().map(|q| q + 0.05 * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect();
         tracks.push(RecordedTrajectory {

@@ -5,7 +5,7 @@
 
 use lnn::lagrangian::{Dissipation, Rayleigh, WithForces, configure};
 use lnn::random::RngStream;
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::Real;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
@@ -38,7 +38,7 @@ pub fn made() -> Result<String, Box<dyn std::error::Error>> {
     let model = WithForces::new(ideal, Rayleigh(Joints([0.08, 0.05])));
     let (mut csv, mut rng) = ("run,t,theta1,theta2\n".to_string(), RngStream::Training(0).generator(0));
     for (run, start) in [[1.2, 1.9], [-2.0, -0.6], [2.4, 0.3], [0.4, -2.6]].into_iter().enumerate() {
-        let motion = rollout(&model, &start, &[0.0; 2], &Options::reference(5.0, 0.01));
+        let motion = rollout(&model, &start, &[0.0; 2], &RolloutOptions::reference(5.0, 0.01));
         let energy = motion.trajectory.energy.clone().unwrap_or_default();
         let motion = motion.complete()?;
         println!("run {run}: energy {:.2} J to {:.2} J", energy[0], energy[500]);

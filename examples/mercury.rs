@@ -10,7 +10,7 @@ use lnn::identification::{Between, Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
 use lnn::pipeline::parse_system;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Driven, Options};
+use lnn::rollout::{Driven, RolloutOptions};
 use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -209,7 +209,7 @@ pub fn made() -> Outcome<RecordedTrajectory> {
         force.copy_from_slice(&pull([q[0], q[1], q[2]], &others(day)));
     };
     let (q, v) = ([0.3075, 0.0, 0.0], [0.0, 0.0338, 0.0041]);
-    let options = Options { energy: false, ..Options::reference(1826.0, 0.5) };
+    let options = RolloutOptions::reference(1826.0, 0.5).energy(false);
     let motion = Driven::new(model.as_ref(), &pulls).rollout(&q, &v, &options).complete()?;
     let mut track = empty();
     for (&day, q) in motion.t.iter().zip(motion.q.chunks(3)) {

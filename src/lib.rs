@@ -103,7 +103,7 @@
 //! assert_eq!(motion.t.len(), 51);
 //!
 //! // With a method that conserves the energy.
-//! let options = Options { method: Integrator::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
+//! let options = RolloutOptions::new(5.0, 0.1).method(Integrator::Gauss6).step(0.01);
 //! let energy = rollout(&*model, &[2.0, 1.0], &[0.0, 0.0], &options).complete()?.energy.unwrap(); // J, at every sample
 //! assert!(energy.iter().all(|e| (e - energy[0]).abs() < 1e-7));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

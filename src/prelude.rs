@@ -3,7 +3,7 @@
 pub use crate::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
 pub use crate::network::{NetworkLagrangian, Structure};
 #[cfg(feature = "rollout")]
-pub use crate::rollout::{Motion, Options, Trajectory, rollout};
+pub use crate::rollout::{Motion, RolloutOptions, Trajectory, rollout};
 pub use crate::scalar::{Dd, Real, Scalar};
 
 #[cfg(feature = "training")]

@@ -231,7 +231,7 @@ fn ensembles(options: &Options) {
         let network = NetworkLagrangian::new(setup.architecture, setup.weights).expect("weights fit");
         let start = |k: usize| setup.data.q()[2 * k..][..2].iter().map(|x| x / 10.0).collect::<Vec<f64>>();
         let starts: Vec<_> = (0..16).map(|k| (start(k), start(k + 16))).collect();
-        let rollout = lnn::rollout::Options::new(0.5, 0.1);
+        let rollout = lnn::rollout::RolloutOptions::new(0.5, 0.1);
         let mut work = [
             Work::new("alone", || {
                 for start in starts.chunks(8) {

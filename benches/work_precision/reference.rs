@@ -5,7 +5,7 @@
 
 use super::problems::Problem;
 use lnn::lagrangian::{Request, Terms};
-use lnn::rollout::{Integrator, Options, Rollout, Trajectory, rollout, rollout_fixed};
+use lnn::rollout::{Integrator, Rollout, RolloutOptions, Trajectory, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Scalar};
 
 /// The motion of a problem, good to all digits of `f64`.
@@ -66,12 +66,10 @@ fn extrapolate(coarse: &Trajectory<Dd>, fine: &Trajectory<Dd>, order: i32) -> Tr
 
 fn run(problem: &Problem, step: f64) -> Result<Trajectory<Dd>, String> {
     let wide = |x: &[f64]| x.iter().map(|&x| Dd::of_f64(x)).collect::<Vec<Dd>>();
-    let options = Options {
-        method: Integrator::Gauss6,
-        step: Some(Dd::of_f64(step)),
-        energy: false,
-        ..Options::new(Dd::of_f64(problem.t_end), Dd::of_f64(problem.dt))
-    };
+    let options = RolloutOptions::new(Dd::of_f64(problem.t_end), Dd::of_f64(problem.dt))
+        .method(Integrator::Gauss6)
+        .step(Dd::of_f64(step))
+        .energy(false);
     let rolled: Rollout<Dd> = rollout_fixed(&*problem.wide, &wide(&problem.q), &wide(&problem.v), &options);
     rolled.complete().map_err(|e| format!("reference: {e}"))
 }
@@ -109,7 +107,7 @@ fn amplification(problem: &Problem, size: f64) -> f64 {
     let start: Vec<f64> = problem.q.iter().chain(&problem.v).copied().collect();
     let magnitude = start.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let displacement = 1e-6 * magnitude;
-    let options = Options { energy: false, ..Options::reference(problem.t_end, problem.dt) };
+    let options = RolloutOptions::reference(problem.t_end, problem.dt).energy(false);
     let run = |start: &[f64]| rollout(&*problem.model, &start[..n], &start[n..], &options).complete().ok();
     let Some(base) = run(&start) else { return f64::NAN };
     let mut growth = vec![vec![0.0; 2 * n]; base.len()];

@@ -6,7 +6,7 @@ use super::problems::{LEARNED, Problem, TAUGHT_BY, problems};
 use super::reference::{Reference, distance, reference};
 use super::summary::{cost_of, slope};
 use super::timing::Timing;
-use lnn::rollout::{Integrator, Options, Rollout, Trajectory, rollout};
+use lnn::rollout::{Integrator, Rollout, RolloutOptions, Trajectory, rollout};
 use lnn::scalar::{Dd, Scalar};
 use std::hint::black_box;
 use std::time::Instant;
@@ -175,12 +175,8 @@ fn points(
             section.failed(case(), "this and finer settings left out: the error no longer falls (rounding floor)");
             break;
         }
-        let base = Options { method, energy: false, max_steps: 10_000_000, ..Options::new(problem.t_end, problem.dt) };
-        let options = if fixed {
-            Options { step: Some(setting), ..base }
-        } else {
-            Options { rtol: setting, atol: setting, ..base }
-        };
+        let base = RolloutOptions::new(problem.t_end, problem.dt).method(method).energy(false).max_steps(10_000_000);
+        let options = if fixed { base.step(setting) } else { base.tolerances(setting, setting) };
         let run = || rollout(&*problem.model, black_box(&problem.q), &problem.v, &options);
         let Rollout { trajectory, statistics, stop, .. } = run();
         if let Some(stop) = stop {

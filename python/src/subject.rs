@@ -19,7 +19,7 @@ use lnn::pipeline::{
     CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, parse_robot, rewrite_robot, trained_on,
 };
 use lnn::report::page;
-use lnn::rollout::{Event, Integrator, Occurrence, Options, Rollout, RolloutError, Start, rollout_each};
+use lnn::rollout::{Event, Integrator, Occurrence, Rollout, RolloutError, RolloutOptions, Start, rollout_each};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -571,7 +571,13 @@ impl Subject {
         };
         let events = self.system_instance().map_or_else(|_| Vec::new(), |known| known.events());
         let events = events.into_iter().map(Event::from).collect();
-        let options = Options { t0, method, rtol, atol, step, domain, events, ..Options::new(t_end, dt) };
+        let options = RolloutOptions::new(t_end, dt)
+            .t0(t0)
+            .method(method)
+            .tolerances(rtol, atol)
+            .step(step)
+            .domain(domain)
+            .events(events);
         let forces = Forces::of(n, (t0, t_end), "force", forces)?;
         let mut known = None;
         let mut fed = None;

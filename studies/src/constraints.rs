@@ -20,7 +20,7 @@ use lnn::lagrangian::{
 use lnn::network::{Initialization, Structure, initial_weights};
 use lnn::presets::Trainer;
 use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions};
-use lnn::rollout::{Integrator, Options, rollout};
+use lnn::rollout::{Integrator, RolloutOptions, rollout};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -100,7 +100,7 @@ fn starts(name: &str, count: usize, seed: u64) -> Vec<(Vec<f64>, Vec<f64>)> {
 fn recorded(name: &str, motions: usize, seconds: f64, noise: f64, seed: u64) -> (Recording, Recording) {
     let (system, model) = (configured(name), model(name));
     let coordinates = system.system.coordinates(system.coordinates);
-    let options = Options { rtol: 1e-10, atol: 1e-10, energy: false, ..Options::new(seconds, 0.01) };
+    let options = RolloutOptions::new(seconds, 0.01).tolerances(1e-10, 1e-10).energy(false);
     let (mut tracks, mut more) = (Vec::new(), 0);
     while tracks.len() < motions {
         for (q, v) in starts(name, motions - tracks.len(), seed + 1000 * more) {
@@ -254,14 +254,11 @@ fn drift(swings: f64) {
         (Integrator::Gauss4, Some(0.04)),
         (Integrator::Gauss6, Some(0.08)),
     ] {
-        let options = Options {
-            method,
-            step: step.map(|step| step * period),
-            rtol: 1e-9,
-            atol: 1e-9,
-            max_steps: usize::MAX,
-            ..Options::new(swings * period, 0.5 * period)
-        };
+        let options = RolloutOptions::new(swings * period, 0.5 * period)
+            .method(method)
+            .step(step.map(|step| step * period))
+            .tolerances(1e-9, 1e-9)
+            .max_steps(usize::MAX);
         let started = Instant::now();
         let motion = rollout(&*pendulum, &q, &v, &options).complete().expect("a pendulum");
         let energy = motion.energy.as_ref().expect("asked for");
@@ -376,7 +373,7 @@ fn learned(seeds: u64, (count, epochs, noise): (usize, usize, f64), only: &dyn F
 fn moved(name: &str, exact: &dyn EulerLagrange<f64>, learned: &dyn EulerLagrange<f64>, seed: u64) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(7 + seed);
     let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
-    let options = |end: f64| Options { rtol: 1e-9, atol: 1e-9, energy: false, ..Options::new(end, end / 100.0) };
+    let options = |end: f64| RolloutOptions::new(end, end / 100.0).tolerances(1e-9, 1e-9).energy(false);
     let (mut errors, what): (Vec<f64>, &str) = match name {
         SPHERE => {
             // Over both poles and back again.
@@ -435,7 +432,7 @@ fn moved(name: &str, exact: &dyn EulerLagrange<f64>, learned: &dyn EulerLagrange
 fn distance_of(
     (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
     (q, v): (&[f64], &[f64]),
-    options: &Options<f64>,
+    options: &RolloutOptions<f64>,
     range: Option<&[(f64, f64)]>,
 ) -> f64 {
     let n = q.len();
@@ -477,7 +474,7 @@ fn cost(rounds: usize, count: usize) {
                     let _ = model.terms(&data.q()[at.clone()], &data.v()[at], Request::ACCELERATION, &mut terms);
                 }
             });
-            let options = Options { energy: false, ..Options::new(5.0, 0.05) };
+            let options = RolloutOptions::new(5.0, 0.05).energy(false);
             let motion = time(rounds, || drop(rollout(&*model, &data.q()[..n], &data.v()[..n], &options)));
             [single / 64.0, motion]
         });

@@ -16,7 +16,7 @@ use lnn::lagrangian::{SystemInstance, configure};
 use lnn::prelude::*;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Driven, Motion, Options, SampledForce};
+use lnn::rollout::{Driven, Motion, RolloutOptions, SampledForce};
 use rand_distr::{Distribution, StandardNormal};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -94,7 +94,8 @@ fn simulated(model: &dyn EulerLagrange<f64>, force: &[f64], step: f64) -> Outcom
     for f in force {
         q.push(state.0);
         let held = SampledForce::constant(vec![*f])?;
-        let motion = Driven::new(model, &held).rollout(&[state.0], &[state.1], &Options::new(step, step)).complete()?;
+        let motion =
+            Driven::new(model, &held).rollout(&[state.0], &[state.1], &RolloutOptions::new(step, step)).complete()?;
         state = (motion.q[1], motion.v[1]);
     }
     Ok(q)

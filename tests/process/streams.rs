@@ -4,7 +4,7 @@ use crate::alone;
 use crate::counting::peak;
 use lnn::lagrangian::build;
 use lnn::recording::{Columns, read_recording};
-use lnn::rollout::{Options, rollout_in_pieces};
+use lnn::rollout::{RolloutOptions, rollout_in_pieces};
 use lnn::storage::{AtomicWriter, Disk};
 use std::ffi::OsString;
 use std::io::Write as _;
@@ -29,7 +29,7 @@ fn a_rollout_takes_the_same_memory_however_long_it_is() {
         let mut samples = 0;
         let bytes = peak(|| {
             let mut file = AtomicWriter::create(&Disk, &out).unwrap();
-            let options = Options::new(10.0, dt);
+            let options = RolloutOptions::new(10.0, dt);
             let ending = rollout_in_pieces(&*system, &[0.1, 0.1], &[0.0, 0.0], &options, &mut |piece| {
                 file.append(piece.csv_rows().as_bytes()).unwrap();
                 ControlFlow::Continue(())

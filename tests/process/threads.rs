@@ -9,7 +9,7 @@ use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
 use lnn::network::{Architecture, Layout, ModelFile, NetworkLagrangian};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::recording::RecordedTrajectory;
-use lnn::rollout::{Between, Options, rollout, rollout_many};
+use lnn::rollout::{Between, RolloutOptions, rollout, rollout_many};
 use lnn::shooting::{Shooting, Task, fit};
 use lnn::training::{Hooks, Objective};
 use std::path::Path;
@@ -60,9 +60,9 @@ fn threads_are_the_callers_choice() {
     let mut terms = Terms::default();
     for model in [&learned as &dyn EulerLagrange<f64>, &*written] {
         model.terms(&q, &v, Request::ALL, &mut terms).unwrap();
-        assert!(rollout(model, &q[..2], &v[..2], &Options::new(0.1, 0.05)).is_complete());
+        assert!(rollout(model, &q[..2], &v[..2], &RolloutOptions::new(0.1, 0.05)).is_complete());
         let starts = vec![(q[..2].to_vec(), v[..2].to_vec()); 4];
-        assert_eq!(rollout_many(model, &starts, &Options::new(0.1, 0.05), 1).len(), 4);
+        assert_eq!(rollout_many(model, &starts, &RolloutOptions::new(0.1, 0.05), 1).len(), 4);
     }
     assert_eq!(threads(), before, "evaluation and roll-outs start no thread");
 

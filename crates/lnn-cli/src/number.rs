@@ -4,7 +4,7 @@ use crate::CliError;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lnn::lagrangian::quantity;
 use lnn::names::unknown;
-use lnn::rollout::Options;
+use lnn::rollout::RolloutOptions;
 use lnn::scalar::Scalar;
 use lnn::storage::MOST_THREADS;
 
@@ -80,7 +80,7 @@ pub fn whole(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String
 
 /// A relative tolerance of an integration in double precision: not finer than rounding, not coarser than 1.
 pub fn tolerance(text: &str) -> Result<f64, String> {
-    number(Options::<f64>::least_tolerance(), 1.0)(text)
+    number(RolloutOptions::<f64>::least_tolerance(), 1.0)(text)
 }
 
 /// A parser of numbers above 0, at most `most`.

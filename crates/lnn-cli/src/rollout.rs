@@ -19,7 +19,7 @@ use lnn::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Requ
 use lnn::names::pluralize;
 use lnn::report::DataTable;
 use lnn::rollout::{
-    Driven, Ending, EnergyBalance, Event, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces,
+    Driven, Ending, EnergyBalance, Event, Integrator, RolloutError, RolloutOptions, Trajectory, rollout_in_pieces,
 };
 use lnn::symmetry::Invariant;
 use std::ops::ControlFlow;
@@ -120,20 +120,17 @@ impl Args {
         Ok(source)
     }
 
-    fn options(&self, source: &MotionSource) -> Result<Options<f64>, CliError> {
+    fn options(&self, source: &MotionSource) -> Result<RolloutOptions<f64>, CliError> {
         if self.step.is_some() && !self.method.is_structure_preserving() {
             return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
         }
-        let options = Options {
-            t0: self.t_start,
-            method: self.method,
-            rtol: self.rtol,
-            atol: self.atol,
-            step: self.step,
-            domain: source.domain.clone().filter(|_| !self.beyond_range),
-            events: source.events.clone(),
-            ..Options::new(self.t_end, self.dt)
-        };
+        let options = RolloutOptions::new(self.t_end, self.dt)
+            .t0(self.t_start)
+            .method(self.method)
+            .tolerances(self.rtol, self.atol)
+            .step(self.step)
+            .domain(source.domain.clone().filter(|_| !self.beyond_range))
+            .events(source.events.clone());
         options.check(source.columns.len() / 2).map_err(|e| refused(&e))?;
         if let Some(step) = self.step.filter(|step| *step > self.dt) {
             output::note(&format!("--step {step} is longer than --dt {}: one step per sample", self.dt));

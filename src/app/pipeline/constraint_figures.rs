@@ -3,7 +3,7 @@
 use crate::lagrangian::{EulerLagrange, ManifoldRows, Request, Terms};
 use crate::pipeline::thresholds::{CONSTRAINT_SAMPLES, MOST_PLANES_AND_CONSTRAINTS};
 use crate::report::{Figure, LinePlot, Series, Trace, figure, file_part, line_plot, trace_plot, with_unit};
-use crate::rollout::{Options, Trajectory, rollout};
+use crate::rollout::{RolloutOptions, Trajectory, rollout};
 
 /// The motion of a model from a state on its constraints over some time; nothing of a model without constraints, or of a motion that does not
 /// begin.
@@ -14,7 +14,7 @@ pub(crate) fn constraint_figures(
     (coordinates, time): (&[String], &str),
 ) -> Vec<Figure> {
     let Some(manifold) = model.manifold() else { return Vec::new() };
-    let options = Options { energy: false, ..Options::new(seconds, seconds / CONSTRAINT_SAMPLES) };
+    let options = RolloutOptions::new(seconds, seconds / CONSTRAINT_SAMPLES).energy(false);
     let motion = rollout(model, q, v, &options).trajectory;
     if motion.len() < 2 {
         return Vec::new();

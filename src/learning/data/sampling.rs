@@ -6,7 +6,7 @@ use crate::data::shell::{in_shell, weigh_by_distance};
 use crate::lagrangian::system::Coordinate;
 use crate::lagrangian::{DescriptionError, EulerLagrange, Interruptible, SystemError, SystemInstance, project};
 use crate::random::RngStream;
-use crate::rollout::{Domain, Integrator, Options, rollout};
+use crate::rollout::{Domain, Integrator, RolloutOptions, rollout};
 use crate::scalar::Scalar;
 use rand::Rng;
 use std::f64::consts::TAU;
@@ -308,14 +308,11 @@ fn along_motions<'a>(
     let fixed = system.constrained_coordinate();
     let chart = position.iter().zip(&coordinates).map(|(b, c)| (!c.periodic).then_some((b[0], b[1])));
     let pace = velocity.iter().enumerate().map(|(i, b)| (Some(i) != fixed).then_some((b[0], b[1])));
-    let options = Options {
-        method: Integrator::Dop853,
-        rtol: 1e-9,
-        atol: 1e-9,
-        energy: false,
-        domain: Some(Domain::new(chart.chain(pace).collect())),
-        ..Options::new(test.t_end, test.dt)
-    };
+    let options = RolloutOptions::new(test.t_end, test.dt)
+        .method(Integrator::Dop853)
+        .tolerances(1e-9, 1e-9)
+        .energy(false)
+        .domain(Domain::new(chart.chain(pace).collect()));
     let chance = PER_MOTION * test.dt / test.t_end;
     let mut drawn = Drawn::new(system)?;
     let mut motions = 0;

@@ -168,11 +168,11 @@ mod tests {
     use crate::analysis::StartBox;
     use crate::lagrangian::{configure, systems};
     use crate::models::{OSCILLATOR, PENDULUM};
-    use crate::rollout::{Options, rollout};
+    use crate::rollout::{RolloutOptions, rollout};
 
     #[test]
     fn exact_motion_keeps_it_and_foreign_motion_does_not() {
-        let options = Options::<f64>::reference(10.0, 0.1);
+        let options = RolloutOptions::<f64>::reference(10.0, 0.1);
         let own = rollout(&PENDULUM, &[2.0], &[0.0], &options).trajectory;
         let error = energy_error(&PENDULUM, &own, 0.0);
         assert!(error.statistics().max < 1e-10, "{:e}", error.statistics().max);
@@ -207,7 +207,7 @@ mod tests {
             let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
             for (q, mut v) in bounds.starts::<f64>(4, 5) {
                 system.impose_constraint(&q, &mut v).unwrap();
-                let run = rollout(exact.as_ref(), &q, &v, &Options::reference(test.t_end, test.dt));
+                let run = rollout(exact.as_ref(), &q, &v, &RolloutOptions::reference(test.t_end, test.dt));
                 assert!(run.stop.is_none(), "{:?}", run.stop);
                 let mut trajectory = run.trajectory;
                 let error = conserved_error(&system, &trajectory).unwrap();

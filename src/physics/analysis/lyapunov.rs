@@ -2,7 +2,7 @@
 
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, dot, eigh, inertia, inverse};
-use crate::rollout::{Integrable, Options, RolloutError, rollout};
+use crate::rollout::{Domain, Integrable, RolloutError, RolloutOptions, rollout};
 use serde::{Deserialize, Serialize};
 
 /// Logarithm of the growth of a separation, below which a motion of at most 50 units of time is regular: its Lyapunov time is then above a
@@ -49,9 +49,9 @@ pub fn lyapunov<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
     v: &[S],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
 ) -> Result<Lyapunov, RolloutError> {
-    let main = rollout(model, q, v, &Options { energy: false, ..options.clone() }).complete()?;
+    let main = rollout(model, q, v, &options.clone().energy(false)).complete()?;
     let n = main.coordinates;
     let size = |state: &[f64]| state.iter().map(|x| x * x).sum::<f64>().sqrt();
     let flat = |k: usize| -> Vec<f64> {
@@ -71,7 +71,7 @@ pub fn lyapunov<S: Integrable>(
     for k in 0..main.len().saturating_sub(1) {
         let shifted: Vec<S> = flat(k).iter().zip(&offset).map(|(x, d)| S::of_f64(x + d)).collect();
         let (t, t_end) = (main.t[k], main.t[k + 1]);
-        let leap = Options { t0: t, t_end, dt: t_end - t, energy: false, domain: None, ..options.clone() };
+        let leap = options.clone().t0(t).t_end(t_end).dt(t_end - t).energy(false).domain(None::<Domain<S>>);
         // Both start afresh for each leap: errors of earlier leaps do not count as growth.
         let ends: Vec<Vec<f64>> = [flat(k).iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>(), shifted]
             .into_iter()
@@ -217,11 +217,11 @@ mod tests {
 
     #[test]
     fn exponents_of_linear_motions() {
-        let options = Options::reference(10.0, 0.5);
+        let options = RolloutOptions::reference(10.0, 0.5);
         let hill = lyapunov(&Hill, &[0.0], &[0.0], &options).unwrap();
         assert!((hill.exponent - 1.0).abs() < 0.05, "{hill:?}");
         assert!((hill.lyapunov_time() - 1.0).abs() < 0.05);
-        let calm = lyapunov(&OSCILLATOR, &[1.0], &[0.0], &Options::<f64>::reference(20.0, 0.5)).unwrap();
+        let calm = lyapunov(&OSCILLATOR, &[1.0], &[0.0], &RolloutOptions::<f64>::reference(20.0, 0.5)).unwrap();
         assert!(calm.exponent.abs() < 1e-3, "{calm:?}");
         assert!(hill.is_chaotic() && !calm.is_chaotic());
         // In proportion to time, over a long span.
@@ -237,7 +237,7 @@ mod tests {
             let turn = [0.005, 0.02, 1.0][k % 3];
             let (polar, rate) = (rng.random_range(0.6..2.5), rng.random_range(0.5..1.5));
             let state = ([polar, 0.3], [rate, turn * rng.random_range(0.5..1.0)]);
-            let found = lyapunov(&*sphere, &state.0, &state.1, &Options::reference(60.0, 0.5)).unwrap();
+            let found = lyapunov(&*sphere, &state.0, &state.1, &RolloutOptions::reference(60.0, 0.5)).unwrap();
             assert!(!found.is_chaotic() && found.exponent < 0.09, "{state:?} {found:?}");
         }
     }
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn a_thrown_double_pendulum_is_chaotic() {
         let pendulum = build::<f64>("double-pendulum", &[]).unwrap();
-        let found = lyapunov(&*pendulum, &[2.0, 2.5], &[0.0, 0.0], &Options::reference(40.0, 0.25)).unwrap();
+        let found = lyapunov(&*pendulum, &[2.0, 2.5], &[0.0, 0.0], &RolloutOptions::reference(40.0, 0.25)).unwrap();
         assert!(found.is_chaotic(), "{found:?}");
     }
 }

@@ -3,7 +3,7 @@
 //! ```
 //! use lnn::analysis::{energy_error, mass_matrix_error};
 //! use lnn::lagrangian::build;
-//! use lnn::rollout::{Options, rollout};
+//! use lnn::rollout::{RolloutOptions, rollout};
 //!
 //! // A double pendulum, and one whose second mass is 1 % too heavy, as a learned model might have it.
 //! let exact = build::<f64>("double-pendulum", &[])?;
@@ -12,7 +12,7 @@
 //! assert!(found.error.count == 3 && found.error.max < 0.01);
 //!
 //! // How far its motion is from keeping the exact energy, relative to 1 J at least.
-//! let motion = rollout(&*heavy, &[1.0, 0.5], &[0.0, 0.0], &Options::new(5.0, 0.1)).complete()?;
+//! let motion = rollout(&*heavy, &[1.0, 0.5], &[0.0, 0.0], &RolloutOptions::new(5.0, 0.1)).complete()?;
 //! let error = energy_error(&*exact, &motion, 1.0);
 //! assert!(error.error.iter().all(|e| *e < 0.05) && error.error.iter().any(|e| *e > 1e-4));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -9,7 +9,7 @@ use super::{ValidTime, angle_difference, relative_error, valid_time};
 use crate::data::StateEstimate;
 use crate::lagrangian::EulerLagrange;
 use crate::recording::hermite;
-use crate::rollout::{Force, Options, RolloutError, SampledForce, Start, rollout_each};
+use crate::rollout::{Force, RolloutError, RolloutOptions, SampledForce, Start, rollout_each};
 use serde::{Deserialize, Serialize};
 
 /// A stretch of recorded motion to be predicted from a state before it.
@@ -103,7 +103,7 @@ pub fn follow(
     let step = shortest.fold(end, f64::min);
     // A little longer, so that rounding leaves the last sample of every window inside.
     let max_steps = STEPS + (STEPS_PER_SAMPLE * end / step) as usize;
-    let options = Options { energy: false, max_steps, ..Options::new(end * (1.0 + 1e-12), step) };
+    let options = RolloutOptions::new(end * (1.0 + 1e-12), step).energy(false).max_steps(max_steps);
     let motions = rollout_each(model, &starts, &options, threads);
     let pairs = windows.iter().zip(motions);
     pairs

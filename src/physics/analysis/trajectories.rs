@@ -7,7 +7,7 @@ use super::{
 };
 use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance, project};
 use crate::random::RngStream;
-use crate::rollout::{Domain, Integrable, Integrator, Options, Rollout, RolloutError, Trajectory, rollout_many};
+use crate::rollout::{Domain, Integrable, Integrator, Rollout, RolloutError, RolloutOptions, Trajectory, rollout_many};
 use crate::scalar::Scalar;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ impl StartBox {
 /// nothing, and runs into a singular mass matrix, then costs only seconds.
 const LEARNED_STEPS: usize = 30_000;
 
-/// The test as the paper makes it: random starts, exact motion by [`Options::reference`], learned motion at rtol 1e-6 and
+/// The test as the paper makes it: random starts, exact motion by [`RolloutOptions::reference`], learned motion at rtol 1e-6 and
 /// atol 1e-8.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryTest<S> {
@@ -214,16 +214,14 @@ impl<S: Integrable> TrajectoryTest<S> {
     }
 
     /// Options of the exact motion and of the learned one.
-    pub(super) fn options(&self) -> (Options<S>, Options<S>) {
-        let reference = Options::reference(S::of_f64(self.t_end), S::of_f64(self.dt));
-        let options = Options {
-            method: self.method,
-            rtol: S::of_f64(self.rtol),
-            atol: S::of_f64(self.atol),
-            domain: self.domain.clone(),
-            max_steps: self.max_steps,
-            ..reference.clone()
-        };
+    pub(super) fn options(&self) -> (RolloutOptions<S>, RolloutOptions<S>) {
+        let reference = RolloutOptions::reference(S::of_f64(self.t_end), S::of_f64(self.dt));
+        let options = reference
+            .clone()
+            .method(self.method)
+            .tolerances(S::of_f64(self.rtol), S::of_f64(self.atol))
+            .domain(self.domain.clone())
+            .max_steps(self.max_steps);
         (reference, options)
     }
 
@@ -239,9 +237,9 @@ impl<S: Integrable> TrajectoryTest<S> {
     }
 
     /// Options of the Lyapunov estimate: a hundred renormalisations are plenty.
-    fn leaps(&self, reference: &Options<S>) -> Options<S> {
+    fn leaps(&self, reference: &RolloutOptions<S>) -> RolloutOptions<S> {
         let tolerance = S::max(S::of_f64(1e-10), reference.rtol);
-        Options { dt: S::of_f64(self.t_end.abs() / 100.0), rtol: tolerance, atol: tolerance, ..reference.clone() }
+        reference.clone().dt(S::of_f64(self.t_end.abs() / 100.0)).tolerances(tolerance, tolerance)
     }
 }
 
@@ -334,8 +332,8 @@ impl<S: Integrable> TrajectoryTest<S> {
             let (q, v) = truth.state(0);
             let start = [(q.to_vec(), v.to_vec())];
             let (t_end, dt) = (S::of_f64(until), S::of_f64(until / SAMPLES));
-            let dense = |model: &dyn EulerLagrange<S>, options: Options<S>| {
-                let options = Options { t_end, dt, energy: false, ..options };
+            let dense = |model: &dyn EulerLagrange<S>, options: RolloutOptions<S>| {
+                let options = options.t_end(t_end).dt(dt).energy(false);
                 rollout_many(model, &start, &options, 1).remove(0).trajectory
             };
             let (reference, options) = self.options();

@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(found.certified, 1.0);
         let guarded = Guarded::new(pendulum.build().unwrap(), &found);
         for (method, slack) in [(Integrator::Dopri5, 1e-3), (Integrator::Dop853, 1e-3), (Integrator::Gauss4, 0.2)] {
-            let options = rollout::Options { method, ..rollout::Options::new(5.0, 0.01) };
+            let options = rollout::RolloutOptions::new(5.0, 0.01).method(method);
             let motion = rollout(&guarded, &[1.5, 1.0], &[0.0, 0.0], &options);
             let Some(RolloutError::Uncertified { t, state }) = motion.stop else { panic!("{:?}", motion.stop) };
             let fastest = state[2..].iter().fold(0.0f64, |m, v| m.max(v.abs()));

@@ -5,7 +5,7 @@ use super::tests::{described, noise};
 use super::*;
 use crate::lagrangian::{Equations, EulerLagrange, SystemInstance, configure, project};
 use crate::recording::{RecordedTrajectory, Recording, Targets};
-use crate::rollout::{Driven, Options};
+use crate::rollout::{Driven, RolloutOptions};
 
 /// A mechanism with the constants of its motion and of its forces.
 struct Mechanism {
@@ -108,7 +108,8 @@ impl Mechanism {
         let track = |start: &&[f64]| {
             let (mut q, mut v) = (start[..n].to_vec(), start[n..].to_vec());
             project(model.manifold().unwrap(), &mut q, &mut v).unwrap();
-            let motion = Driven::new(&*model, &force).rollout(&q, &v, &Options::new(3.0, 0.02)).complete().unwrap();
+            let motion =
+                Driven::new(&*model, &force).rollout(&q, &v, &RolloutOptions::new(3.0, 0.02)).complete().unwrap();
             let mut forces = vec![0.0; if forced { motion.q.len() } else { 0 }];
             let own = forces.iter_mut().skip(driven).step_by(n).zip(&motion.t);
             own.for_each(|(force, t)| *force = push(*t));

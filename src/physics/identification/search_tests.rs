@@ -4,7 +4,7 @@ use super::tests::{described, noise, recorded};
 use super::*;
 use crate::lagrangian::SystemInstance;
 use crate::recording::{RecordedTrajectory, Recording};
-use crate::rollout::{Driven, Options};
+use crate::rollout::{Driven, RolloutOptions};
 
 /// A damped oscillator whose stiffness and friction are positive, from starting values.
 fn damped(k: f64, c: f64) -> SystemInstance<f64> {
@@ -271,8 +271,10 @@ fn a_delay_beside_a_force_is_found() {
     let model = form(&[("m", 1.0), ("k", 20.0), ("c", 0.4)]).build().unwrap();
     let push = |t: f64| 2.0 * (3.1 * t).sin() + 1.5 * (5.3 * t + 1.0).cos();
     let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = push(t);
-    let motion =
-        Driven::new(&*model, &force).rollout(&[0.4], &[0.0], &Options::reference(10.0, 0.01)).complete().unwrap();
+    let motion = Driven::new(&*model, &force)
+        .rollout(&[0.4], &[0.0], &RolloutOptions::reference(10.0, 0.01))
+        .complete()
+        .unwrap();
     for (seed, late) in [(0, 2), (1, 2), (2, 5), (3, 0)] {
         // Every second sample, read `late` steps later.
         let at: Vec<usize> = (late..motion.t.len()).step_by(2).collect();

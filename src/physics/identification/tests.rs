@@ -4,7 +4,7 @@ use super::*;
 use crate::lagrangian::{Description, SystemInstance, configure, configure_system};
 use crate::random::RngStream;
 use crate::recording::{RecordedTrajectory, Recording};
-use crate::rollout::{Driven, Motion, Options, SampledForce};
+use crate::rollout::{Driven, Motion, RolloutOptions, SampledForce};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
@@ -299,7 +299,7 @@ fn a_driven_oscillator_is_known_from_coarse_samples_and_the_hold_is_seen() {
         let draw: f64 = StandardNormal.sample(&mut rng);
         q.push(state.0 + 0.01 * draw);
         let held = SampledForce::constant(vec![*f]).unwrap();
-        let motion = Driven::new(&*model, &held).rollout(&[state.0], &[state.1], &Options::new(step, step));
+        let motion = Driven::new(&*model, &held).rollout(&[state.0], &[state.1], &RolloutOptions::new(step, step));
         let motion = motion.complete().unwrap();
         state = (motion.q[1], motion.v[1]);
     }
@@ -367,7 +367,7 @@ fn a_smooth_force_is_seen_between_coarse_samples() {
     let model = oscillator(&[("m", 1.0), ("k", 1.2)]).build().unwrap();
     let push = |t: f64| (0.8 * t).sin() + 0.5 * (0.37 * t).cos();
     let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = push(t);
-    let motion = Driven::new(&*model, &force).rollout(&[0.4], &[0.0], &Options::reference(400.0, 0.9));
+    let motion = Driven::new(&*model, &force).rollout(&[0.4], &[0.0], &RolloutOptions::reference(400.0, 0.9));
     let motion = motion.complete().unwrap();
     let mut rng = RngStream::Trajectories.generator(3);
     let noisy = |q: &f64| {
@@ -405,7 +405,7 @@ fn pushed(noise_of_force: f64, seed: u64) -> (SystemInstance<f64>, Recording) {
     let model = described(text, &[("m", 1.0), ("k", 1.3), ("c", 0.2)]).build().unwrap();
     let push = |t: f64| (0.8 * t).sin() + 0.7 * (2.1 * t).cos();
     let force = |t: f64, _: &[f64], _: &[f64], force: &mut [f64]| force[0] = push(t);
-    let motion = Driven::new(&*model, &force).rollout(&[0.2], &[0.0], &Options::reference(40.0, 0.05));
+    let motion = Driven::new(&*model, &force).rollout(&[0.2], &[0.0], &RolloutOptions::reference(40.0, 0.05));
     let motion = motion.complete().unwrap();
     let mut rng = RngStream::Trajectories.generator(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };

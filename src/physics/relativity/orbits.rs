@@ -5,7 +5,7 @@ use super::CentralCoordinates;
 use crate::geometry::{GeometryError, Sense, characters};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::Inertia;
-use crate::rollout::{Integrator, Options, RolloutError, rollout, rollout_in_pieces};
+use crate::rollout::{Integrator, RolloutError, RolloutOptions, rollout, rollout_in_pieces};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -25,15 +25,12 @@ pub(super) struct MotionState {
 }
 
 /// Options of the motions that are followed.
-pub(super) fn options(t_end: f64, dt: f64) -> Options<f64> {
-    Options {
-        method: Integrator::Dop853,
-        rtol: TOLERANCE,
-        atol: TOLERANCE,
-        max_steps: STEPS,
-        energy: false,
-        ..Options::new(t_end, dt)
-    }
+pub(super) fn options(t_end: f64, dt: f64) -> RolloutOptions<f64> {
+    RolloutOptions::new(t_end, dt)
+        .method(Integrator::Dop853)
+        .tolerances(TOLERANCE, TOLERANCE)
+        .max_steps(STEPS)
+        .energy(false)
 }
 
 /// The first sample for which `next` returns `true`, with the one before it.

@@ -302,7 +302,7 @@ fn integral(t: &[f64], y: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rollout::{Integrator, Options, rollout};
+    use crate::rollout::{Integrator, RolloutOptions, rollout};
     use crate::symmetry::{Chart, Degrees};
 
     #[test]
@@ -340,7 +340,7 @@ mod tests {
             Field { coefficients, gauge: vec![0.0; functions] }
         };
         let (exact, learned) = (particle(2.0, 0.0), particle(-5.0, 0.01));
-        let options = Options { method: Integrator::Gauss6, step: Some(0.01), ..Options::new(3.0, 0.01) };
+        let options = RolloutOptions::new(3.0, 0.01).method(Integrator::Gauss6).step(0.01);
         let motion = rollout(&learned, &[0.0, 0.0], &[0.7, 0.2], &options).complete().unwrap();
         let found = drifts((&exact, &learned), &basis, &[field(0), field(1)], &motion).unwrap();
         // Momenta 2 v, energy |v|^2; v_y grows by 0.03.

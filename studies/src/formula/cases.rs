@@ -3,7 +3,7 @@
 use lnn::formula::{Families, FormulaOptions};
 use lnn::lagrangian::{Dissipation, EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Rayleigh, WithForces};
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Options, rollout_many};
+use lnn::rollout::{RolloutOptions, rollout_many};
 use lnn::scalar::Real;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -74,7 +74,7 @@ impl Case {
             let made = starts.iter().map(|start| self.driven(&*model, start, how, &mut rng));
             made.collect()
         } else {
-            let options = Options { energy: false, ..Options::reference(how.seconds, step) };
+            let options = RolloutOptions::reference(how.seconds, step).energy(false);
             let motions = rollout_many(&*model, &starts, &options, 2);
             let tracks = motions.into_iter().enumerate().map(|(k, motion)| {
                 let motion = motion.trajectory;

@@ -14,7 +14,7 @@ use lnn::linalg::Workspace;
 use lnn::network::{Initialization, NetworkLagrangian};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::Real;
 use lnn::training::{Hooks, train};
 use rand::Rng;
@@ -221,7 +221,7 @@ impl Case {
             let force = self.forced.then(|| (rng.random_range(2.0..8.0), rng.random_range(-0.5..0.5)));
             let model = Driven { exact: (self.exact)(), friction: self.friction, force };
             let [q, v] = (self.start)(rng);
-            let options = Options { energy: false, ..Options::reference(seconds, self.step) };
+            let options = RolloutOptions::reference(seconds, self.step).energy(false);
             let motion = rollout(&model, &q, &v, &options).complete().expect("a system that moves on");
             let force = motion.q.chunks_exact(n).flat_map(|q| {
                 let drive = model.drive(q[0]);

@@ -7,7 +7,7 @@ use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
-use lnn::rollout::{Options, Trajectory, rollout};
+use lnn::rollout::{RolloutOptions, Trajectory, rollout};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::time::Instant;
@@ -19,7 +19,7 @@ const NOISE: f64 = 0.01;
 fn motion(exact: &dyn EulerLagrange<f64>, rng: &mut RandomGenerator) -> Trajectory<f64> {
     let mut draw = |size: f64| [0, 1].map(|_| rng.random_range(-size..size));
     let (q, v) = (draw(1.5), draw(1.0));
-    let options = Options { energy: false, ..Options::reference(4.99, 0.01) };
+    let options = RolloutOptions::reference(4.99, 0.01).energy(false);
     rollout(exact, &q, &v, &options).complete().expect("a double pendulum moves on")
 }
 

@@ -9,7 +9,7 @@ use lnn::geometry::Sense;
 use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::relativity::{CentralCoordinates, Chart};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -97,7 +97,7 @@ fn start(
 
 /// Motion from a state, `(samples, 4)` positions and velocities, until it is lost.
 fn motion(hole: &dyn EulerLagrange<f64>, [q, v]: &[[f64; 4]; 2], duration: f64, step: f64) -> [Vec<f64>; 2] {
-    let found = rollout(hole, q, v, &Options { energy: false, ..Options::reference(duration, step) }).trajectory;
+    let found = rollout(hole, q, v, &RolloutOptions::reference(duration, step).energy(false)).trajectory;
     let seen = found.q.chunks_exact(4).take_while(|q| distance(q) > LOST).count();
     [found.q[..4 * seen].to_vec(), found.v[..4 * seen].to_vec()]
 }

@@ -16,7 +16,7 @@ use lnn::lagrangian::{Constrained, EulerLagrange, ExpressionConstraints, Lagrang
 use lnn::network::Structure;
 use lnn::presets::Trainer;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Options, rollout_many};
+use lnn::rollout::{RolloutOptions, rollout_many};
 use lnn::scalar::Real;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -361,7 +361,7 @@ impl Row {
     fn motions(&self, starts: &[(Vec<f64>, Vec<f64>)], samples: usize) -> Vec<Option<States>> {
         let model = Mechanics::new(self.exact, []);
         let time = (samples - 1) as f64 * self.dt;
-        let options = Options { energy: false, rtol: 1e-11, atol: 1e-11, ..Options::reference(time, self.dt) };
+        let options = RolloutOptions::reference(time, self.dt).energy(false).tolerances(1e-11, 1e-11);
         let whole = rollout_many(&model, starts, &options, 2).into_iter().map(|motion| motion.complete().ok());
         whole.map(|motion| motion.map(|motion| States { q: motion.q, v: motion.v })).collect()
     }
@@ -528,7 +528,7 @@ fn run(row: &Row, data: &Data, cartesian: bool, seed: u64, budget: &Budget) -> O
         })
         .collect();
     let time = (SAMPLES - 1) as f64 * row.dt;
-    let options = Options { energy: false, rtol: 1e-8, atol: 1e-8, ..Options::new(time, row.dt) };
+    let options = RolloutOptions::new(time, row.dt).energy(false).tolerances(1e-8, 1e-8);
     let predicted = rollout_many(&*learned.motion().ok()?, &starts, &options, 2);
     let pairs = data.motions.iter().zip(&predicted).map(|(exact, predicted)| {
         let exact = exact.rows(row.exact.coordinates()).map(|(q, v)| row.exact.cartesian(q, v)).collect();

@@ -8,7 +8,7 @@ use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics};
 use lnn::network::Structure;
 use lnn::presets::Trainer;
 use lnn::recording::RecordedTrajectory;
-use lnn::rollout::{Options, rollout_many};
+use lnn::rollout::{RolloutOptions, rollout_many};
 use lnn::scalar::Real;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -159,7 +159,7 @@ fn motions(exact: Exact, starts: &[State], samples: usize, time: f64) -> Vec<Rec
     let model = Mechanics::new(exact, []);
     let starts: Vec<State> =
         starts.iter().map(|(q, p)| (q.clone(), p.iter().map(|p| p * exact.per_momentum()).collect())).collect();
-    let options = Options { energy: false, ..Options::reference(time, time / (samples - 1) as f64) };
+    let options = RolloutOptions::reference(time, time / (samples - 1) as f64).energy(false);
     let motions = rollout_many(&model, &starts, &options, 2).into_iter();
     motions
         .map(|motion| {
@@ -246,7 +246,7 @@ fn run(row: &Row, seed: u64, share: f64, steps: usize) -> (f64, f64) {
     let true_motions = motions(exact, &starts, samples, time);
     let starts: Vec<State> =
         starts.into_iter().map(|(q, p)| (q, p.iter().map(|p| p * per_momentum).collect())).collect();
-    let options = Options { energy: false, rtol: 1e-8, atol: 1e-8, ..Options::new(time, time / (samples - 1) as f64) };
+    let options = RolloutOptions::new(time, time / (samples - 1) as f64).energy(false).tolerances(1e-8, 1e-8);
     let predicted = rollout_many(&model, &starts, &options, threads);
     let errors = true_motions.iter().zip(predicted).map(|(exact_motion, predicted)| {
         let predicted = predicted.trajectory;

@@ -12,7 +12,7 @@ use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, ForceParts, Lagrangian, Mechanics, force_parts, inverse_dynamics};
 use lnn::network::{Factor, Structure};
 use lnn::presets::Trainer;
-use lnn::rollout::{Driven, Force, Options, Trajectory, rollout};
+use lnn::rollout::{Driven, Force, RolloutOptions, Trajectory, rollout};
 use lnn::scalar::Real;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -177,8 +177,8 @@ fn valid_letter(model: &dyn EulerLagrange<f64>, letter: &Motion) -> f64 {
     valid(&letter.q, &found.trajectory, LETTER_SPREAD, LETTER_STEP)
 }
 
-fn tight(time: f64, step: f64) -> Options<f64> {
-    Options { energy: false, rtol: 1e-9, atol: 1e-9, ..Options::new(time, step) }
+fn tight(time: f64, step: f64) -> RolloutOptions<f64> {
+    RolloutOptions::new(time, step).energy(false).tolerances(1e-9, 1e-9)
 }
 
 /// Motion without torques from rest by their integrator: Euler's method at 2 ms, velocities first.
@@ -244,7 +244,7 @@ fn tracking_error(model: Option<&dyn EulerLagrange<f64>>, letter: &Motion) -> f6
             Some(model) => inverse_dynamics(model, &q, &v, &a).expect("finite forces").generalized,
             None => a,
         };
-        let options = Options { energy: false, ..Options::new(CONTROL_STEP, CONTROL_STEP) };
+        let options = RolloutOptions::new(CONTROL_STEP, CONTROL_STEP).energy(false);
         let held = move |_: f64, _: &[f64], _: &[f64], force: &mut [f64]| force.copy_from_slice(&torque);
         let moved = Driven::new(&arm, &held).rollout(&q, &v, &options).complete().expect("smooth forces");
         let (next, speed) = moved.state(moved.len() - 1);

@@ -6,7 +6,7 @@ use lnn::lagrangian::{Description, SystemInstance, configure_system};
 use lnn::prelude::Motion;
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
-use lnn::rollout::{Driven, Options, SampledForce};
+use lnn::rollout::{Driven, RolloutOptions, SampledForce};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
@@ -160,7 +160,7 @@ fn driven(truth: &Constants, force_noise: f64, rng: &mut RandomGenerator) -> Out
         force.push(push(*t) + force_noise * normal(rng));
         let held = SampledForce::constant(vec![push(*t)])?;
         let motion =
-            Driven::new(&*model, &held).rollout(&[state.0], &[state.1], &Options::new(step, step)).complete()?;
+            Driven::new(&*model, &held).rollout(&[state.0], &[state.1], &RolloutOptions::new(step, step)).complete()?;
         state = (motion.q[1], motion.v[1]);
     }
     Ok(DUFFING.recording(vec![track(times, q, force)]))

@@ -5,7 +5,7 @@ use lnn::analysis::lyapunov;
 use lnn::lagrangian::{EulerLagrange, Mechanics, WithForces, build};
 use lnn::prelude::*;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::symmetry::{Basis, Chart, Degrees, EXACT, Invariant, Region, quadratic, symmetries};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -60,7 +60,7 @@ impl Motion<'_> {
             let samples = (50.0 * self.seconds) as usize;
             let times: Vec<f64> = (0..=samples).map(|k| 0.02 * k as f64).collect();
             let mut q = match self.model {
-                Some(model) => rollout(model, &q, &v, &Options::new(self.seconds, 0.02)).complete()?.q,
+                Some(model) => rollout(model, &q, &v, &RolloutOptions::new(self.seconds, 0.02)).complete()?.q,
                 None => vec![0.0; 2 * times.len()],
             };
             q.truncate(2 * times.len());
@@ -221,7 +221,7 @@ fn is_chaotic(
 ) -> Outcome<bool> {
     let state: Vec<f64> = bounds.iter().map(|[low, high]| rng.random_range(*low..*high)).collect();
     let (q, v) = state.split_at(state.len() / 2);
-    Ok(lyapunov(model, q, v, &Options::reference(seconds, seconds / 200.0))?.is_chaotic())
+    Ok(lyapunov(model, q, v, &RolloutOptions::reference(seconds, seconds / 200.0))?.is_chaotic())
 }
 
 fn chaotic(seeds: u64) -> Outcome<Vec<Rate>> {

@@ -5,7 +5,7 @@ use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{Description, SystemInstance, configure_system};
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Driven, Options};
+use lnn::rollout::{Driven, RolloutOptions};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
@@ -168,7 +168,8 @@ impl Trial {
         let mut tracks = Vec::new();
         for sign in [1.0, -0.6] {
             let start: Vec<f64> = form.coordinates.iter().map(|(_, q)| q * sign).collect();
-            let motion = Driven::new(&*model, &law).rollout(&start, &vec![0.0; n], &Options::reference(seconds, STEP));
+            let motion =
+                Driven::new(&*model, &law).rollout(&start, &vec![0.0; n], &RolloutOptions::reference(seconds, STEP));
             let motion = motion.complete()?;
             let noisy = |q: &f64| {
                 let draw: f64 = StandardNormal.sample(&mut rng);

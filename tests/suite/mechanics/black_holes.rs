@@ -2,7 +2,7 @@
 
 use lnn::lagrangian::systems::{KerrGeodesic, KerrSchild};
 use lnn::lagrangian::{Request, Terms, configure};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::{Dd, Real, Scalar};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -106,7 +106,7 @@ fn free_fall_passes_the_horizon() {
     // From rest at r0: proper time sqrt(r0^3/(8 M)) (h + sin h), r = r0 (1 + cos h)/2.
     let h = (2.0 * 1.5 / r0 - 1.0_f64).acos();
     let time = (r0.powi(3) / 8.0).sqrt() * (h + h.sin());
-    let run = rollout(&*exact, &q, &v, &Options::reference(time, time / 8.0));
+    let run = rollout(&*exact, &q, &v, &RolloutOptions::reference(time, time / 8.0));
     assert_eq!(run.stop, None);
     let (end, _) = run.trajectory.state(8);
     let r = end[1..].iter().map(|x| x * x).sum::<f64>().sqrt();

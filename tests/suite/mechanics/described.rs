@@ -6,7 +6,7 @@ use lnn::linalg::{self, Workspace};
 use lnn::network::Structure;
 use lnn::pipeline::parse_system;
 use lnn::presets::Preset;
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::{Dd, Scalar};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -106,7 +106,7 @@ fn a_spinning_hole_keeps_its_shell_and_what_its_symmetries_promise() {
     assert_eq!(kerr.constrained_coordinate(), Some(0));
     let built = kerr.build().unwrap();
     for (q, v) in (0..20).map(|_| random_state(&kerr, &kerr.system.trajectory(4).start, &mut rng)) {
-        let run = rollout(built.as_ref(), &q, &v, &Options::reference(5.0, 0.5));
+        let run = rollout(built.as_ref(), &q, &v, &RolloutOptions::reference(5.0, 0.5));
         assert!(run.stop.is_none(), "{:?}", run.stop);
         let mut terms = Terms::default();
         built.terms(&run.trajectory.q, &run.trajectory.v, Request::LAGRANGIAN | Request::MOMENTUM, &mut terms).unwrap();

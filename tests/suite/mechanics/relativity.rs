@@ -5,7 +5,7 @@ use lnn::lagrangian::{
     self, Bounds, EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, System, SystemInstance, Terms,
 };
 use lnn::linalg::{self, Inertia};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::{Dd, Real, Scalar};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -225,7 +225,7 @@ fn energy_and_mass_shell_are_kept_along_the_motion() {
         let configured = configure::<f64>(&system.name, &[]);
         let n = configured.coordinates;
         let test = system.trajectory(n);
-        let options = Options::reference(test.t_end.min(5.0), test.dt);
+        let options = RolloutOptions::reference(test.t_end.min(5.0), test.dt);
         let built = configured.build().unwrap();
         for _ in 0..3 {
             let (q, v) = random_state(&configured, &test.start, &mut rng);
@@ -310,7 +310,7 @@ fn geodesics_of_anti_de_sitter_space_are_circles() {
     let mut v = [0.0, 0.0];
     system.impose_constraint(&q, &mut v).unwrap();
     assert_eq!(v, [0.75, 0.0]);
-    let options = Options::reference(1.25, 0.125);
+    let options = RolloutOptions::reference(1.25, 0.125);
     let run = rollout(&*system.build().unwrap(), &q, &v, &options);
     assert_eq!((run.stop, run.trajectory.len()), (None, 11));
     for (k, tau) in run.trajectory.t.iter().enumerate() {

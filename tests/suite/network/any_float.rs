@@ -7,7 +7,7 @@ use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, configure};
 use lnn::network::{
     Activation, ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
 };
-use lnn::rollout::{Integrator, Options, rollout_fixed};
+use lnn::rollout::{Integrator, RolloutOptions, rollout_fixed};
 use lnn::scalar::{AnyFloat, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use lnn::training::Objective;
@@ -47,7 +47,7 @@ fn terms<S: Scalar>(model: &dyn EulerLagrange<S>) -> Results {
 /// Steps of Gauss's method of order 6.
 fn motion<S: Scalar>(model: &dyn EulerLagrange<S>) -> Results {
     let [t_end, dt, step] = [0.3, 0.1, 0.05].map(S::of_f64);
-    let options = Options { method: Integrator::Gauss6, step: Some(step), ..Options::new(t_end, dt) };
+    let options = RolloutOptions::new(t_end, dt).method(Integrator::Gauss6).step(step);
     let rolled = rollout_fixed(model, &numbers::<S>(&Q[..2]), &numbers::<S>(&V[..2]), &options).complete().unwrap();
     vec![("motion", floats(&rolled.q)), ("velocities", floats(&rolled.v))]
 }

@@ -14,7 +14,7 @@ use lnn::network::{
     Structure, initial_weights,
 };
 use lnn::optimizers::{Method, Schedule};
-use lnn::rollout::{Integrator, Options, RolloutError, rollout, rollout_fixed, rollout_together};
+use lnn::rollout::{Integrator, RolloutError, RolloutOptions, rollout, rollout_fixed, rollout_together};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use lnn::training::{Hooks, train};
@@ -276,7 +276,7 @@ fn the_energy_of_a_motion_goes_where_friction_takes_it() {
     let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
     let at = |dt: f64| {
-        let options = Options { rtol: 1e-12, atol: 1e-12, method: Integrator::Dop853, ..Options::new(3.0, dt) };
+        let options = RolloutOptions::new(3.0, dt).tolerances(1e-12, 1e-12).method(Integrator::Dop853);
         let rolled = rollout(&model, &q, &v, &options);
         assert_eq!(rolled.stop, None);
         rolled.trajectory.energy_balance(&model).unwrap()
@@ -287,7 +287,7 @@ fn the_energy_of_a_motion_goes_where_friction_takes_it() {
     assert!(fine.defect().abs() < 1e-8 * fine.size, "{fine:?}");
     assert!(coarse.defect().abs() < 1e-4 * coarse.size, "{coarse:?}");
     // Backwards the motion takes its energy back.
-    let rolled = rollout(&model, &q, &v, &Options { rtol: 1e-12, atol: 1e-12, ..Options::new(-0.3, 0.0025) });
+    let rolled = rollout(&model, &q, &v, &RolloutOptions::new(-0.3, 0.0025).tolerances(1e-12, 1e-12));
     let back = rolled.complete().unwrap().energy_balance(&model).unwrap();
     assert!(back.change > 0.1 && back.dissipated < -0.1 && back.defect().abs() < 1e-8 * back.size, "{back:?}");
 }
@@ -297,10 +297,10 @@ fn the_energy_of_a_motion_goes_where_friction_takes_it() {
 fn gauss_methods_integrate_friction_and_the_variational_one_refuses() {
     let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
-    let reference = Options { rtol: 1e-13, atol: 1e-13, ..Options::reference(0.5, 0.5) };
+    let reference = RolloutOptions::reference(0.5, 0.5).tolerances(1e-13, 1e-13);
     let exact = rollout(&model, &q, &v, &reference).complete().unwrap();
     let error = |method, step: f64| {
-        let rolled = rollout_fixed(&model, &q, &v, &Options { method, step: Some(step), ..Options::new(0.5, 0.5) });
+        let rolled = rollout_fixed(&model, &q, &v, &RolloutOptions::new(0.5, 0.5).method(method).step(step));
         let motion = rolled.complete().unwrap();
         let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         apart(&motion.q, &exact.q).max(apart(&motion.v, &exact.v))
@@ -310,7 +310,7 @@ fn gauss_methods_integrate_friction_and_the_variational_one_refuses() {
         let slope = (coarse / fine).log2();
         assert!((slope - order).abs() < 0.7, "{method:?}: {coarse:.1e}, {fine:.1e}, order {slope:.2}");
     }
-    let options = Options { method: Integrator::Variational, ..Options::new(1.0, 0.1) };
+    let options = RolloutOptions::new(1.0, 0.1).method(Integrator::Variational);
     let starts = vec![(q.to_vec(), v.to_vec()); 2];
     let refused = rollout_together(&model, &starts, &options, 1).into_iter().chain([rollout(&model, &q, &v, &options)]);
     for rolled in refused {

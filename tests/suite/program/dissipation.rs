@@ -2,7 +2,7 @@
 
 use crate::running::{Folder, lnn, model, text};
 use lnn::network::{Layout, ModelFile, NetworkLagrangian};
-use lnn::rollout::{Integrator, Options, rollout};
+use lnn::rollout::{Integrator, RolloutOptions, rollout};
 use serde_json::Value;
 use std::fs;
 
@@ -75,7 +75,7 @@ fn a_motion_with_friction_comes_with_its_energy_balance() {
     assert_eq!(csv.lines().next(), Some("t,shoulder,elbow,shoulder_dot,elbow_dot,energy"));
     // The same by the library.
     let network = NetworkLagrangian::new(damped.header.architecture, damped.weights).unwrap().cast::<f64>();
-    let options = Options { rtol: 1e-10, atol: 1e-12, method: Integrator::Dopri5, ..Options::new(0.5, 0.01) };
+    let options = RolloutOptions::new(0.5, 0.01).tolerances(1e-10, 1e-12).method(Integrator::Dopri5);
     let balance = rollout(&network, &[1.0, 2.0], &[0.5, -0.5], &options).trajectory.energy_balance(&network).unwrap();
     assert!((balance.dissipated - taken).abs() <= 1e-9 * taken, "{balance:?} {taken}");
 

@@ -4,7 +4,7 @@ use crate::common::damped;
 use crate::running::{Folder, Run, joined, lead, lnn, text};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::ModelFile;
-use lnn::rollout::{Integrator, Options, rollout};
+use lnn::rollout::{Integrator, RolloutOptions, rollout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -26,7 +26,7 @@ pub(super) fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, 
     for run in 0..runs {
         let mut draw = |size: f64| -> Vec<f64> { (0..n).map(|_| rng.random_range(-size..size)).collect() };
         let start = [draw(1.5 * n as f64), draw(2.0 * n as f64)];
-        let options = Options { method: Integrator::Dop853, ..Options::new(seconds, 0.02) };
+        let options = RolloutOptions::new(seconds, 0.02).method(Integrator::Dop853);
         let motion = rollout(model, &start[0], &start[1], &options).complete().unwrap();
         let mut terms = Terms::default();
         model.terms(&motion.q, &motion.v, Request::ACCELERATION, &mut terms).unwrap();

@@ -6,7 +6,7 @@ use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::configure;
 use lnn::network::ModelFile;
 use lnn::recording::{Columns, read_recording};
-use lnn::rollout::{Driven, Options, SampledForce};
+use lnn::rollout::{Driven, RolloutOptions, SampledForce};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -50,7 +50,7 @@ fn runs(count: usize) -> Vec<Vec<String>> {
             let force = SampledForce::new(2, times, values.clone()).unwrap();
             let driven = Driven::new(arm.as_ref(), &force);
             let (q, v) = ([draw(1.5), draw(1.5)], [draw(2.0), draw(2.0)]);
-            let motion = driven.rollout(&q, &v, &Options::reference(2.0, 1.0 / RATE)).complete().unwrap();
+            let motion = driven.rollout(&q, &v, &RolloutOptions::reference(2.0, 1.0 / RATE)).complete().unwrap();
             (0..motion.len())
                 .map(|k| {
                     let (q, v) = motion.state(k);

@@ -3,7 +3,7 @@
 use crate::running::lnn;
 use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, configure_system};
 use lnn::random::RngStream;
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 use std::fs;
@@ -18,7 +18,7 @@ fn swings_of(model: &dyn EulerLagrange<f64>, starts: &[f64]) -> String {
     let mut rng = RngStream::Trajectories.generator(1);
     let mut csv = "run,t,a\n".to_string();
     for (run, start) in starts.iter().enumerate() {
-        let motion = rollout(model, &[*start], &[0.0], &Options::new(3.0, 0.05)).complete().unwrap();
+        let motion = rollout(model, &[*start], &[0.0], &RolloutOptions::new(3.0, 0.05)).complete().unwrap();
         for (t, a) in motion.t.iter().zip(&motion.q) {
             let noise: f64 = StandardNormal.sample(&mut rng);
             writeln!(csv, "{run},{t},{}", a + 1e-4 * noise).unwrap();
@@ -76,7 +76,7 @@ fn of_lagrangians_with_one_motion_the_definite_and_short_one_is_found() {
     let mut csv = "run,t,x,a\n".to_string();
     let starts = [0.5, -1.0, 1.4, -1.8, 2.2, -2.5, 2.8, 3.0, 0.9, -0.6, -2.1, 1.7];
     for (run, start) in starts.iter().enumerate() {
-        let motion = rollout(&cart, &[0.0, *start], &[0.0; 2], &Options::new(3.0, 0.01)).complete().unwrap();
+        let motion = rollout(&cart, &[0.0, *start], &[0.0; 2], &RolloutOptions::new(3.0, 0.01)).complete().unwrap();
         for (t, q) in motion.t.iter().zip(motion.q.chunks_exact(2)) {
             let mut noisy =
                 |x: f64| x + 1e-2 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);

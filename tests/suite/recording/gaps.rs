@@ -2,7 +2,7 @@
 
 use lnn::lagrangian::{Request, Terms, build};
 use lnn::recording::{Columns, LoadedRecording, SmoothOptions, Smoothing, read_recording};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -19,7 +19,7 @@ fn takes() -> Vec<[Vec<f64>; 3]> {
     let model = build::<f64>("double-pendulum", &[]).unwrap();
     let mut take = |_| {
         let start: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-        let options = Options::reference((FRAMES - 1) as f64 * STEP, STEP);
+        let options = RolloutOptions::reference((FRAMES - 1) as f64 * STEP, STEP);
         let motion = rollout(&*model, &start[..2], &start[2..], &options).complete().unwrap();
         let mut terms = Terms::default();
         model.terms(&motion.q, &motion.v, Request::ACCELERATION, &mut terms).unwrap();

@@ -2,7 +2,7 @@
 
 use lnn::lagrangian::{Request, Terms, build};
 use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions, Smoothed, Smoothing};
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,7 +12,8 @@ const SIGMA: f64 = 1e-3;
 /// Noisy positions at 400 samples per second, and exact position, velocity and acceleration.
 fn pendulum() -> (Recording, [Vec<f64>; 3]) {
     let model = build::<f64>("double-pendulum", &[]).unwrap();
-    let motion = rollout(&*model, &[1.6, 0.4], &[0.0, 0.5], &Options::reference(12.0, 0.0025)).complete().unwrap();
+    let motion =
+        rollout(&*model, &[1.6, 0.4], &[0.0, 0.5], &RolloutOptions::reference(12.0, 0.0025)).complete().unwrap();
     let mut terms = Terms::default();
     model.terms(&motion.q, &motion.v, Request::ACCELERATION, &mut terms).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(4);

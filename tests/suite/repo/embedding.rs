@@ -4,7 +4,7 @@ use super::floors::LIBRARIES;
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Terms, systems::DoublePendulum};
 use lnn::network::{ModelFile, NetworkLagrangian};
-use lnn::rollout::Options;
+use lnn::rollout::RolloutOptions;
 use lnn::training::Objective;
 use lnn::{analysis, linalg, network, recording, rollout as motion, scalar, storage, tape, training};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ const _: () = {
     shared::<ModelFile<f32>>();
     shared::<motion::Trajectory<f64>>();
     shared::<motion::Rollout<f64>>();
-    shared::<Options<f64>>();
+    shared::<RolloutOptions<f64>>();
     shared::<recording::Recording>();
     shared::<linalg::Workspace<f64>>();
     shared::<lnn::tape::Evaluation<f32>>();

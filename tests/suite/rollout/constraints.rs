@@ -4,7 +4,7 @@ use lnn::lagrangian::{
     Constrained, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, ManifoldRows, Mechanics, MechanicsError,
     configure, inverse_dynamics,
 };
-use lnn::rollout::{Driven, Integrator, Options, RolloutError, Trajectory, rollout, rollout_fixed};
+use lnn::rollout::{Driven, Integrator, RolloutError, RolloutOptions, Trajectory, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
 const FIXED: [(Integrator, f64); 4] =
@@ -57,11 +57,11 @@ fn fixed_steps_have_their_order_and_stay_on_the_constraints() {
     for (name, q, v) in starts() {
         let model = model(name);
         let t_end = if name == "schwarzschild-by-clock" { 40.0 } else { 1.0 };
-        let exact = last(&rollout(&*model, &q, &v, &Options::reference(t_end, t_end)).complete().unwrap());
+        let exact = last(&rollout(&*model, &q, &v, &RolloutOptions::reference(t_end, t_end)).complete().unwrap());
         for (method, order) in FIXED {
             let base = if order > 5.0 { 8.0 } else { 20.0 };
             let error = |steps: f64| {
-                let options = Options { method, step: Some(t_end / steps), ..Options::new(t_end, t_end / base) };
+                let options = RolloutOptions::new(t_end, t_end / base).method(method).step(t_end / steps);
                 let motion = rollout_fixed(&*model, &q, &v, &options).complete().unwrap();
                 let off = defect(&*model, &motion);
                 assert!(off < 1e-12, "{name} {method:?}: {off:e} off the constraints");
@@ -79,10 +79,10 @@ fn adaptive_steps_stay_on_the_constraints_with_their_tolerance() {
     for (name, q, v) in starts() {
         let model = model(name);
         let t_end = if name == "schwarzschild-by-clock" { 100.0 } else { 5.0 };
-        let exact = rollout(&*model, &q, &v, &Options::reference(t_end, t_end / 50.0)).complete().unwrap();
+        let exact = rollout(&*model, &q, &v, &RolloutOptions::reference(t_end, t_end / 50.0)).complete().unwrap();
         for method in [Integrator::Dopri5, Integrator::Dop853] {
             for tolerance in [1e-5, 1e-8] {
-                let options = Options { method, rtol: tolerance, atol: tolerance, ..Options::new(t_end, t_end / 50.0) };
+                let options = RolloutOptions::new(t_end, t_end / 50.0).method(method).tolerances(tolerance, tolerance);
                 let done = rollout(&*model, &q, &v, &options);
                 let motion = done.trajectory;
                 let (off, error) = (defect(&*model, &motion), distance(&last(&motion), &last(&exact)));
@@ -101,7 +101,7 @@ fn energy_stays_in_its_band() {
     let pendulum = model("cartesian-chain-1");
     let (q, v) = ([0.6, -0.8], [0.0, 0.0]);
     for (method, bound) in [(Integrator::Midpoint, 2e-2), (Integrator::Gauss4, 2e-5)] {
-        let options = Options { method, step: Some(0.05), ..Options::new(400.0, 0.5) };
+        let options = RolloutOptions::new(400.0, 0.5).method(method).step(0.05);
         let motion = rollout(&*pendulum, &q, &v, &options).complete().unwrap();
         let energy = motion.energy.as_ref().unwrap();
         let worst = |part: &[f64]| part.iter().map(|e| (e - energy[0]).abs()).fold(0.0, f64::max);
@@ -112,8 +112,7 @@ fn energy_stays_in_its_band() {
     let wide = configure::<Dd>("cartesian-chain-1", &[]).unwrap().build().unwrap();
     let [q, v] = [q, v].map(|x| x.map(Dd::of));
     let q = [q[0], -(Dd::of(1.0) - q[0] * q[0]).sqrt()];
-    let options =
-        Options { method: Integrator::Gauss6, step: Some(Dd::of(0.02)), ..Options::new(Dd::of(1.0), Dd::of(1.0)) };
+    let options = RolloutOptions::new(Dd::of(1.0), Dd::of(1.0)).method(Integrator::Gauss6).step(Dd::of(0.02));
     let end = rollout_fixed(&*wide, &q, &v, &options).complete().unwrap();
     let (q, _) = end.state(1);
     let length = (q[0] * q[0] + q[1] * q[1] - Dd::of(1.0)).to_f64().abs();
@@ -124,7 +123,7 @@ fn energy_stays_in_its_band() {
 fn starts_are_brought_near_or_refused_with_their_distance() {
     let pendulum = model("cartesian-chain-1");
     for method in [Integrator::Dopri5, Integrator::Gauss4] {
-        let options = Options { method, ..Options::new(1.0, 0.1) };
+        let options = RolloutOptions::new(1.0, 0.1).method(method);
         let near = rollout(&*pendulum, &[0.6003, -0.8], &[0.0, 0.0], &options).complete().unwrap();
         let (q, _) = near.state(0);
         assert!((q[0].hypot(q[1]) - 1.0).abs() < 1e-15 && (q[0] - 0.6003).abs() < 4e-4);
@@ -154,7 +153,7 @@ fn a_linkage_that_folds_stops_where_its_rows_lose_their_rank() {
     // Both cranks turn alike with one radian per second: flat after one.
     let (s, c) = 1.0f64.sin_cos();
     let start = ([c, s, 2.0 + c, s], [s, -c, s, -c]);
-    let options = Options { method: Integrator::Dopri5, ..Options::new(2.0, 0.01) };
+    let options = RolloutOptions::new(2.0, 0.01).method(Integrator::Dopri5);
     let done = rollout(&model, &start.0, &start.1, &options);
     assert!(
         done.stop.is_none() || done.stop.as_ref().and_then(RolloutError::time).is_some_and(|t| (t - 1.0).abs() < 0.05)
@@ -171,12 +170,10 @@ fn forces_from_outside_act_within_the_constraints() {
     let push = |_: f64, q: &[f64], _: &[f64], force: &mut [f64]| (force[0], force[1]) = (-3.0 * q[1], 3.0 * q[0]);
     let driven = Driven::new(&*pendulum, &push);
     for method in [Integrator::Dop853, Integrator::Gauss6, Integrator::Variational] {
-        let options = Options {
-            method,
-            step: method.is_structure_preserving().then_some(1e-3),
-            rtol: 1e-9,
-            ..Options::new(0.5, 0.005)
-        };
+        let options = RolloutOptions::new(0.5, 0.005)
+            .method(method)
+            .step(method.is_structure_preserving().then_some(1e-3))
+            .tolerances(1e-9, 1e-8);
         let motion = driven.rollout(&[0.0, -1.0], &[0.0, 0.0], &options).complete().unwrap();
         let energy = motion.energy.as_ref().unwrap();
         let end = last(&motion);
@@ -197,7 +194,7 @@ fn gear(formula: &str) -> impl EulerLagrange<f64> {
 fn a_motion_ends_where_a_constraint_has_a_second_branch() {
     for method in Integrator::ALL {
         for sign in [1.0, -1.0] {
-            let options = Options { method, ..Options::new(6.0, 0.02) };
+            let options = RolloutOptions::new(6.0, 0.02).method(method);
             // Wheels that turn on and on. The cosine vanishes with its gradient where b is a whole number of half turns.
             let (q, v) = ([0.0, 0.3], [sign * 1.0, sign * 2.0]);
             let stopped = rollout(&gear("cos(b) - cos(2*a + 0.3)"), &q, &v, &options);
@@ -221,7 +218,7 @@ fn a_motion_ends_where_a_constraint_has_a_second_branch() {
 fn a_motion_that_turns_far_in_a_step_has_one_branch() {
     let pendulum = model("cartesian-chain-1");
     for (method, dt) in [(Integrator::Gauss6, 0.2), (Integrator::Dop853, 1.0), (Integrator::Variational, 0.02)] {
-        let options = Options { method, ..Options::new(4.0, dt) };
+        let options = RolloutOptions::new(4.0, dt).method(method);
         let motion = rollout(&*pendulum, &[0.0, -1.0], &[9.0, 0.0], &options);
         assert!(motion.stop.is_none(), "{method:?}: {:?}", motion.stop);
     }

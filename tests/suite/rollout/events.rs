@@ -1,7 +1,7 @@
 //! Events along motions, against closed forms.
 
 use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, build};
-use lnn::rollout::{Event, Integrator, Occurrence, Options, Rollout, RolloutError, rollout};
+use lnn::rollout::{Event, Integrator, Occurrence, Rollout, RolloutError, RolloutOptions, rollout};
 use lnn::scalar::Scalar;
 use std::f64::consts::{PI, TAU};
 
@@ -20,8 +20,8 @@ fn ground(e: f64) -> Event<f64> {
 }
 
 /// Options with tolerances and steps by which smooth motions over a few seconds are known to 1e-11 by methods of high order.
-fn options(method: Integrator, t_end: f64, events: Vec<Event<f64>>) -> Options<f64> {
-    Options { method, rtol: 1e-13, atol: 1e-13, events, ..Options::new(t_end, 0.01) }
+fn options(method: Integrator, t_end: f64, events: Vec<Event<f64>>) -> RolloutOptions<f64> {
+    RolloutOptions::new(t_end, 0.01).method(method).tolerances(1e-13, 1e-13).events(events)
 }
 
 /// Times of the events of a name.
@@ -60,7 +60,7 @@ fn a_ball_bounces_at_the_times_and_to_the_heights_of_the_closed_form() {
         assert!(found.trajectory.q.iter().all(|y| *y > -1e-12), "{method:?}");
     }
     let single = Event::new("ground", |_, q: &[f32], _: &[f32]| q[0]).falling().restitution(0.8);
-    let found = rollout(&ball::<f32>(), &[1.0], &[0.0], &Options { events: vec![single], ..Options::new(2.0, 0.1) });
+    let found = rollout(&ball::<f32>(), &[1.0], &[0.0], &RolloutOptions::new(2.0, 0.1).events(vec![single]));
     assert!((f64::from(found.events[1].t) - 2.6 * fall()).abs() < 1e-5, "{:?}", found.events);
 }
 
@@ -200,7 +200,7 @@ fn two_crossings_in_one_step_and_two_events_at_one_time_are_found() {
         let top = Event::new("top", |_, q: &[f64], _: &[f64]| q[0] - 0.99);
         let same = |factor: f64| move |_: f64, q: &[f64], _: &[f64]| factor * q[0];
         let events = vec![top, Event::new("a", same(1.0)), Event::new("b", same(2.0))];
-        let options = Options { dt: 0.5, step, rtol: 1e-8, atol: 1e-8, ..options(method, 20.0, events) };
+        let options = options(method, 20.0, events).dt(0.5).step(step).tolerances(1e-8, 1e-8);
         let found = rollout(&spring, &[0.0], &[1.0], &options);
         let width = 0.99f64.acos();
         let exact: Vec<f64> = (0..3).flat_map(|k| [-width, width].map(|w| PI / 2.0 + TAU * f64::from(k) + w)).collect();

@@ -5,8 +5,8 @@ use lnn::lagrangian::systems::DoublePendulum;
 use lnn::lagrangian::systems::HarmonicOscillator;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, force_parts, inverse_dynamics};
 use lnn::rollout::{
-    Between, Driven, Force, Integrable, Integrator, Options, Rollout, RolloutError, SampledForce, Start, rollout,
-    rollout_each,
+    Between, Driven, Force, Integrable, Integrator, Rollout, RolloutError, RolloutOptions, SampledForce, Start,
+    rollout, rollout_each,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 use std::ops::ControlFlow;
@@ -42,10 +42,10 @@ fn weight<S: Scalar>(_: S, q: &[S], _: &[S], force: &mut [S]) {
     force[1] = S::of_f64(-9.81) * q[1].sin();
 }
 
-fn options<S: Scalar>(method: Integrator, t_end: f64, step: f64) -> Options<S> {
+fn options<S: Scalar>(method: Integrator, t_end: f64, step: f64) -> RolloutOptions<S> {
     let tolerance = S::max(S::of_f64(1e-11), S::epsilon().ldexp(4));
-    let base = Options::new(S::of_f64(t_end), S::of_f64(0.1));
-    Options { method, rtol: tolerance, atol: tolerance, step: Some(S::of_f64(step)), ..base }
+    let base = RolloutOptions::new(S::of_f64(t_end), S::of_f64(0.1));
+    base.method(method).tolerances(tolerance, tolerance).step(S::of_f64(step))
 }
 
 /// What a step of 1/128 leaves of the error of a smooth motion over a few seconds.
@@ -80,7 +80,7 @@ fn a_force_in_time_by_every_method_and_in_both_directions() {
     for method in Integrator::ALL {
         for (t0, t_end) in [(0.0, 6.05), (1.5, -2.0)] {
             let start = exact(t0);
-            let options = Options { t0, ..options(method, t_end, STEP) };
+            let options = options(method, t_end, STEP).t0(t0);
             let rolled = driven.rollout(&start[..1], &start[1..], &options);
             assert_eq!((rolled.stop.clone(), *rolled.trajectory.t.last().unwrap()), (None, t_end));
             let errors = (0..rolled.trajectory.len()).map(|k| {
@@ -154,10 +154,10 @@ fn jumps_and_kinks_cost_nothing_where_they_are_known() {
     // At 0.333 it is at 0.333^2 with 0.666 m/s; 0.667 s follow.
     let exact = [0.333 * 0.333 + 0.666 * 0.667 - 0.5 * 0.667 * 0.667, 0.666 - 0.667];
     for method in Integrator::ALL {
-        let options = Options { dt: 0.25, ..options(method, 1.0, 0.25) };
+        let options = options(method, 1.0, 0.25).dt(0.25);
         let there = end(&Driven::new(&model, &known).rollout(&[0.0], &[0.0], &options));
         assert!((there[0] - exact[0]).abs() < 1e-13 && (there[1] - exact[1]).abs() < 1e-13, "{method:?}: {there:?}");
-        let back = Options { t0: 1.0, t_end: 0.0, ..options.clone() };
+        let back = options.clone().t0(1.0).t_end(0.0);
         let back = end(&Driven::new(&model, &known).rollout(&exact[..1], &exact[1..], &back));
         assert!(back[0].abs() < 1e-13 && back[1].abs() < 1e-13, "{method:?}: {back:?}");
         if method.is_structure_preserving() {
@@ -170,7 +170,7 @@ fn jumps_and_kinks_cost_nothing_where_they_are_known() {
     // Velocities are areas of trapezia.
     let velocity = 0.5 * 0.3 * 3.0 + 0.5 * 0.4 * 2.0 + 0.5 * 0.3 * -0.5;
     for method in Integrator::ALL {
-        let options = Options { dt: 0.5, ..options(method, 1.0, 0.5) };
+        let options = options(method, 1.0, 0.5).dt(0.5);
         let [_, v] = end(&Driven::new(&model, &ramp).rollout(&[0.0], &[0.0], &options));
         assert!((v - velocity).abs() < 1e-13, "{method:?}: {v} {velocity}");
     }
@@ -186,7 +186,7 @@ fn work_and_friction_make_the_change_of_energy() {
     let driven = Driven::new(&chain, &motor);
     for (t0, t_end) in [(0.0, 2.0), (2.0, 1.0)] {
         // Dry friction is felt within percentage of a second.
-        let options = Options { t0, ..Options::reference(t_end, 0.002) };
+        let options = RolloutOptions::reference(t_end, 0.002).t0(t0);
         let motion = driven.rollout(&[0.4, -0.2], &[1.0, 0.5], &options).complete().unwrap();
         let balance = driven.energy_balance(&motion).unwrap();
         assert!(balance.work.abs() > 0.1 && balance.dissipated.abs() > 0.1, "{balance:?}");
@@ -224,7 +224,7 @@ fn ensembles_take_a_force_each() {
     let (q, v) = ([0.2, 0.1], [0.0, 0.3]);
     let start = |k: usize| Start { q: &q, v: &v, force: (k > 0).then(|| &forces[k] as &dyn Force<f64>) };
     let starts: Vec<Start<'_, f64>> = (0..11).map(start).collect();
-    let options = Options::new(1.0, 0.1);
+    let options = RolloutOptions::new(1.0, 0.1);
     struct Wide(Mechanics<DoublePendulum, f64>);
     impl EulerLagrange<f64> for Wide {
         fn coordinates(&self) -> usize {
@@ -268,7 +268,7 @@ fn a_force_that_fails_is_named() {
         assert!(rolled.trajectory.len() >= 5 && rolled.trajectory.q.iter().all(|q| q.is_finite()));
     }
     let driven = Driven::new(&model, &late);
-    let few = Options { max_steps: 3, ..options(Integrator::Dopri5, 0.5, 0.05) };
+    let few = options(Integrator::Dopri5, 0.5, 0.05).max_steps(3);
     assert!(matches!(driven.rollout(&[0.0], &[0.0], &few).stop, Some(RolloutError::TooManySteps { steps: 3, .. })));
     assert!(driven.acceleration(0.6, &[0.0], &[0.0]).is_err());
 }
@@ -333,7 +333,7 @@ fn the_account_of_the_energy_is_integrated_beside_the_motion() {
     let driven = Driven::new(&chain, &motor);
     let account = |method: Integrator, t_end: f64, dt: f64| {
         let step = method.is_structure_preserving().then_some(0.005);
-        let options = Options { method, step, energy: true, ..Options::reference(t_end, dt) };
+        let options = RolloutOptions::reference(t_end, dt).method(method).step(step).energy(true);
         let ending = driven.rollout_in_pieces(&[0.4, -0.2], &[1.0, 0.5], &options, &mut |_| ControlFlow::Continue(()));
         assert_eq!(ending.stop, None);
         ending.balance.unwrap()
@@ -357,9 +357,9 @@ fn forces_between_samples_are_as_they_are_said_to_be() {
     let times: Vec<f64> = (0..=80).map(|k| 0.125 * f64::from(k)).collect();
     let values: Vec<f64> = times.iter().map(|t| (omega * t).cos()).collect();
     let sampled = SampledForce::new(1, times, values).unwrap();
-    let options = Options::reference(6.0, 0.05);
+    let options = RolloutOptions::reference(6.0, 0.05);
     // From 2 s on, away from the ends of the samples.
-    let options = Options { t0: 2.0, ..options };
+    let options = options.t0(2.0);
     let exact = |t: f64| (1.0 - (omega * (t - 2.0)).cos()) / omega.powi(2);
     let off = |between: Between| {
         let force = sampled.clone().between(between);

@@ -2,7 +2,7 @@
 
 use lnn::lagrangian::systems::{DoublePendulum, SpringPendulum};
 use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, Terms, configure};
-use lnn::rollout::{Domain, Integrator, Options, Rollout, RolloutError, rollout, rollout_fixed};
+use lnn::rollout::{Domain, Integrator, Rollout, RolloutError, RolloutOptions, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
 const METHODS: [(Integrator, f64); 4] =
@@ -80,9 +80,9 @@ fn spring_pendulum<S: Scalar>() -> Mechanics<SpringPendulum, S> {
     Mechanics::new(SpringPendulum, configure("spring-pendulum", &[]).unwrap().parameters)
 }
 
-fn fixed<S: Scalar>(method: Integrator, t_end: f64, dt: f64, step: f64) -> Options<S> {
+fn fixed<S: Scalar>(method: Integrator, t_end: f64, dt: f64, step: f64) -> RolloutOptions<S> {
     let [t_end, dt, step] = [t_end, dt, step].map(S::of_f64);
-    Options { method, step: Some(step), max_steps: usize::MAX, ..Options::new(t_end, dt) }
+    RolloutOptions::new(t_end, dt).method(method).step(step).max_steps(usize::MAX)
 }
 
 fn done<S: Scalar>(rolled: Rollout<S>) -> Rollout<S> {
@@ -149,7 +149,7 @@ fn measured_orders_are_the_theoretical_ones() {
         let run =
             |method, h| end(&done(rollout_fixed(&*model, &wide[..n], &wide[n..], &fixed(method, t_end, t_end, h))));
         let exact = run(Integrator::Gauss6, 0.1 * scale / 32.0);
-        let reference = Options::reference(t_end, t_end);
+        let reference = RolloutOptions::reference(t_end, t_end);
         let independent = end(&done(rollout(&*system::<f64>(name), &start[..n], &start[n..], &reference)));
         let narrow: Vec<f64> = exact.iter().map(|x| x.to_f64()).collect();
         assert!(distance(&narrow, &independent) < 1e-10, "{name}: {:e}", distance(&narrow, &independent));
@@ -181,7 +181,7 @@ fn reversible_to_rounding() {
     for (method, _) in METHODS {
         let (q, v) = ([0.5, -0.4], [0.3, 0.8]);
         let there = end(&done(rollout(&model, &q, &v, &fixed(method, 10.0, 1.0, 0.01))));
-        let back = Options { t0: 10.0, ..fixed(method, 0.0, 1.0, 0.01) };
+        let back = fixed(method, 0.0, 1.0, 0.01).t0(10.0);
         let start = end(&done(rollout(&model, &there[..2], &there[2..], &back)));
         let error = distance(&start, &[q, v].concat());
         assert!(error < 1e-12, "{method:?}: {error:e}");
@@ -387,7 +387,7 @@ fn every_precision() {
         &plain::<Dd, _>(Pendulum),
         &[Dd::of_f64(1.0)],
         &[Dd::of_f64(0.0)],
-        &Options::new(Dd::of_f64(1.0), Dd::of_f64(0.5)),
+        &RolloutOptions::new(Dd::of_f64(1.0), Dd::of_f64(0.5)),
     );
     assert!(matches!(adaptive.stop, Some(RolloutError::Invalid { what: "method", .. })));
 }
@@ -402,14 +402,13 @@ fn failures_are_typed_and_keep_what_was_reached() {
 
         let kepler = plain::<f64, _>(Kepler);
         let domain = Some(Domain::new(vec![Some((-0.5, 2.0)), None, None, None]));
-        let options = Options { domain, ..fixed(method, 10.0, 0.1, 0.01) };
+        let options = fixed(method, 10.0, 0.1, 0.01).domain(domain);
         let left = rollout(&kepler, &[1.0, 0.0], &[0.0, 1.0], &options);
         let Some(RolloutError::LeftDomain { t, component: 0, .. }) = left.stop else { panic!("{:?}", left.stop) };
         assert!((t - (2.0 * std::f64::consts::PI / 3.0)).abs() < 0.011, "{t}");
         assert!((*left.trajectory.t.last().unwrap() - 2.0).abs() < 1e-12);
 
-        let few =
-            rollout(&kepler, &[1.0, 0.0], &[0.0, 1.0], &Options { max_steps: 25, ..fixed(method, 10.0, 0.1, 0.01) });
+        let few = rollout(&kepler, &[1.0, 0.0], &[0.0, 1.0], &fixed(method, 10.0, 0.1, 0.01).max_steps(25));
         // Known before the first.
         assert!(matches!(few.stop, Some(RolloutError::Invalid { what: "step", .. })), "{:?}", few.stop);
         assert_eq!((few.trajectory.len(), few.statistics.accepted), (0, 0));
@@ -461,7 +460,7 @@ fn stiff_springs_end_the_iteration_at_the_rounding_of_places() {
     for (method, order) in METHODS {
         for step in [0.01, 0.05, 0.2, 1.0] {
             for k in [1e4, 1e6, 1e8] {
-                let options = Options { method, ..Options::new(10.0, step) };
+                let options = RolloutOptions::new(10.0, step).method(method);
                 let motion = rollout(&lagrangian(k), &[1.0, 1.0], &[0.0, 0.0], &options);
                 assert!(motion.stop.is_none(), "{method:?} {step} {k}: {:?}", motion.stop);
                 let x = motion.trajectory.q[2 * motion.trajectory.len() - 2];
@@ -470,7 +469,7 @@ fn stiff_springs_end_the_iteration_at_the_rounding_of_places() {
             }
         }
     }
-    let options = Options { method: Integrator::Gauss6, ..Options::new(10.0, 0.01) };
+    let options = RolloutOptions::new(10.0, 0.01).method(Integrator::Gauss6);
     let motion = rollout(&lagrangian(1e6), &[1.0, 1.0], &[0.0, 0.0], &options).complete().unwrap();
     assert!((motion.q[2000] - 0.705_347_906_3).abs() < 1e-6, "{}", motion.q[2000]);
 }
@@ -481,13 +480,13 @@ fn second_derivatives_that_nothing_needs_are_not_taken() {
     let formula = "(y_dot^2 + x_dot^2)/2 - 9.81*y - 1000*max(0, -y)^1.5";
     let soft = Mechanics::<_, f64>::new(ExpressionLagrangian::new(&["x", "y"], &[], formula).unwrap(), []);
     for method in Integrator::ALL {
-        let options = Options { method, ..Options::new(0.3, 0.01) };
+        let options = RolloutOptions::new(0.3, 0.01).method(method);
         let motion = rollout(&soft, &[0.0, 1.0], &[0.0, 0.0], &options).complete().unwrap();
         let y = motion.q[2 * 30 + 1];
         assert!((y - (1.0 - 9.81 * 0.3 * 0.3 / 2.0)).abs() < 1e-6, "{method:?}: {y}");
     }
     // It bounces, and many states at once are evaluated as one is.
-    let options = Options::reference(1.0, 0.01);
+    let options = RolloutOptions::reference(1.0, 0.01);
     let motion = rollout(&soft, &[0.0, 1.0], &[0.0, 0.0], &options).complete().unwrap();
     assert!(motion.q.iter().skip(1).step_by(2).any(|y| *y < -0.01));
     let (mut all, mut one) = (Terms::default(), Terms::default());

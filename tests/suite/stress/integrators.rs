@@ -2,7 +2,7 @@
 
 use super::record::{LIMIT, Row};
 use lnn::lagrangian::{EulerLagrange, configure};
-use lnn::rollout::{Integrable, Integrator, Options, rollout, rollout_fixed};
+use lnn::rollout::{Integrable, Integrator, RolloutOptions, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
 const ECCENTRICITY: f64 = 0.5;
@@ -29,7 +29,7 @@ fn run<S: Integrable>(method: Integrator, t_end: f64, tolerance: f64) -> f64 {
     let start = orbit(Dd::of_f64(0.0)).map(|x| x.cast::<S>());
     let tolerance = S::of_f64(tolerance);
     let options =
-        Options { method, rtol: tolerance, atol: tolerance, ..Options::new(S::of_f64(t_end), S::of_f64(t_end / 32.0)) };
+        RolloutOptions::new(S::of_f64(t_end), S::of_f64(t_end / 32.0)).method(method).tolerances(tolerance, tolerance);
     let done = rollout(&*kepler::<S>(), &start[..2], &start[2..], &options);
     assert_eq!(done.stop, None);
     let path = &done.trajectory;
@@ -90,7 +90,7 @@ fn case_33_orders_of_the_adaptive_methods() {
         let t_end = 60.0;
         let (sin, cos) = Dd::of_f64(t_end).sin_cos();
         let run = |tolerance: f64| {
-            let options = Options { method, rtol: tolerance, atol: tolerance, ..Options::new(t_end, t_end) };
+            let options = RolloutOptions::new(t_end, t_end).method(method).tolerances(tolerance, tolerance);
             let done = rollout(&*model, &[1.0], &[0.0], &options);
             assert_eq!(done.stop, None);
             let (q, v) = done.trajectory.state(1);
@@ -115,13 +115,8 @@ fn exponent<S: Scalar>(h: f64, steps: usize, starts: usize) -> f64 {
     let mut squares = vec![0.0; 1025];
     for k in 0..starts {
         let [t_end, dt, step] = [t_end, t_end / 1024.0, h].map(S::of_f64);
-        let options = Options {
-            method: Integrator::Gauss6,
-            step: Some(step),
-            max_steps: usize::MAX,
-            energy: false,
-            ..Options::new(t_end, dt)
-        };
+        let options =
+            RolloutOptions::new(t_end, dt).method(Integrator::Gauss6).step(step).max_steps(usize::MAX).energy(false);
         let start = [0.0, 0.1 + 0.013 * k as f64, 0.2, 0.03].map(S::of_f64);
         let run = rollout_fixed(&*model, &start[..2], &start[2..], &options);
         assert_eq!(run.stop, None);

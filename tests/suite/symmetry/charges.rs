@@ -1,14 +1,14 @@
 //! Charges along motion.
 
 use super::{PHI, Subject, line};
-use lnn::rollout::{Integrator, Options, rollout};
+use lnn::rollout::{Integrator, RolloutOptions, rollout};
 use lnn::symmetry::charges;
 
 #[test]
 fn drift_of_a_coarse_integrator_is_its_own() {
     let kepler = Subject::system("kepler", &[line("x"), line("y")]);
     let found = kepler.symmetries(None);
-    let options = Options { rtol: 1e-4, atol: 1e-6, ..Options::new(10.0, 0.01) };
+    let options = RolloutOptions::new(10.0, 0.01).tolerances(1e-4, 1e-6);
     let motion = rollout(kepler.model.as_ref(), &[1.0, 0.0], &[0.0, 0.9], &options).complete().unwrap();
     let all = charges(kepler.model.as_ref(), &found.basis, &found.fields, &motion).unwrap();
     assert_eq!((all.len(), all[1].values.len()), (2, motion.len()));
@@ -26,7 +26,7 @@ fn drift_of_a_broken_symmetry_is_the_models() {
     let [round, oval] = ["x^2 + y^2", "x^2 + 1.05*y^2"]
         .map(|v| Subject::formula(&[line("x"), line("y")], &format!("(x_dot^2 + y_dot^2 - ({v}))/2")));
     let found = round.symmetries(None);
-    let options = Options { method: Integrator::Dop853, rtol: 1e-12, atol: 1e-14, ..Options::new(5.0, 0.01) };
+    let options = RolloutOptions::new(5.0, 0.01).method(Integrator::Dop853).tolerances(1e-12, 1e-14);
     let motion = rollout(oval.model.as_ref(), &[1.0, 0.3], &[0.2, 0.9], &options).complete().unwrap();
     let all = charges(oval.model.as_ref(), &found.basis, &found.fields, &motion).unwrap();
     assert!(

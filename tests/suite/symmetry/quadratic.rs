@@ -2,7 +2,7 @@
 
 use super::{Coordinate, PHI, Subject, THETA, degrees, line, radius};
 use lnn::lagrangian::{Request, Terms};
-use lnn::rollout::{Integrator, Options, rollout};
+use lnn::rollout::{Integrator, RolloutOptions, rollout};
 use lnn::symmetry::{Chart, Degrees, EXACT, Quadratic, quadratic};
 
 fn found(subject: &Subject, basis: Option<Degrees>) -> Quadratic {
@@ -13,7 +13,7 @@ fn found(subject: &Subject, basis: Option<Degrees>) -> Quadratic {
 
 /// The quantities stay the same along a motion.
 fn keeps(subject: &Subject, quadratic: &Quadratic, q: &[f64], v: &[f64]) {
-    let options = Options { method: Integrator::Dop853, rtol: 1e-12, atol: 1e-14, ..Options::new(3.0, 0.5) };
+    let options = RolloutOptions::new(3.0, 0.5).method(Integrator::Dop853).tolerances(1e-12, 1e-14);
     let motion = rollout(subject.model.as_ref(), q, v, &options).complete().unwrap();
     let mut terms = Terms::default();
     subject.model.terms(&motion.q, &motion.v, Request::ENERGY, &mut terms).unwrap();

@@ -5,7 +5,7 @@ use lnn::configuration::Config;
 use lnn::lagrangian::{configure, systems};
 use lnn::presets::Preset;
 use lnn::random::RngStream;
-use lnn::rollout::{Options, rollout};
+use lnn::rollout::{RolloutOptions, rollout};
 use lnn::training::{Hooks, run};
 use rand::Rng;
 
@@ -59,7 +59,7 @@ fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
             let (q, mut v) = (draw(&test.start.positions), draw(&test.start.velocities));
             system.impose_constraint(&q, &mut v).unwrap();
             // z'' = z + 2 z'^2 / z whatever the other velocities: at most z' = 2.36, from z = 3 and z' = 0.25.
-            let run = rollout(exact.as_ref(), &q, &v, &Options::reference(test.t_end, test.dt));
+            let run = rollout(exact.as_ref(), &q, &v, &RolloutOptions::reference(test.t_end, test.dt));
             assert!(run.stop.is_none());
             for k in 0..run.trajectory.len() {
                 let (q, v) = run.trajectory.state(k);

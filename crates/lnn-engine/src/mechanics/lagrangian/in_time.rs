@@ -19,7 +19,7 @@ use alloc::vec::Vec;
 ///
 /// ```
 /// use lnn::lagrangian::{InTime, Lagrangian, Mechanics};
-/// use lnn::rollout::{Options, rollout};
+/// use lnn::rollout::{RolloutOptions, rollout};
 /// use lnn::scalar::Real;
 ///
 /// struct Shrinking; // a pendulum of 1 kg whose length, 1 m at first, grows by 0.1 m/s
@@ -34,7 +34,7 @@ use alloc::vec::Vec;
 /// }
 ///
 /// let model = InTime::new(Mechanics::new(Shrinking, Vec::new()));
-/// let motion = rollout(&model, &[0.1], &[0.0], &Options::<f64>::new(20.0, 0.01)).complete()?;
+/// let motion = rollout(&model, &[0.1], &[0.0], &RolloutOptions::<f64>::new(20.0, 0.01)).complete()?;
 /// // The amplitude falls as the length to the power -3/4.
 /// let last = motion.q[1500..].iter().fold(0.0, |most: f64, q| most.max(q.abs()));
 /// assert!((0.1 * 2.6_f64.powf(-0.75) - last).abs() < 2e-3);

@@ -6,7 +6,7 @@ use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran, Scan, StepNodes}
 use super::regular::Regularity;
 use super::run::{Receivers, into_error};
 use super::trajectory::{Part, Samples, Times};
-use super::{Domain, Force, Integrable, Options, RolloutError, StepCounts, StepFailure, UnderflowCause};
+use super::{Domain, Force, Integrable, RolloutError, RolloutOptions, StepCounts, StepFailure, UnderflowCause};
 use crate::lagrangian::{Accelerations, EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
@@ -18,7 +18,7 @@ const GROWTH: f64 = 2.0;
 struct MotionEquations<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     force: Option<&'a dyn Force<S>>,
-    options: &'a Options<S>,
+    options: &'a RolloutOptions<S>,
     n: usize,
     /// `true` if the accelerations depend on the time, through the model or through an external force.
     timed: bool,
@@ -74,7 +74,7 @@ pub(super) fn run<S: Integrable>(
     force: Option<&dyn Force<S>>,
     method: Adaptive,
     (q, v): (&[S], &[S]),
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     (keep, mut nodes, events): Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let mut total = StepCounts::default();
@@ -185,7 +185,7 @@ pub(super) fn run<S: Integrable>(
 /// Brings a state back to the constraints; returns how far that was, in the norm and the unit of the error of a step.
 fn returned<S: Scalar>(
     manifold: Option<&dyn Manifold<S>>,
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     n: usize,
     y: &mut [S],
 ) -> Result<S, StepFailure> {

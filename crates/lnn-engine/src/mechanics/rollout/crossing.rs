@@ -5,7 +5,7 @@
 
 use super::event::{Event, Occurrence};
 use super::impact::Flights;
-use super::{Options, RolloutError, StepFailure};
+use super::{RolloutError, RolloutOptions, StepFailure};
 use crate::lagrangian::{EulerLagrange, Terms};
 use crate::scalar::{Real, Scalar};
 
@@ -110,7 +110,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
     pub(super) fn new(
         model: &'a dyn EulerLagrange<S>,
         (q, v): (&[S], &[S]),
-        options: &'a Options<S>,
+        options: &'a RolloutOptions<S>,
         happened: &'a mut Vec<Occurrence<S>>,
     ) -> Result<Option<Self>, RolloutError> {
         let events = &options.events[..];

@@ -5,7 +5,7 @@
 //! in the order of the motions. A wide network then reads its weights once per round instead of once per motion.
 
 use super::run::adaptive_or_fixed;
-use super::{Force, Integrable, Options, Rollout};
+use super::{Force, Integrable, Rollout, RolloutOptions};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::Scalar;
 use crate::storage::{MOST_THREADS, in_order};
@@ -37,7 +37,7 @@ fn free<S: Scalar>(starts: &[(Vec<S>, Vec<S>)]) -> Vec<Start<'_, S>> {
 pub fn rollout_many<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[(Vec<S>, Vec<S>)],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
     rollout_each(model, &free(starts), options, threads)
@@ -47,7 +47,7 @@ pub fn rollout_many<S: Integrable>(
 pub fn rollout_each<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[Start<'_, S>],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
     if model.prefers_batches() && starts.len() > GROUP {
@@ -64,7 +64,7 @@ pub fn rollout_each<S: Integrable>(
 pub fn rollout_together<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[(Vec<S>, Vec<S>)],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
     together(model, &free(starts), options, threads)
@@ -73,7 +73,7 @@ pub fn rollout_together<S: Integrable>(
 fn together<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[Start<'_, S>],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
     let groups: Vec<_> = starts.chunks(GROUP).collect();
@@ -85,7 +85,7 @@ fn together<S: Integrable>(
 fn roll_group<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[Start<'_, S>],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
 ) -> Vec<Rollout<S>> {
     let group = Group::new(model, starts.len());
     // Every member must exist before the first one could conclude that it is alone.
@@ -251,7 +251,7 @@ mod tests {
     fn motions_together_are_the_motions_alone() {
         let system = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
         for method in [Integrator::Dopri5, Integrator::Dop853, Integrator::Gauss4, Integrator::Variational] {
-            let options = Options { method, step: Some(0.01), ..Options::new(2.0, 0.1) };
+            let options = RolloutOptions { method, step: Some(0.01), ..RolloutOptions::new(2.0, 0.1) };
             let alone = rollout_many(&*system, &starts(11), &options, 2);
             let together = rollout_together(&*system, &starts(11), &options, 1);
             assert_eq!(rollout_together(&*system, &starts(11), &options, 3), together);
@@ -264,7 +264,7 @@ mod tests {
                 }
             }
         }
-        assert!(rollout_together(&*system, &[], &Options::new(1.0, 0.1), 2).is_empty());
+        assert!(rollout_together(&*system, &[], &RolloutOptions::new(1.0, 0.1), 2).is_empty());
     }
 
     /// A motion that fails or ends early neither stops the others nor lends them its error.
@@ -275,7 +275,7 @@ mod tests {
         // r = 0 is singular; the last start is refused before it begins.
         starts[1].0[0] = 0.0;
         starts.push((vec![f64::NAN, 0.0], vec![0.0, 0.0]));
-        let options = Options::new(3.0, 0.1);
+        let options = RolloutOptions::new(3.0, 0.1);
         let (together, alone) =
             (rollout_together(&*system, &starts, &options, 2), rollout_many(&*system, &starts, &options, 1));
         let done: Vec<bool> = together.iter().map(Rollout::is_complete).collect();

@@ -61,18 +61,18 @@ impl<S: Scalar> When<S> for GivenEvent<S> {
 
 /// An event to watch for in a motion: the zeros of a number `when(t, q, v)`. Each zero is recorded, and may end the motion or be an impact.
 ///
-/// Belongs to [`Options::events`](super::Options::events); the zeros found are in [`Rollout::events`](super::Rollout::events). They are
+/// Belongs to [`RolloutOptions::events`](super::RolloutOptions::events); the zeros found are in [`Rollout::events`](super::Rollout::events). They are
 /// sought within every step, through the integrator's interpolation, and determined to rounding. The value at the start is not an event.
 /// Two zeros so close that the number does not change its sign between eight equidistant points of a step are found if its slope does.
 ///
 /// ```
 /// use lnn::lagrangian::{ExpressionLagrangian, Mechanics};
-/// use lnn::rollout::{Event, Options, rollout};
+/// use lnn::rollout::{Event, RolloutOptions, rollout};
 ///
 /// // A ball of 1 kg falls from 1 m, and has 0.8 of its speed after each impact on the ground.
 /// let ball = ExpressionLagrangian::new(&["y"], &["g"], "y_dot^2/2 - g*y")?;
 /// let ground = Event::new("ground", |_, q: &[f64], _: &[f64]| q[0]).falling().restitution(0.8);
-/// let options = Options { events: vec![ground], ..Options::new(1.5, 0.01) };
+/// let options = RolloutOptions { events: vec![ground], ..RolloutOptions::new(1.5, 0.01) };
 /// let motion = rollout(&Mechanics::new(ball, [9.81]), &[1.0], &[0.0], &options);
 /// let fall = (2.0 / 9.81_f64).sqrt();
 /// assert!((motion.events[0].t - fall).abs() < 1e-9 && (motion.events[1].t - 2.6 * fall).abs() < 1e-9);

@@ -10,7 +10,7 @@ use super::run::{Keep, Nodes, Receivers, into_error};
 use super::spark::Spark;
 use super::trajectory::{Samples, Times};
 use super::variational::Variational;
-use super::{Force, Integrator, Options, RolloutError, StepCounts, StepFailure};
+use super::{Force, Integrator, RolloutError, RolloutOptions, StepCounts, StepFailure};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
@@ -89,7 +89,7 @@ pub(super) fn run<S: Scalar>(
     force: Option<&dyn Force<S>>,
     stepper: &mut Stepper<S>,
     (q, v): (&[S], &[S]),
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     (keep, nodes, events): Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let mut statistics = StepCounts::default();
@@ -132,7 +132,7 @@ fn advance<'a, S: Scalar>(
     phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
     position: &mut Position<'a, S>,
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     cuts: &[Piece<S>],
     (statistics, keep, mut nodes, mut watcher): AllReceivers<'_, '_, '_, S>,
 ) -> Option<RolloutError> {
@@ -196,7 +196,7 @@ fn leg<'a, S: Scalar>(
     phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
     position: &mut Position<'a, S>,
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     (from, distance, blur): (S, S, S),
     piece: &Piece<S>,
     (statistics, mut nodes, mut watcher): Counted<'_, '_, '_, S>,
@@ -228,7 +228,7 @@ fn stretch<'a, S: Scalar>(
     phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
     position: &mut Position<'a, S>,
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     (from, distance): (S, S),
     piece: &Piece<S>,
     (statistics, mut nodes, mut watcher): Counted<'_, '_, '_, S>,
@@ -358,7 +358,7 @@ fn visit_stages<S: Scalar>(stepper: &Stepper<S>, n: usize, (t, h): (S, S), nodes
 }
 
 /// Checks the stages of the last step.
-fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Result<(), StepFailure> {
+fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &RolloutOptions<S>) -> Result<(), StepFailure> {
     let Some(domain) = options.domain.as_ref() else { return Ok(()) };
     let (q, v) = stepper.stages();
     let mut stage = vec![<S as Real>::zero(); 2 * n];
@@ -410,7 +410,7 @@ impl<'a, S: Scalar> Position<'a, S> {
         }
     }
 
-    fn time(&self, options: &Options<S>, backwards: bool) -> S {
+    fn time(&self, options: &RolloutOptions<S>, backwards: bool) -> S {
         let elapsed = self.since + S::of_f64(self.steps as f64) * self.h;
         if backwards { options.t0 - elapsed } else { options.t0 + elapsed }
     }
@@ -420,7 +420,7 @@ impl<'a, S: Scalar> Position<'a, S> {
         &self,
         phase: &mut PhaseSpace<'_, S>,
         failure: StepFailure,
-        options: &Options<S>,
+        options: &RolloutOptions<S>,
         backwards: bool,
     ) -> RolloutError {
         phase.stop_at(self.time(options, backwards));

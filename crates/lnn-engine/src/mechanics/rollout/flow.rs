@@ -234,7 +234,7 @@ fn ratio<S: Scalar>((numerator, denominator): (f64, f64)) -> S {
 mod tests {
     use super::*;
     use crate::lagrangian::configure;
-    use crate::rollout::{Options, rollout};
+    use crate::rollout::{RolloutOptions, rollout};
     use crate::scalar::Dd;
 
     fn arm<S: Scalar>(changed: Option<(usize, S)>) -> Box<dyn EulerLagrange<S>> {
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn the_end_is_that_of_the_motion_to_the_fifth_order() {
         let (q, v, model) = ([1.1, -0.4], [0.3, 0.8], arm::<f64>(None));
-        let options = Options { rtol: 1e-12, atol: 1e-12, ..Options::new(1.0, 1.0) };
+        let options = RolloutOptions { rtol: 1e-12, atol: 1e-12, ..RolloutOptions::new(1.0, 1.0) };
         let exact = rollout(&*model, &q, &v, &options).complete().unwrap();
         let miss = |steps: usize| {
             let end = Flow::new(&*model, 1.0, steps).end(&q, &v, None).unwrap();

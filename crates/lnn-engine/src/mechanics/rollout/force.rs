@@ -2,7 +2,7 @@
 
 use super::pieces::{Ending, hand_over};
 use super::run::{adaptive_or_fixed, fixed};
-use super::{Between, EnergyBalance, Integrable, Options, Rollout, RolloutError, Trajectory};
+use super::{Between, EnergyBalance, Integrable, Rollout, RolloutError, RolloutOptions, Trajectory};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
@@ -167,7 +167,7 @@ pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> 
 ///
 /// ```
 /// use lnn::lagrangian::configure;
-/// use lnn::rollout::{Driven, Options};
+/// use lnn::rollout::{Driven, RolloutOptions};
 ///
 /// let arm = configure::<f64>("double-pendulum", &[])?.build()?;
 /// // A motor in the shoulder, in N m, and a brake in the elbow.
@@ -176,7 +176,7 @@ pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> 
 ///     force[1] = -0.5 * v[1];
 /// };
 /// let driven = Driven::new(arm.as_ref(), &motor);
-/// let motion = driven.rollout(&[0.0, 0.0], &[0.0, 0.0], &Options::reference(5.0, 0.01)).complete()?;
+/// let motion = driven.rollout(&[0.0, 0.0], &[0.0, 0.0], &RolloutOptions::reference(5.0, 0.01)).complete()?;
 /// let balance = driven.energy_balance(&motion)?;
 /// assert!(balance.defect().abs() < 1e-8 * balance.work.abs());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -195,7 +195,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
 
     /// [`rollout`](super::rollout) under the force, by any method. Energies are those of the model, which the force
     /// changes; the variational method takes the force into its discrete equations (Marsden and West 2001, 3.2.1).
-    pub fn rollout(&self, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S>
+    pub fn rollout(&self, q: &[S], v: &[S], options: &RolloutOptions<S>) -> Rollout<S>
     where
         S: Integrable,
     {
@@ -207,7 +207,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
         &self,
         q: &[S],
         v: &[S],
-        options: &Options<S>,
+        options: &RolloutOptions<S>,
         take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
     ) -> Ending<S>
     where
@@ -217,7 +217,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
     }
 
     /// [`rollout_fixed`](super::rollout_fixed) under the force.
-    pub fn rollout_fixed(&self, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    pub fn rollout_fixed(&self, q: &[S], v: &[S], options: &RolloutOptions<S>) -> Rollout<S> {
         fixed(self.model, Some(self.force), q, v, options)
     }
 

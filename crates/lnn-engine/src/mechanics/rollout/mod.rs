@@ -48,7 +48,7 @@ pub use event::{Event, Impact, Occurrence};
 pub use flow::{Flow, FlowGradient, FlowJacobian};
 pub use force::{Driven, Force, SampledForce};
 pub use ode::Integrable;
-pub use options::{Domain, Integrator, Options};
+pub use options::{Domain, Integrator, RolloutOptions};
 pub use pieces::{Ending, EnergyBalance, rollout_in_pieces};
 pub use run::{Motion, Rollout, rollout, rollout_fixed};
 pub use trajectory::{StepCounts, Trajectory};

@@ -15,7 +15,7 @@ use super::dense::{Interpolant, Rhs, Step};
 use super::gauss::Tableau;
 use super::run;
 use super::trajectory::Times;
-use super::{Force, Options, RolloutError, StepCounts};
+use super::{Force, RolloutError, RolloutOptions, StepCounts};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
@@ -102,7 +102,7 @@ pub trait Integrates: Scalar {
         model: &dyn EulerLagrange<Self>,
         force: Option<&dyn Force<Self>>,
         start: (&[Self], &[Self]),
-        options: &Options<Self>,
+        options: &RolloutOptions<Self>,
         receivers: run::Receivers<'_, '_, Self>,
     ) -> (StepCounts, Option<RolloutError>);
 
@@ -125,7 +125,7 @@ macro_rules! integrable {
                     model: &dyn EulerLagrange<Self>,
                     force: Option<&dyn Force<Self>>,
                     start: (&[Self], &[Self]),
-                    options: &Options<Self>,
+                    options: &RolloutOptions<Self>,
                     receivers: run::Receivers<'_, '_, Self>,
                 ) -> (StepCounts, Option<RolloutError>) {
                     run::integrate(model, force, start, options, receivers)

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Integrators: explicit Runge-Kutta methods with step size control, and structure-preserving ones of fixed step.
 ///
 /// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix:
-/// the energy error stays bounded over long times, where adaptive methods drift. See [`Options::step`]. A motion with
+/// the energy error stays bounded over long times, where adaptive methods drift. See [`RolloutOptions::step`]. A motion with
 /// friction has no energy to keep: [`Integrator::Variational`] refuses it, the Gauss methods keep their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -121,9 +121,18 @@ impl<S: Scalar> Domain<S> {
 /// | `domain` | none | where the trajectory must stay | `2n` components |
 /// | `energy` | true | store `E` at every sample | |
 /// | `events` | none | zeros along the motion that are recorded, end it, or are impacts | |
+/// [`RolloutOptions::new`] has the defaults; every other field has a setter of its name, `rtol` and `atol` share
+/// [`RolloutOptions::tolerances`]:
 ///
+/// ```
+/// use lnn::rollout::{Integrator, RolloutOptions};
+///
+/// let options = RolloutOptions::new(10.0, 0.1).method(Integrator::Gauss4).step(0.02).energy(false);
+/// assert_eq!(options.step, Some(0.02));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options<S> {
+#[non_exhaustive]
+pub struct RolloutOptions<S> {
     /// Time of the start.
     pub t0: S,
     /// Time of the last sample.
@@ -152,7 +161,7 @@ pub struct Options<S> {
 /// More samples than this are refused: their memory would be in the tens of gigabytes.
 const MAX_SAMPLES: f64 = 1e8;
 
-impl<S: Scalar> Options<S> {
+impl<S: Scalar> RolloutOptions<S> {
     /// Learned motion as in the paper's tests: `Dopri5`, rtol 1e-6, atol 1e-8, from time 0.
     pub fn new(t_end: S, dt: S) -> Self {
         Self {
@@ -174,6 +183,66 @@ impl<S: Scalar> Options<S> {
     pub fn reference(t_end: S, dt: S) -> Self {
         let tolerance = S::max(S::of_f64(1e-12), S::epsilon().ldexp(4));
         Self { method: Integrator::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
+    }
+
+    /// Sets the time of the start.
+    #[must_use]
+    pub fn t0(self, t0: S) -> Self {
+        Self { t0, ..self }
+    }
+
+    /// Sets the time of the last sample.
+    #[must_use]
+    pub fn t_end(self, t_end: S) -> Self {
+        Self { t_end, ..self }
+    }
+
+    /// Sets the distance of samples.
+    #[must_use]
+    pub fn dt(self, dt: S) -> Self {
+        Self { dt, ..self }
+    }
+
+    /// Sets the integrator.
+    #[must_use]
+    pub fn method(self, method: Integrator) -> Self {
+        Self { method, ..self }
+    }
+
+    /// Sets the relative and the absolute tolerance of the adaptive methods.
+    #[must_use]
+    pub fn tolerances(self, rtol: S, atol: S) -> Self {
+        Self { rtol, atol, ..self }
+    }
+
+    /// Sets the longest step of the structure-preserving methods; `None` is one step per sample.
+    #[must_use]
+    pub fn step(self, step: impl Into<Option<S>>) -> Self {
+        Self { step: step.into(), ..self }
+    }
+
+    /// Sets how many steps may be attempted.
+    #[must_use]
+    pub fn max_steps(self, max_steps: usize) -> Self {
+        Self { max_steps, ..self }
+    }
+
+    /// Sets where the trajectory must stay.
+    #[must_use]
+    pub fn domain(self, domain: impl Into<Option<Domain<S>>>) -> Self {
+        Self { domain: domain.into(), ..self }
+    }
+
+    /// Sets whether the energy of every sample is stored.
+    #[must_use]
+    pub fn energy(self, energy: bool) -> Self {
+        Self { energy, ..self }
+    }
+
+    /// Sets the zeros along the motion that are recorded, end it, or are impacts.
+    #[must_use]
+    pub fn events(self, events: Vec<Event<S>>) -> Self {
+        Self { events, ..self }
     }
 
     /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
@@ -255,7 +324,7 @@ impl<S: Scalar> Options<S> {
 
 /// Rounding of the quotient of time span and `dt`: one this close to a whole number is whole, for the times carry no more
 /// digits. From one half on the samples themselves cannot be distinguished.
-pub(super) fn blur<S: Scalar>(options: &Options<S>) -> S {
+pub(super) fn blur<S: Scalar>(options: &RolloutOptions<S>) -> S {
     let span = options.t_end - options.t0;
     S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()
 }
@@ -266,35 +335,35 @@ mod tests {
 
     #[test]
     fn nonsense_is_named() {
-        let good = Options::<f64>::new(1.0, 0.1);
+        let good = RolloutOptions::<f64>::new(1.0, 0.1);
         assert!(good.check(1).is_ok());
-        let name = |options: Options<f64>| match options.check(1) {
+        let name = |options: RolloutOptions<f64>| match options.check(1) {
             Err(RolloutError::Invalid { what, .. }) => what,
             other => panic!("{other:?}"),
         };
-        assert_eq!(name(Options { dt: 0.0, ..good.clone() }), "dt");
-        assert_eq!(name(Options { dt: 1e-12, ..good.clone() }), "dt");
-        assert_eq!(name(Options { t_end: f64::INFINITY, ..good.clone() }), "t_end");
-        assert_eq!(name(Options { rtol: f64::NAN, ..good.clone() }), "rtol");
-        assert_eq!(name(Options { atol: -1.0, ..good.clone() }), "atol");
-        assert_eq!(name(Options { rtol: 0.0, atol: 0.0, ..good.clone() }), "rtol");
-        assert_eq!(name(Options { rtol: 1e-30, ..good.clone() }), "rtol");
-        assert_eq!(name(Options { t0: 1e16, t_end: 1e16 + 10.0, ..good.clone() }), "dt");
-        let least = Options::<f64>::least_tolerance();
-        assert!(Options { rtol: least, ..good.clone() }.check(1).is_ok());
-        assert!(Options { rtol: 1e-30, method: Integrator::Gauss4, ..good.clone() }.check(1).is_ok());
-        assert!(Options::<f32>::new(1.0, 0.1).check(1).is_ok());
-        assert_eq!(name(Options { step: Some(0.0), ..good.clone() }), "step");
-        assert_eq!(name(Options { step: Some(f64::NAN), ..good.clone() }), "step");
-        assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");
-        let fixed = Options { method: Integrator::Gauss4, ..good.clone() };
-        assert!(Options { step: Some(1e-6), ..fixed.clone() }.check(1).is_ok());
-        assert_eq!(name(Options { step: Some(9e-7), ..fixed.clone() }), "step");
-        assert_eq!(name(Options { step: Some(1e-308), ..fixed.clone() }), "step");
-        assert_eq!(name(Options { dt: 1e-7, ..fixed.clone() }), "dt");
-        assert!(Options { dt: 1e-7, ..good.clone() }.check(1).is_ok());
-        assert_eq!(name(Options { max_steps: 9, ..fixed }), "dt");
-        assert_eq!(name(Options { domain: Some(Domain::new(vec![None])), ..good.clone() }), "domain");
+        assert_eq!(name(RolloutOptions { dt: 0.0, ..good.clone() }), "dt");
+        assert_eq!(name(RolloutOptions { dt: 1e-12, ..good.clone() }), "dt");
+        assert_eq!(name(RolloutOptions { t_end: f64::INFINITY, ..good.clone() }), "t_end");
+        assert_eq!(name(RolloutOptions { rtol: f64::NAN, ..good.clone() }), "rtol");
+        assert_eq!(name(RolloutOptions { atol: -1.0, ..good.clone() }), "atol");
+        assert_eq!(name(RolloutOptions { rtol: 0.0, atol: 0.0, ..good.clone() }), "rtol");
+        assert_eq!(name(RolloutOptions { rtol: 1e-30, ..good.clone() }), "rtol");
+        assert_eq!(name(RolloutOptions { t0: 1e16, t_end: 1e16 + 10.0, ..good.clone() }), "dt");
+        let least = RolloutOptions::<f64>::least_tolerance();
+        assert!(RolloutOptions { rtol: least, ..good.clone() }.check(1).is_ok());
+        assert!(RolloutOptions { rtol: 1e-30, method: Integrator::Gauss4, ..good.clone() }.check(1).is_ok());
+        assert!(RolloutOptions::<f32>::new(1.0, 0.1).check(1).is_ok());
+        assert_eq!(name(RolloutOptions { step: Some(0.0), ..good.clone() }), "step");
+        assert_eq!(name(RolloutOptions { step: Some(f64::NAN), ..good.clone() }), "step");
+        assert_eq!(name(RolloutOptions { max_steps: 0, ..good.clone() }), "max_steps");
+        let fixed = RolloutOptions { method: Integrator::Gauss4, ..good.clone() };
+        assert!(RolloutOptions { step: Some(1e-6), ..fixed.clone() }.check(1).is_ok());
+        assert_eq!(name(RolloutOptions { step: Some(9e-7), ..fixed.clone() }), "step");
+        assert_eq!(name(RolloutOptions { step: Some(1e-308), ..fixed.clone() }), "step");
+        assert_eq!(name(RolloutOptions { dt: 1e-7, ..fixed.clone() }), "dt");
+        assert!(RolloutOptions { dt: 1e-7, ..good.clone() }.check(1).is_ok());
+        assert_eq!(name(RolloutOptions { max_steps: 9, ..fixed }), "dt");
+        assert_eq!(name(RolloutOptions { domain: Some(Domain::new(vec![None])), ..good.clone() }), "domain");
     }
 
     #[test]

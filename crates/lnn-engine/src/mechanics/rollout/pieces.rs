@@ -6,7 +6,7 @@ use super::force::pieces;
 use super::gauss::{Tableau, lagrange};
 use super::run::Nodes;
 use super::trajectory::CHUNK;
-use super::{Force, Integrable, Occurrence, Options, RolloutError, StepCounts, Trajectory};
+use super::{Force, Integrable, Occurrence, RolloutError, RolloutOptions, StepCounts, Trajectory};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
 use std::ops::ControlFlow;
@@ -36,7 +36,7 @@ pub fn rollout_in_pieces<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
     v: &[S],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
 ) -> Ending<S> {
     hand_over(model, None, (q, v), options, take)
@@ -47,7 +47,7 @@ pub(super) fn hand_over<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
     start: (&[S], &[S]),
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
 ) -> Ending<S> {
     let mut piece = Trajectory::empty(model.coordinates());
@@ -279,7 +279,7 @@ mod tests {
     /// All pieces as one trajectory, at most `most` of them, their number, and how it ended.
     fn joined(
         model: &dyn EulerLagrange<f64>,
-        options: &Options<f64>,
+        options: &RolloutOptions<f64>,
         most: usize,
     ) -> (Trajectory<f64>, usize, Ending<f64>) {
         let mut whole = Trajectory { energy: options.energy.then(Vec::new), ..Trajectory::empty(1) };
@@ -299,7 +299,7 @@ mod tests {
     fn the_pieces_are_the_whole() {
         for method in [Integrator::Dopri5, Integrator::Dop853, Integrator::Gauss4, Integrator::Variational] {
             for (t_end, energy) in [(10.0, true), (-7.681, false), (0.0, true), (2.559, true)] {
-                let options = Options { method, energy, ..Options::new(t_end, 0.01) };
+                let options = RolloutOptions { method, energy, ..RolloutOptions::new(t_end, 0.01) };
                 let whole = rollout(&*oscillator(), &[1.0], &[0.2], &options);
                 let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 99);
                 assert_eq!((&trajectory, ending.statistics), (&whole.trajectory, whole.statistics));
@@ -311,19 +311,19 @@ mod tests {
 
     #[test]
     fn a_motion_that_fails_hands_over_what_it_has() {
-        let options = Options::new(5.0, 0.001);
+        let options = RolloutOptions::new(5.0, 0.001);
         let (trajectory, _, ending) = joined(&BROKEN, &options, 99);
         let whole = rollout(&BROKEN, &[1.0], &[0.2], &options);
         assert!(ending.stop.is_some() && trajectory.len() > CHUNK);
         assert_eq!((trajectory, ending.stop), (whole.trajectory, whole.stop));
-        let (nothing, pieces, refused) = joined(&*oscillator(), &Options::new(1.0, 0.0), 99);
+        let (nothing, pieces, refused) = joined(&*oscillator(), &RolloutOptions::new(1.0, 0.0), 99);
         assert!(nothing.is_empty() && pieces == 0 && matches!(refused.stop, Some(RolloutError::Invalid { .. })));
     }
 
     #[test]
     fn a_receiver_that_takes_no_more_ends_the_motion() {
         for method in [Integrator::Dopri5, Integrator::Gauss4] {
-            let options = Options { method, ..Options::new(1e3, 0.001) };
+            let options = RolloutOptions { method, ..RolloutOptions::new(1e3, 0.001) };
             let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 2);
             assert_eq!((trajectory.len(), pieces, ending.samples), (2 * CHUNK, 2, 2 * CHUNK));
             assert!(matches!(ending.stop, Some(RolloutError::Stopped { t }) if t < 5.0), "{:?}", ending.stop);

@@ -4,7 +4,7 @@ use super::error::UnderflowCause;
 use super::fixed::Stepper;
 use super::ode::Adaptive;
 use super::{
-    Force, Integrable, Integrator, Occurrence, Options, RolloutError, StepCounts, Trajectory, adaptive, fixed,
+    Force, Integrable, Integrator, Occurrence, RolloutError, RolloutOptions, StepCounts, Trajectory, adaptive, fixed,
 };
 use crate::lagrangian::{EulerLagrange, ManifoldRows, MechanicsError, OffManifold, project};
 use crate::scalar::Scalar;
@@ -52,7 +52,7 @@ impl<S: Scalar> Rollout<S> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Motion<S: Integrable>: EulerLagrange<S> {
-    /// The motion from `(q, v)` at time 0, sampled every `dt` until `t_end`, by the adaptive method of [`Options::new`] with its
+    /// The motion from `(q, v)` at time 0, sampled every `dt` until `t_end`, by the adaptive method of [`RolloutOptions::new`] with its
     /// tolerances; [`rollout`] takes other options and keeps what was reached before a failure.
     ///
     /// # Errors
@@ -62,7 +62,7 @@ pub trait Motion<S: Integrable>: EulerLagrange<S> {
 
 impl<S: Integrable, M: EulerLagrange<S>> Motion<S> for M {
     fn rollout(&self, q: &[S], v: &[S], t_end: S, dt: S) -> Result<Trajectory<S>, RolloutError> {
-        rollout(self, q, v, &Options::new(t_end, dt)).complete()
+        rollout(self, q, v, &RolloutOptions::new(t_end, dt)).complete()
     }
 }
 
@@ -73,12 +73,22 @@ impl<S: Integrable, M: EulerLagrange<S>> Motion<S> for M {
 /// the exit.
 ///
 /// Fixed-step methods check the domain at the stages and the end of every step, and report the last time inside.
-pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+pub fn rollout<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    options: &RolloutOptions<S>,
+) -> Rollout<S> {
     adaptive_or_fixed(model, None, q, v, options)
 }
 
 /// [`rollout`] by the structure-preserving methods only, in every precision, including [`crate::scalar::Dd`].
-pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+pub fn rollout_fixed<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    options: &RolloutOptions<S>,
+) -> Rollout<S> {
     fixed(model, None, q, v, options)
 }
 
@@ -88,7 +98,7 @@ pub(super) fn adaptive_or_fixed<S: Integrable>(
     force: Option<&dyn Force<S>>,
     q: &[S],
     v: &[S],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
 ) -> Rollout<S> {
     collected(model, options, |keep, events| S::roll_out(model, force, (q, v), options, (keep, None, events)))
 }
@@ -99,7 +109,7 @@ pub(super) fn fixed<S: Scalar>(
     force: Option<&dyn Force<S>>,
     q: &[S],
     v: &[S],
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
 ) -> Rollout<S> {
     collected(model, options, |keep, events| integrate_fixed(model, force, (q, v), options, (keep, None, events)))
 }
@@ -107,7 +117,7 @@ pub(super) fn fixed<S: Scalar>(
 /// The samples of a motion as a trajectory, with the energies if the options request them.
 fn collected<S: Scalar>(
     model: &dyn EulerLagrange<S>,
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     motion: impl FnOnce(&mut Keep<'_, S>, &mut Vec<Occurrence<S>>) -> (StepCounts, Option<RolloutError>),
 ) -> Rollout<S> {
     let (mut trajectory, mut events) = (Trajectory::empty(model.coordinates()), Vec::new());
@@ -127,7 +137,7 @@ pub(super) fn integrate<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
     (q, v): (&[S], &[S]),
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     receivers: Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let method = match options.method {
@@ -149,7 +159,7 @@ fn integrate_fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
     (q, v): (&[S], &[S]),
-    options: &Options<S>,
+    options: &RolloutOptions<S>,
     receivers: Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let n = model.coordinates();
@@ -202,7 +212,7 @@ fn allowed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Result<
     Err(RolloutError::OffConstraints { constraint, distance, nearest })
 }
 
-fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
+fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &RolloutOptions<S>) -> Result<(), RolloutError> {
     let invalid = |what, problem| Err(RolloutError::Invalid { what, problem });
     if n == 0 {
         return invalid("model", "has no coordinates".to_string());
@@ -219,10 +229,10 @@ fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<
 }
 
 /// Rejects a purely absolute tolerance that is finer than the scalar can resolve at the start.
-fn reachable<S: Scalar>(q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
+fn reachable<S: Scalar>(q: &[S], v: &[S], options: &RolloutOptions<S>) -> Result<(), RolloutError> {
     let zero = S::of_f64(0.0);
     let size = q.iter().chain(v).fold(zero, |size, x| S::max(size, x.abs()));
-    let least = Options::<S>::least_tolerance() * size;
+    let least = RolloutOptions::<S>::least_tolerance() * size;
     if options.rtol > zero || options.atol >= least {
         return Ok(());
     }

@@ -6,8 +6,8 @@ use crate::lagrangian::{EulerLagrange, build};
 
 const METHODS: [Integrator; 2] = [Integrator::Dopri5, Integrator::Dop853];
 
-fn options(method: Integrator, t_end: f64, dt: f64, tolerance: f64) -> Options<f64> {
-    Options { method, rtol: tolerance, atol: tolerance, ..Options::new(t_end, dt) }
+fn options(method: Integrator, t_end: f64, dt: f64, tolerance: f64) -> RolloutOptions<f64> {
+    RolloutOptions { method, rtol: tolerance, atol: tolerance, ..RolloutOptions::new(t_end, dt) }
 }
 
 /// Largest error of the oscillator started at `(1, 0)`.
@@ -25,7 +25,7 @@ fn oscillator_error(trajectory: &Trajectory<f64>, t0: f64) -> f64 {
 fn exact_motion_at_exact_times_in_both_directions() {
     for method in METHODS {
         for (t0, t_end) in [(0.0, 10.0), (10.0, 0.0), (-1.0, 1.0), (1.0, -1.0), (-5.0, -1.0), (0.0, 0.37)] {
-            let options = Options { t0, ..options(method, t_end, 0.1, 1e-11) };
+            let options = RolloutOptions { t0, ..options(method, t_end, 0.1, 1e-11) };
             let done = rollout(&OSCILLATOR, &[1.0], &[0.0], &options);
             assert_eq!(done.stop, None);
             let trajectory = &done.trajectory;
@@ -77,7 +77,7 @@ fn sampling_does_not_change_the_steps() {
 
 #[test]
 fn energy_is_kept_and_angles_stay_continuous() {
-    let done = rollout(&PENDULUM, &[0.0], &[3.0], &Options::<f64>::reference(50.0, 0.1));
+    let done = rollout(&PENDULUM, &[0.0], &[3.0], &RolloutOptions::<f64>::reference(50.0, 0.1));
     let energy = done.trajectory.energy.as_ref().unwrap();
     let worst = energy.iter().map(|e| (e - energy[0]).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-10, "{worst:e}");
@@ -90,7 +90,7 @@ fn kepler_returns_after_ten_turns() {
     // Eccentricity 0.5 from the pericentre: period 2 pi.
     let (q, v) = ([0.5, 0.0], [0.0, 3.0_f64.sqrt()]);
     let turn = 2.0 * std::f64::consts::PI;
-    let done = rollout(&KEPLER, &q, &v, &Options::<f64>::reference(10.0 * turn, turn)).complete().unwrap();
+    let done = rollout(&KEPLER, &q, &v, &RolloutOptions::<f64>::reference(10.0 * turn, turn)).complete().unwrap();
     assert_eq!(done.len(), 11);
     for k in 0..done.len() {
         let (qk, vk) = done.state(k);
@@ -104,7 +104,7 @@ fn kepler_returns_after_ten_turns() {
 #[test]
 fn many_coordinates_and_single_precision() {
     let start = [1.0, 0.5, -0.5, 0.25];
-    let done = rollout(&FOUR, &start, &[0.0; 4], &Options::<f64>::reference(10.0, 0.5)).complete().unwrap();
+    let done = rollout(&FOUR, &start, &[0.0; 4], &RolloutOptions::<f64>::reference(10.0, 0.5)).complete().unwrap();
     for k in 0..done.len() {
         for (i, start) in start.iter().enumerate() {
             let exact = start * (done.t[k] * (1.0 + i as f64).sqrt()).cos();
@@ -112,7 +112,7 @@ fn many_coordinates_and_single_precision() {
         }
     }
     for method in METHODS {
-        let options = Options::<f32> { method, ..Options::new(10.0, 0.1) };
+        let options = RolloutOptions::<f32> { method, ..RolloutOptions::new(10.0, 0.1) };
         let done = rollout(&OSCILLATOR, &[1.0_f32], &[0.0], &options);
         assert_eq!(done.stop, None);
         let error = oscillator_error(&done.trajectory.cast(), 0.0);
@@ -151,7 +151,7 @@ fn failures_are_typed_and_keep_the_valid_part() {
             other => panic!("{other:?}"),
         }
         let domain = Some(Domain::new(vec![Some((-1.0, 10.0)), None]));
-        let done = rollout(&SINGULAR, &[0.0], &[0.0], &Options { domain, ..options.clone() });
+        let done = rollout(&SINGULAR, &[0.0], &[0.0], &RolloutOptions { domain, ..options.clone() });
         match &done.stop {
             Some(RolloutError::LeftDomain { t, component: 0, value, lower, .. }) => {
                 assert!(*value < *lower && *lower == -1.0);
@@ -166,7 +166,7 @@ fn failures_are_typed_and_keep_the_valid_part() {
 #[test]
 fn failures_in_single_precision_end_soon() {
     for method in METHODS {
-        let options = Options::<f32> { method, ..Options::new(5.0, 0.1) };
+        let options = RolloutOptions::<f32> { method, ..RolloutOptions::new(5.0, 0.1) };
         let done = rollout(&SINGULAR, &[0.0_f32], &[0.0], &options);
         assert!(matches!(done.stop, Some(RolloutError::SingularMass { .. })), "{:?}", done.stop);
         assert_eq!(done.trajectory.len(), 15);
@@ -183,7 +183,7 @@ fn a_bound_that_only_trial_states_cross_is_no_failure() {
             &OSCILLATOR,
             &[1.0],
             &[0.0],
-            &Options { domain: domain.clone(), ..options(method, 20.0, 0.1, 1e-9) },
+            &RolloutOptions { domain: domain.clone(), ..options(method, 20.0, 0.1, 1e-9) },
         );
         assert_eq!(done.stop, None, "{method:?}");
         assert!(oscillator_error(&done.trajectory, 0.0) < 1e-6);
@@ -207,25 +207,25 @@ fn blow_up_underflows() {
 
 #[test]
 fn too_many_steps_and_bad_starts() {
-    let few = Options { max_steps: 5, ..options(Integrator::Dopri5, 100.0, 0.1, 1e-10) };
+    let few = RolloutOptions { max_steps: 5, ..options(Integrator::Dopri5, 100.0, 0.1, 1e-10) };
     let done = rollout(&PENDULUM, &[1.0], &[0.0], &few);
     assert!(matches!(done.stop, Some(RolloutError::TooManySteps { steps: 5, t }) if t > 0.0 && t < 100.0));
     assert!(!done.trajectory.is_empty());
 
-    let good = Options::new(1.0, 0.1);
+    let good = RolloutOptions::new(1.0, 0.1);
     for (q, v) in [(vec![1.0, 2.0], vec![0.0]), (vec![1.0], vec![]), (vec![f64::NAN], vec![0.0])] {
         let done = rollout(&PENDULUM, &q, &v, &good);
         assert!(matches!(done.stop, Some(RolloutError::Invalid { .. })));
         assert!(done.trajectory.is_empty());
     }
-    let outside = Options { domain: Some(Domain::new(vec![Some((0.0, 1.0)), None])), ..good.clone() };
+    let outside = RolloutOptions { domain: Some(Domain::new(vec![Some((0.0, 1.0)), None])), ..good.clone() };
     let done = rollout(&PENDULUM, &[2.0], &[0.0], &outside);
     assert!(matches!(done.stop, Some(RolloutError::LeftDomain { t: 0.0, value: 2.0, .. })));
     assert!(done.trajectory.is_empty());
 
-    let still = rollout(&PENDULUM, &[1.0], &[0.5], &Options::<f64>::new(0.0, 0.1)).complete().unwrap();
+    let still = rollout(&PENDULUM, &[1.0], &[0.5], &RolloutOptions::<f64>::new(0.0, 0.1)).complete().unwrap();
     assert_eq!((still.t, still.q, still.v), (vec![0.0], vec![1.0], vec![0.5]));
-    let rest = rollout(&PENDULUM, &[0.0], &[0.0], &Options::<f64>::new(10.0, 1.0)).complete().unwrap();
+    let rest = rollout(&PENDULUM, &[0.0], &[0.0], &RolloutOptions::<f64>::new(10.0, 1.0)).complete().unwrap();
     assert!(rest.q.iter().all(|&q| q == 0.0) && rest.len() == 11);
 }
 
@@ -233,11 +233,11 @@ fn too_many_steps_and_bad_starts() {
 fn ensembles_do_not_depend_on_threads() {
     let starts: Vec<_> = (0..7).map(|k| (vec![0.3 * f64::from(k)], vec![0.1])).collect();
     let model: &dyn EulerLagrange<f64> = &PENDULUM;
-    let one = rollout_many(model, &starts, &Options::<f64>::new(5.0, 0.1), 1);
-    let four = rollout_many(model, &starts, &Options::<f64>::new(5.0, 0.1), 4);
+    let one = rollout_many(model, &starts, &RolloutOptions::<f64>::new(5.0, 0.1), 1);
+    let four = rollout_many(model, &starts, &RolloutOptions::<f64>::new(5.0, 0.1), 4);
     assert_eq!(one.len(), 7);
     assert_eq!(one, four);
-    assert!(rollout_many(model, &[], &Options::<f64>::new(5.0, 0.1), 3).is_empty());
+    assert!(rollout_many(model, &[], &RolloutOptions::<f64>::new(5.0, 0.1), 3).is_empty());
 }
 
 const FIXED: [Integrator; 4] = [Integrator::Midpoint, Integrator::Gauss4, Integrator::Gauss6, Integrator::Variational];
@@ -247,7 +247,7 @@ fn long_steps_are_cut<S: crate::scalar::Scalar>(model: &dyn EulerLagrange<S>) {
     let number = S::of_f64;
     for method in FIXED {
         for t_end in [0.3, -0.3] {
-            let options = |step| Options { method, step, ..Options::new(number(t_end), number(0.1)) };
+            let options = |step| RolloutOptions { method, step, ..RolloutOptions::new(number(t_end), number(0.1)) };
             let run = |step| rollout_fixed(model, &[number(1.0)], &[number(0.5)], &options(step)).complete().unwrap();
             let expected = run(None);
             assert!(expected.q.windows(2).all(|pair| pair[0] != pair[1]), "{method:?} does not move");
@@ -269,7 +269,7 @@ fn steps_beyond_the_samples_are_cut_in_every_precision() {
 fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
     let system = build::<f64>("harmonic-oscillator", &[]).unwrap();
     let run = |method, rtol, atol| {
-        let options = Options { method, rtol, atol, ..Options::new(1.0, 0.1) };
+        let options = RolloutOptions { method, rtol, atol, ..RolloutOptions::new(1.0, 0.1) };
         rollout(&*system, &[1.0], &[2.0], &options)
     };
     for method in METHODS {
@@ -279,7 +279,7 @@ fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
         let alone = "atol: 1e-30 without rtol is finer than f64 can keep of a state of size 2, the least is 4e-15";
         assert_eq!(refusal(0.0, 1e-30), alone);
         // The least works, alone or together.
-        let least = Options::<f64>::least_tolerance();
+        let least = RolloutOptions::<f64>::least_tolerance();
         for (rtol, atol) in [(least, least), (least, 0.0), (0.0, 2.0 * least)] {
             let done = run(method, rtol, atol);
             assert!(
@@ -288,11 +288,11 @@ fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
                 done.stop
             );
         }
-        let single = Options::<f32> { method, rtol: 1e-7, ..Options::new(1.0, 0.1) };
+        let single = RolloutOptions::<f32> { method, rtol: 1e-7, ..RolloutOptions::new(1.0, 0.1) };
         let refusal = rollout(&PENDULUM, &[1.0_f32], &[2.0], &single).stop.unwrap().to_string();
         assert!(refusal.ends_with("than f32 can keep, the least is 1e-6"), "{refusal}");
         // A coordinate that stays at 0 has no error, whatever the absolute tolerance.
-        let still = Options { method, atol: 0.0, ..Options::new(1.0, 0.1) };
+        let still = RolloutOptions { method, atol: 0.0, ..RolloutOptions::new(1.0, 0.1) };
         let done = rollout(&PENDULUM, &[0.0], &[0.0], &still);
         assert!(done.is_complete() && done.trajectory.q.iter().all(|q| *q == 0.0), "{:?}", done.stop);
     }

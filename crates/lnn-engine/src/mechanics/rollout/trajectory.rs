@@ -1,7 +1,7 @@
 //! Sampled motion, and the times of its samples.
 
 use super::RolloutError;
-use super::options::{Options, blur};
+use super::options::{RolloutOptions, blur};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
@@ -201,7 +201,7 @@ pub(super) struct Samples<S> {
 
 impl<S: Scalar> Samples<S> {
     /// Of checked options.
-    pub(super) fn new(options: &Options<S>) -> Self {
+    pub(super) fn new(options: &RolloutOptions<S>) -> Self {
         let (t0, t_end) = (options.t0, options.t_end);
         let span = t_end - t0;
         let step = options.dt.abs();
@@ -306,14 +306,14 @@ mod tests {
         assert_eq!(single.v[1], 0.0);
     }
 
-    fn times<S: Scalar>(options: Options<S>) -> Vec<S> {
+    fn times<S: Scalar>(options: RolloutOptions<S>) -> Vec<S> {
         let samples = Samples::new(&options);
         (0..samples.len()).map(|k| samples.time(k)).collect()
     }
 
     #[test]
     fn sample_times_are_the_requested_ones() {
-        let times = |t0: f64, t_end: f64, dt: f64| times(Options { t0, ..Options::new(t_end, dt) });
+        let times = |t0: f64, t_end: f64, dt: f64| times(RolloutOptions { t0, ..RolloutOptions::new(t_end, dt) });
         assert_eq!(times(0.0, 0.3, 0.1), [0.0, 0.1, 0.2, 0.3]);
         assert_eq!(times(0.0, 0.35, 0.1), [0.0, 0.1, 0.2, 0.1 * 3.0, 0.35]);
         assert_eq!(times(1.0, 0.0, 0.5), [1.0, 0.5, 0.0]);
@@ -322,11 +322,11 @@ mod tests {
         assert_eq!(times(0.0, 0.05, 0.1), [0.0, 0.05]);
         assert_eq!(times(0.0, 100.0, 0.1).len(), 1001);
         assert_eq!(times(1e6, 1e6 + 1.0, 0.1).len(), 11);
-        let single = super::tests::times(Options::<f32>::new(100.0, 0.1));
+        let single = super::tests::times(RolloutOptions::<f32>::new(100.0, 0.1));
         assert_eq!(single.len(), 1001);
         assert_eq!(*single.last().unwrap(), 100.0);
         // The last sample is at the end, whatever the rounding of the quotient, and none is later.
-        let many = Samples::new(&Options::<f32>::new(200_000.0, 1.0));
+        let many = Samples::new(&RolloutOptions::<f32>::new(200_000.0, 1.0));
         assert_eq!((many.len(), many.get(200_000), many.get(200_001)), (200_001, Some(200_000.0), None));
     }
 }
