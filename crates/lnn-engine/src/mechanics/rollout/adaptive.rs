@@ -1,18 +1,18 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
-use super::crossing::{Dense, Watcher};
+use super::crossing::{Dense, Found, Watcher};
 use super::force::{Piece, pieces};
-use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran, Scan, StepNodes};
+use super::ode::{Adaptive, EarlyEnd, Integration, Project, Scan, StepNodes};
 use super::regular::Regularity;
-use super::run::{Receivers, into_error};
+use super::run::{Keep, Nodes, Receivers, into_error};
+use super::thresholds::STEP_GROWTH_AFTER_BREAK;
 use super::trajectory::{Part, Samples, Times};
-use super::{Domain, Force, Integrable, RolloutError, RolloutOptions, StepCounts, StepFailure, UnderflowCause};
+use super::{
+    Domain, Force, Integrable, Occurrence, RolloutError, RolloutOptions, StepCounts, StepFailure, UnderflowCause,
+};
 use crate::lagrangian::{Accelerations, EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
-
-/// Growth of the first step after a break over the last step before it, which may have been cut short.
-const GROWTH: f64 = 2.0;
 
 /// The equations of a motion in elapsed time `|t - t0|`.
 struct MotionEquations<'a, S> {
@@ -73,113 +73,214 @@ pub(super) fn run<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
     method: Adaptive,
-    (q, v): (&[S], &[S]),
+    start: (&[S], &[S]),
     options: &RolloutOptions<S>,
-    (keep, mut nodes, events): Receivers<'_, '_, S>,
+    (keep, nodes, events): Receivers<'_, '_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
-    let mut total = StepCounts::default();
-    let (n, zero) = (model.coordinates(), <S as Real>::zero());
-    let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
-    let accelerations = Accelerations::new(model);
-    let timed = force.is_some() || model.is_timed();
-    let mut motion = MotionEquations { model, force, options, n, timed, accelerations, terms, external, workspace };
-    let all = Samples::new(options);
-    let (domain, manifold) = (options.domain.as_ref(), model.manifold());
-    let mut state: Vec<S> = q.iter().chain(v).copied().collect();
-    let mut regular = manifold.map(|manifold| Regularity::new(manifold, (q, v), motion.backwards()));
-    let (mut start, mut first, mut first_step) = (zero, 0, zero);
-    let nodes_are_asked_for = nodes.is_some();
-    let mut watcher = match Watcher::new(model, (q, v), options, events) {
-        Ok(watcher) => watcher,
-        Err(error) => return (total, Some(error)),
+    let mut progress = match Progress::new(model, force, start, options, events) {
+        Ok(progress) => progress,
+        Err(error) => return (StepCounts::default(), Some(error)),
     };
-    let watched = watcher.is_some();
     let cuts = pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end);
-    let mut passed = 0_usize;
-    while let Some(piece) = cuts.get(passed) {
-        // The samples of this piece; it is integrated to its end even if that is not a sample.
+    let outcome = progress.run(&cuts, method, keep, nodes);
+    (progress.total, outcome.err())
+}
+
+/// A motion as far as it has come.
+struct Progress<'a, S> {
+    equations: MotionEquations<'a, S>,
+    manifold: Option<&'a dyn Manifold<S>>,
+    regular: Option<Regularity<'a, S>>,
+    watcher: Option<Watcher<'a, S>>,
+    all: Samples<S>,
+    total: StepCounts,
+    /// Elapsed time and state.
+    start: S,
+    state: Vec<S>,
+    /// The next sample, and the size of the next step; 0 leaves it to the solver.
+    first: usize,
+    first_step: S,
+}
+
+impl<'a, S: Integrable> Progress<'a, S> {
+    /// At the start `(q, v)`.
+    ///
+    /// # Errors
+    /// Events that the options do not allow.
+    fn new(
+        model: &'a dyn EulerLagrange<S>,
+        force: Option<&'a dyn Force<S>>,
+        (q, v): (&[S], &[S]),
+        options: &'a RolloutOptions<S>,
+        events: &'a mut Vec<Occurrence<S>>,
+    ) -> Result<Self, RolloutError> {
+        let (n, zero) = (model.coordinates(), <S as Real>::zero());
+        let equations = MotionEquations {
+            model,
+            force,
+            options,
+            n,
+            timed: force.is_some() || model.is_timed(),
+            accelerations: Accelerations::new(model),
+            terms: Terms::default(),
+            external: vec![zero; n],
+            workspace: Workspace::new(),
+        };
+        let manifold = model.manifold();
+        Ok(Self {
+            manifold,
+            regular: manifold.map(|manifold| Regularity::new(manifold, (q, v), equations.backwards())),
+            watcher: Watcher::new(model, (q, v), options, events)?,
+            all: Samples::new(options),
+            total: StepCounts::default(),
+            start: zero,
+            state: q.iter().chain(v).copied().collect(),
+            first: 0,
+            first_step: zero,
+            equations,
+        })
+    }
+
+    /// Integrates piece after piece, from event to event.
+    fn run(
+        &mut self,
+        cuts: &[Piece<S>],
+        method: Adaptive,
+        keep: &mut Keep<'_, S>,
+        mut nodes: Option<&mut Nodes<'_, S>>,
+    ) -> Result<(), RolloutError> {
+        for piece in cuts {
+            while let Some(found) = self.advance(piece, method, keep, &mut nodes)? {
+                if self.is_ended_by(found, keep)? {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The samples within a piece, from here; it is integrated to its end even if that is not a sample.
+    fn samples(&self, piece: &Piece<S>) -> Part<S> {
+        let (all, first) = (self.all, self.first);
         let last = piece.end >= all.elapsed(all.len() - 1);
         let after = if last { all.len() } else { all.count_until(piece.end) };
         let end = (!last && (after == first || all.elapsed(after - 1) < piece.end)).then_some(piece.end);
-        let samples = Part { all, first, after, start, end };
-        let attempts = total.accepted + total.rejected;
+        Part { all, first, after, start: self.start, end }
+    }
+
+    /// Integrates to the end of a piece, or to the first event within it that interrupts the motion, which is returned.
+    fn advance(
+        &mut self,
+        piece: &Piece<S>,
+        method: Adaptive,
+        keep: &mut Keep<'_, S>,
+        nodes: &mut Option<&mut Nodes<'_, S>>,
+    ) -> Result<Option<Found<S>>, RolloutError> {
+        let samples = self.samples(piece);
+        let Self { equations, manifold, regular, watcher, start, .. } = self;
+        let (options, n, backwards) = (equations.options, equations.n, equations.backwards());
+        let (manifold, start) = (*manifold, *start);
         let task = Integration {
             method,
             rtol: options.rtol,
             atol: options.atol,
-            max_steps: options.max_steps.saturating_sub(attempts),
-            first_step: S::min(first_step, piece.end - start),
-            timed,
-            start: &state,
+            max_steps: options.max_steps.saturating_sub(self.total.accepted + self.total.rejected),
+            first_step: S::min(self.first_step, piece.end - start),
+            timed: equations.timed,
+            start: &self.state,
             samples: &samples,
         };
-        let (mut valid, mut delivered, mut found) = (true, 0, None);
-        let mut on = Vec::with_capacity(2 * n);
-        let mut sample = |k: usize, y: &[S]| {
-            delivered = k + 1;
-            on.clear();
-            on.extend_from_slice(y);
-            // Between two states it deviates by the error of the interpolation.
-            if let Some(manifold) = manifold {
-                let (q, v) = on.split_at_mut(n);
-                valid &= project(manifold, q, v).is_ok();
-            }
-            let y = on.as_slice();
-            // An interpolated state may still cross a bound by less than the tolerance.
-            valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
-            // The samples after an invalid one are dropped; the motion continues to its end.
-            !valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
-        };
-        let (t0, backwards) = (options.t0, motion.backwards());
+        let time = |elapsed: S| if backwards { options.t0 - elapsed } else { options.t0 + elapsed };
+        let mut delivery = Delivery { manifold, options, samples, on: Vec::with_capacity(2 * n), next: 0, valid: true };
+        let mut sample = |k: usize, y: &[S]| delivery.deliver(k, y, keep);
+        let are_nodes_wanted = nodes.is_some();
         let mut node = |e: S, weight: S, y: &[S]| {
-            let (t, weight) = if backwards { (t0 - (start + e), -weight) } else { (t0 + (start + e), weight) };
-            nodes.iter_mut().for_each(|nodes| nodes(t, weight, &y[..n], &y[n..]));
+            let weight = if backwards { -weight } else { weight };
+            nodes.iter_mut().for_each(|nodes| nodes(time(start + e), weight, &y[..n], &y[n..]));
         };
-        let node = nodes_are_asked_for.then_some(&mut node as &mut StepNodes<'_, S>);
+        let node = are_nodes_wanted.then_some(&mut node as &mut StepNodes<'_, S>);
+        let (mut found, are_events_watched) = (None, watcher.is_some());
         let mut scan = |e: S, h: S, dense: &mut Dense<'_, S>| {
-            let elapsed = |share: S| start + (e + share * h);
-            let time = |share: S| if backwards { t0 - elapsed(share) } else { t0 + elapsed(share) };
+            let time = |share: S| time(start + (e + share * h));
             found = watcher.as_mut()?.interruption(manifold, &time, dense);
             found.map(|(_, share)| share)
         };
-        let scan = watched.then_some(&mut scan as &mut Scan<'_, S>);
-        let mut derivative = |e: S, y: &[S], dy: &mut [S]| motion.derivative(&piece, start + e, y, dy);
+        let scan = are_events_watched.then_some(&mut scan as &mut Scan<'_, S>);
+        let mut derivative = |e: S, y: &[S], dy: &mut [S]| equations.derivative(piece, start + e, y, dy);
         let mut back = |h: S, y: &mut [S]| {
             let drift = returned(manifold, options, n, y)?;
             regular.as_mut().map_or(Ok(()), |regular| regular.step(h, &y[..n], &y[n..]))?;
             Ok(drift)
         };
         let project = manifold.is_some().then_some(&mut back as &mut Project<'_, S, StepFailure>);
-        let Ran { statistics, elapsed: reached, state: mut reached_state, step, ended } =
-            S::integrate(&task, &mut derivative, project, (&mut sample, node, scan));
-        total += statistics;
-        let returned = match found {
-            Some((_, share)) if manifold.is_some() && share > zero => back(share * step, &mut reached_state),
-            _ => Ok(zero),
+        let mut ran = S::integrate(&task, &mut derivative, project, (&mut sample, node, scan));
+        let struck = found.map(|(_, share)| share).filter(|share| manifold.is_some() && *share > <S as Real>::zero());
+        let failed = struck.and_then(|share| back(share * ran.step, &mut ran.state).err());
+        let Delivery { next, valid, .. } = delivery;
+        let ended = failed.map(EarlyEnd::Failed).or(ran.ended);
+        self.total += ran.statistics;
+        if let Some(error) = stopped(equations, piece, ended, valid, (start + ran.elapsed, &ran.state, ran.step)) {
+            return Err(error);
+        }
+        self.state = ran.state;
+        (self.start, self.first, self.first_step) = match found {
+            Some(_) => (start + ran.elapsed, self.first + next, ran.step),
+            None => (piece.end, samples.after, S::of_f64(STEP_GROWTH_AFTER_BREAK) * ran.step),
         };
-        let ended = returned.err().map(EarlyEnd::Failed).or(ended);
-        let stop = stopped(&mut motion, &piece, ended, valid, (start + reached, &reached_state, step));
-        if stop.is_some() {
-            return (total, stop);
-        }
-        let (Some((found, _)), Some(watcher)) = (found, &mut watcher) else {
-            first_step = S::of_f64(GROWTH) * step;
-            (start, first, state, passed) = (piece.end, after, reached_state, passed + 1);
-            continue;
-        };
-        (start, first, state, first_step) = (start + reached, first + delivered, reached_state, step);
-        let t = motion.time(start);
-        if let Err(error) = watcher.strike(found, t, &mut state) {
-            return (total, Some(error));
-        }
-        let (q, v) = state.split_at(n);
-        if watcher.over {
-            let is_taken = keep(t, q, v);
-            return (total, (!is_taken).then(|| RolloutError::Stopped { t: t.to_f64() }));
-        }
-        regular = manifold.map(|manifold| Regularity::new(manifold, (q, v), backwards));
+        Ok(found.map(|(found, _)| found))
     }
-    (total, None)
+
+    /// Applies an event to the state; `true` if it ends the motion, whose last sample is then there.
+    ///
+    /// # Errors
+    /// An undetermined impact; a receiver that takes no more samples.
+    fn is_ended_by(&mut self, found: Found<S>, keep: &mut Keep<'_, S>) -> Result<bool, RolloutError> {
+        let t = self.equations.time(self.start);
+        let Some(watcher) = &mut self.watcher else { return Ok(false) };
+        watcher.strike(found, t, &mut self.state)?;
+        let (q, v) = self.state.split_at(self.equations.n);
+        if watcher.over {
+            return if keep(t, q, v) { Ok(true) } else { Err(RolloutError::Stopped { t: t.to_f64() }) };
+        }
+        let backwards = self.equations.backwards();
+        self.regular = self.manifold.map(|manifold| Regularity::new(manifold, (q, v), backwards));
+        Ok(false)
+    }
+}
+
+/// Passes on the samples of a piece.
+struct Delivery<'a, S> {
+    manifold: Option<&'a dyn Manifold<S>>,
+    options: &'a RolloutOptions<S>,
+    samples: Part<S>,
+    /// The sample on the constraints.
+    on: Vec<S>,
+    /// Samples delivered.
+    next: usize,
+    /// `true` until a sample is outside the domain or not finite.
+    valid: bool,
+}
+
+impl<S: Scalar> Delivery<'_, S> {
+    /// Passes on sample `k` of the piece, at the state `y`; `false` if no more are accepted.
+    fn deliver(&mut self, k: usize, y: &[S], keep: &mut Keep<'_, S>) -> bool {
+        let n = y.len() / 2;
+        self.next = k + 1;
+        self.on.clear();
+        self.on.extend_from_slice(y);
+        // Between two states it deviates by the error of the interpolation.
+        if let Some(manifold) = self.manifold {
+            let (q, v) = self.on.split_at_mut(n);
+            self.valid &= project(manifold, q, v).is_ok();
+        }
+        let y = self.on.as_slice();
+        // An interpolated state may still cross a bound by less than the tolerance.
+        let is_outside = |domain: &Domain<S>| domain.violation(y).is_some();
+        self.valid &= y.iter().all(|x| x.is_finite()) && !self.options.domain.as_ref().is_some_and(is_outside);
+        // The samples after an invalid one are dropped; the motion continues to its end.
+        let Part { all, first, after, .. } = self.samples;
+        !self.valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
+    }
 }
 
 /// Brings a state back to the constraints; returns how far that was, in the norm and the unit of the error of a step.

@@ -1,5 +1,6 @@
 //! Forces between the samples at which they were recorded.
 
+use super::thresholds::AT_SAMPLE;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +74,7 @@ impl Between {
                 let (pi, width) = (S::pi(), S::of_f64(REACH as f64));
                 let weight = |k: isize| {
                     let t = x - S::of_f64(k as f64);
-                    if t.abs() < S::of_f64(1e-12) {
+                    if t.abs() < S::of_f64(AT_SAMPLE) {
                         one
                     } else if t.abs() >= width {
                         <S as Real>::zero()

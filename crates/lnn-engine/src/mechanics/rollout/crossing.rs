@@ -5,16 +5,10 @@
 
 use super::event::{Event, Occurrence};
 use super::impact::Flights;
+use super::thresholds::{EVENT_PARTS, EXTREME_TRISECTIONS, SLOPE_SHARE};
 use super::{RolloutError, RolloutOptions, StepFailure};
 use crate::lagrangian::{EulerLagrange, Terms};
 use crate::scalar::{Real, Scalar};
-
-/// Parts of a step at whose ends the sides are looked at.
-const PARTS: usize = 8;
-/// Share of a part over which a slope is measured.
-const NEAR: f64 = 1.0 / 256.0;
-/// Trisections of a part in which a number may have an extreme beyond zero.
-const DIVISIONS: usize = 40;
 
 /// The state `(q, v)` at a share of a step, from 0 to 1.
 pub(super) type Dense<'a, S> = dyn FnMut(S, &mut [S]) + 'a;
@@ -179,7 +173,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
     /// The first crossing of one event.
     fn first_of(&mut self, event: usize, from: S, time: &dyn Fn(S) -> S, dense: &mut Dense<'_, S>) -> Option<Found<S>> {
         let one = <S as Real>::one();
-        let place = |k: usize| from + (one - from) * S::of_f64(k as f64 / PARTS as f64);
+        let place = |k: usize| from + (one - from) * S::of_f64(k as f64 / EVENT_PARTS as f64);
         let mut known = self.sides[event];
         let start = side(self.value(event, from, time, dense));
         if self.fired != Some(event) && start.is_some() && start != known {
@@ -189,7 +183,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
             }
             known = start;
         }
-        for k in 1..=PARTS {
+        for k in 1..=EVENT_PARTS {
             let (a, b) = (place(k - 1), place(k));
             let now = side(self.value(event, b, time, dense));
             let mut turns = vec![(a, b)];
@@ -234,14 +228,14 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         time: &dyn Fn(S) -> S,
         dense: &mut Dense<'_, S>,
     ) -> Option<S> {
-        let (zero, small) = (<S as Real>::zero(), (b - a) * S::of_f64(NEAR));
+        let (zero, small) = (<S as Real>::zero(), (b - a) * S::of_f64(SLOPE_SHARE));
         let mut f = |share: S| self.oriented((event, above), share, time, dense);
         let comes_back = f(a + small) < f(a) && f(b - small) < f(b);
         if !comes_back {
             return None;
         }
         let (mut low, mut high) = (a, b);
-        for _ in 0..DIVISIONS {
+        for _ in 0..EXTREME_TRISECTIONS {
             let third = (high - low) / S::of_f64(3.0);
             let (left, right) = (low + third, high - third);
             let values = (f(left), f(right));
@@ -292,7 +286,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
             return Ok(Some(found));
         }
         // Grow around the place until the crossing is inside.
-        let part = S::ratio(1, PARTS as i32);
+        let part = S::ratio(1, EVENT_PARTS as i32);
         let mut reach = part.ldexp(-10);
         let (mut a, mut b) = between;
         while b < one && f(b)? >= zero {

@@ -5,15 +5,13 @@
 //! in the order of the motions. A wide network then reads its weights once per round instead of once per motion.
 
 use super::run::adaptive_or_fixed;
+use super::thresholds::MOTIONS_TOGETHER;
 use super::{Force, Integrable, Rollout, RolloutOptions};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::Scalar;
 use crate::storage::{MOST_THREADS, in_order};
 use std::ops::Range;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-
-/// Motions of a group; more gain nothing, since products of eight states at a time are as quick per state as any.
-const GROUP: usize = 8;
 
 /// The start of a motion, and the external force that drives it, if there is one.
 #[derive(Clone, Copy)]
@@ -50,7 +48,7 @@ pub fn rollout_each<S: Integrable>(
     options: &RolloutOptions<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
-    if model.prefers_batches() && starts.len() > GROUP {
+    if model.prefers_batches() && starts.len() > MOTIONS_TOGETHER {
         return together(model, starts, options, threads);
     }
     in_order(starts, threads, |start| adaptive_or_fixed(model, start.force, start.q, start.v, options))
@@ -76,9 +74,9 @@ fn together<S: Integrable>(
     options: &RolloutOptions<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
-    let groups: Vec<_> = starts.chunks(GROUP).collect();
+    let groups: Vec<_> = starts.chunks(MOTIONS_TOGETHER).collect();
     // Every motion of a group has a thread.
-    let abreast = threads.min(MOST_THREADS / GROUP);
+    let abreast = threads.min(MOST_THREADS / MOTIONS_TOGETHER);
     in_order(&groups, abreast, |group| roll_group(model, group, options)).into_iter().flatten().collect()
 }
 

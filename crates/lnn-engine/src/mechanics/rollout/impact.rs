@@ -3,13 +3,11 @@
 use super::crossing::{Dense, Found, Watcher, side};
 use super::event::{Event, Impact, Occurrence, When};
 use super::run::into_error;
+use super::thresholds::QUICK_IMPACTS;
 use super::{RolloutError, StepFailure};
 use crate::lagrangian::{Manifold, MechanicsError, Request, dot, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
-
-/// Impacts of one event, each sooner after the one before than time resolves, that are taken one by one.
-const QUICK: usize = 16;
 
 /// The impacts of an event so far.
 #[derive(Clone, Debug, Default)]
@@ -182,7 +180,7 @@ impl<S: Scalar> Watcher<'_, S> {
         }
         let since = *since.get_or_insert(self.happened.len().saturating_sub(1));
         *quick += 1;
-        if *quick < QUICK {
+        if *quick < QUICK_IMPACTS {
             return None;
         }
         let rest = ratio.map_or(<S as Real>::zero(), |ratio| now * ratio / (<S as Real>::one() - ratio));

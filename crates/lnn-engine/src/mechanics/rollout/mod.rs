@@ -38,6 +38,7 @@ mod regular;
 mod run;
 mod simplified_newton;
 mod spark;
+mod thresholds;
 mod trajectory;
 mod variational;
 

@@ -14,6 +14,7 @@ use super::crossing::Dense;
 use super::dense::{Interpolant, Rhs, Step};
 use super::gauss::Tableau;
 use super::run;
+use super::thresholds::{QUADRATURE_PANELS, RETRIED_SHARE};
 use super::trajectory::Times;
 use super::{Force, RolloutError, RolloutOptions, StepCounts};
 use crate::lagrangian::EulerLagrange;
@@ -36,9 +37,6 @@ pub(super) type Scan<'a, S> = dyn FnMut(S, S, &mut Dense<'_, S>) -> Option<S> + 
 /// The receivers of an integration's results.
 pub(super) type Receivers<'a, 'f, S> =
     (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>, Option<&'a mut Scan<'f, S>>);
-
-/// Parts of a step that have three nodes of Gauss each.
-const PANELS: usize = 2;
 
 /// Projects the state at the end of a step of some length onto its manifold, and returns the distance in units of the tolerance.
 pub(super) type Project<'a, S, E> = dyn FnMut(S, &mut [S]) -> Result<S, E> + 'a;
@@ -208,7 +206,110 @@ struct Observer<'a, 'f, S, E> {
     sample: Vec<S>,
 }
 
-impl<S: Scalar, E> Observer<'_, '_, S, E> {
+impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
+    /// At the start, where the slope and the first sample behind it are known.
+    fn new(
+        task: &'a Integration<'a, S>,
+        f: &'a mut Rhs<'f, S, E>,
+        project: Option<&'a mut Project<'f, S, E>>,
+        (output, nodes, scan): Receivers<'a, 'f, S>,
+        (slope, next): (Vec<S>, usize),
+    ) -> Self {
+        let (zero, dim) = (<S as Real>::zero(), task.start.len());
+        let ring = stages(task.method) + closing_calls(task.method);
+        Self {
+            task,
+            f,
+            project,
+            output,
+            nodes,
+            scan,
+            rule: Tableau::new(3),
+            recent: vec![zero; ring * dim],
+            calls: 0,
+            opening: 0,
+            asked: zero,
+            statistics: StepCounts { evaluations: 1, ..StepCounts::default() },
+            elapsed: zero,
+            state: task.start.to_vec(),
+            slope,
+            step: zero,
+            next,
+            failure: None,
+            earlier: None,
+            retry: None,
+            restart: None,
+            stuck: false,
+            stopped: false,
+            event: false,
+            interpolant: Interpolant::default(),
+            slopes: Vec::with_capacity((ring + 1) * dim),
+            sample: vec![zero; dim],
+        }
+    }
+
+    /// Prepares for a run of the solver; returns the attempts that it may make.
+    fn open_run(&mut self, first_step: S) -> usize {
+        self.calls = 0;
+        let attempts = self.statistics.accepted + self.statistics.rejected;
+        let left = self.task.max_steps.saturating_sub(attempts);
+        // Without a first step, the solver evaluates two more states to choose one.
+        self.opening = match () {
+            () if left == 0 => 0,
+            () if first_step == <S as Real>::zero() => 3,
+            () => 1,
+        };
+        left
+    }
+
+    /// Counts the rejected attempts of a run by its calls.
+    fn count_rejected(&mut self, accepted_before: usize) {
+        let accepted = self.statistics.accepted - accepted_before;
+        let closing = accepted * closing_calls(self.task.method);
+        let attempts = (self.calls - self.opening - closing) / stages(self.task.method);
+        self.statistics.rejected += attempts - accepted;
+    }
+
+    /// The first step of another run, if the one that began at an elapsed time was stopped to continue from another state or by a shorter
+    /// step.
+    fn continuation(&mut self, began: S, end: S) -> Option<S> {
+        if let Some(step) = self.restart.take() {
+            let first_step = Real::min(step, end - self.elapsed);
+            if first_step > <S as Scalar>::epsilon().ldexp(2) * end {
+                return Some(first_step);
+            }
+        }
+        let failed = self.retry.take()?;
+        // The step counted as accepted was not taken.
+        self.statistics.accepted -= 1;
+        self.statistics.rejected += 1;
+        let first_step = failed * S::of_f64(RETRIED_SHARE);
+        if began + first_step > began && self.elapsed + first_step > self.elapsed {
+            return Some(first_step);
+        }
+        self.stuck = true;
+        None
+    }
+
+    /// Why the last run ended early, if it did; otherwise the remaining samples are delivered.
+    fn ending(&mut self, result: Result<(), IntegrationError>) -> Option<EarlyEnd<E>> {
+        match result {
+            _ if self.stopped => Some(EarlyEnd::Stopped),
+            _ if self.event => Some(EarlyEnd::Event),
+            _ if self.stuck => Some(self.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
+            Ok(()) => {
+                // The last step may end one rounding short of the end.
+                while self.next < self.task.samples.len() {
+                    let _ = (self.output)(self.next, &self.state);
+                    self.next += 1;
+                }
+                None
+            }
+            Err(IntegrationError::MaxNumStepReached { .. }) => Some(EarlyEnd::TooManySteps),
+            Err(_) => Some(self.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
+        }
+    }
+
     fn evaluate(&mut self, x: S, y: &[S], dy: &mut [S]) {
         let x = self.stage_time(x);
         self.asked = x;
@@ -340,8 +441,8 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
     /// Passes on the nodes of a quadrature within the first share of the interpolant's step.
     fn visit_nodes(&mut self, h: S, whole: S) {
         let Some(nodes) = &mut self.nodes else { return };
-        let part = S::ratio(1, PANELS as i32);
-        for panel in 0..PANELS {
+        let part = S::ratio(1, QUADRATURE_PANELS as i32);
+        for panel in 0..QUADRATURE_PANELS {
             for (&node, &weight) in self.rule.nodes.iter().zip(&self.rule.weights) {
                 let share = (S::of_f64(panel as f64) + node) * part * whole;
                 self.interpolant.evaluate(share, &mut self.sample);
@@ -379,7 +480,7 @@ impl<S: Scalar, E> Observer<'_, '_, S, E> {
     }
 }
 
-/// The watch as the solver sees it.
+/// The observer as the solver sees it.
 struct Watched<'w, 'a, 'f, S, E>(&'w RefCell<Observer<'a, 'f, S, E>>);
 
 impl<S, D, E> System<S, OVector<S, D>> for Watched<'_, '_, '_, S, E>
@@ -397,6 +498,7 @@ where
     }
 }
 
+/// Runs the solver, and again from every state that its observer has changed, until the last sample.
 fn integrate<S, D, E>(
     task: &Integration<'_, S>,
     vector: impl Fn(&[S]) -> OVector<S, D>,
@@ -411,10 +513,7 @@ where
     DefaultAllocator: Allocator<D>,
     OVector<S, D>: std::ops::Mul<S, Output = OVector<S, D>>,
 {
-    let dim = task.start.len();
-    let ring = stages(task.method) + closing_calls(task.method);
-    let (zero, end) = (<S as Real>::zero(), task.samples.len().checked_sub(1).and_then(|last| task.samples.get(last)));
-    let mut slope = vec![zero; dim];
+    let zero = <S as Real>::zero();
     let mut ran = Ran {
         statistics: StepCounts { evaluations: 1, ..StepCounts::default() },
         elapsed: zero,
@@ -422,111 +521,65 @@ where
         step: zero,
         ended: None,
     };
-    if let Err(error) = f(zero, task.start, &mut slope) {
-        ran.ended = Some(EarlyEnd::Failed(error));
-        return ran;
-    }
-    let Some(end) = end else { return ran };
-    let mut next = 0;
-    while task.samples.get(next).is_some_and(|t| t <= zero) {
-        if !output(next, task.start) {
-            ran.ended = Some(EarlyEnd::Stopped);
-            return ran;
-        }
-        next += 1;
-    }
-    let watch = RefCell::new(Observer {
-        task,
-        f,
-        project: project.map(|project| project as &mut Project<'_, S, E>),
-        output,
-        nodes: nodes.map(|nodes| nodes as &mut StepNodes<'_, S>),
-        scan: scan.map(|scan| scan as &mut Scan<'_, S>),
-        rule: Tableau::new(3),
-        recent: vec![zero; ring * dim],
-        calls: 0,
-        opening: 0,
-        asked: zero,
-        statistics: ran.statistics,
-        elapsed: zero,
-        state: task.start.to_vec(),
-        slope,
-        step: zero,
-        next,
-        failure: None,
-        earlier: None,
-        retry: None,
-        restart: None,
-        stuck: false,
-        stopped: false,
-        event: false,
-        interpolant: Interpolant::default(),
-        slopes: Vec::with_capacity((ring + 1) * dim),
-        sample: vec![zero; dim],
-    });
-
+    let end = task.samples.len().checked_sub(1).and_then(|last| task.samples.get(last));
+    let (begun, end) = match (begin(task, f, output), end) {
+        (Ok(begun), Some(end)) => (begun, end),
+        (begun, _) => return Ran { ended: begun.err(), ..ran },
+    };
+    let project = project.map(|project| project as &mut Project<'_, S, E>);
+    let nodes = nodes.map(|nodes| nodes as &mut StepNodes<'_, S>);
+    let scan = scan.map(|scan| scan as &mut Scan<'_, S>);
+    let observer = RefCell::new(Observer::new(task, f, project, (output, nodes, scan), begun));
     let mut first_step = task.first_step;
-    while next < task.samples.len() {
+    while ran.ended.is_none() && observer.borrow().next < task.samples.len() {
         let (elapsed, y, attempts_left) = {
-            let mut watch = watch.borrow_mut();
-            watch.calls = 0;
-            watch.opening = if first_step == zero { 3 } else { 1 };
-            let attempts = watch.statistics.accepted + watch.statistics.rejected;
-            (watch.elapsed, vector(&watch.state), task.max_steps.saturating_sub(attempts))
+            let mut observer = observer.borrow_mut();
+            let attempts_left = observer.open_run(first_step);
+            (observer.elapsed, vector(&observer.state), attempts_left)
         };
-        let accepted_before = watch.borrow().statistics.accepted;
+        let accepted_before = observer.borrow().statistics.accepted;
         let result = if attempts_left == 0 {
             Err(IntegrationError::MaxNumStepReached { x: 0.0, n_step: 0 })
         } else {
-            run(task, Watched(&watch), elapsed, end, y, first_step, attempts_left)
+            run(task, Watched(&observer), elapsed, end, y, first_step, attempts_left)
         };
-
-        let mut watch = watch.borrow_mut();
-        let accepted = watch.statistics.accepted - accepted_before;
-        let opening = if attempts_left == 0 { 0 } else { watch.opening };
-        let attempts = (watch.calls - opening - accepted * closing_calls(task.method)) / stages(task.method);
-        watch.statistics.rejected += attempts - accepted;
-        next = watch.next;
-        if let Some(step) = watch.restart.take() {
-            first_step = Real::min(step, end - watch.elapsed);
-            if first_step > <S as Scalar>::epsilon().ldexp(2) * end {
-                continue;
-            }
-        }
-        if let Some(failed) = watch.retry.take() {
-            // The step counted as accepted was not taken.
-            watch.statistics.accepted -= 1;
-            watch.statistics.rejected += 1;
-            first_step = failed * S::of_f64(0.25);
-            if elapsed + first_step > elapsed && watch.elapsed + first_step > watch.elapsed {
-                continue;
-            }
-            watch.stuck = true;
-        }
-        ran.ended = match result {
-            _ if watch.stopped => Some(EarlyEnd::Stopped),
-            _ if watch.event => Some(EarlyEnd::Event),
-            _ if watch.stuck => Some(watch.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
-            Ok(()) => {
-                // The last step may end one rounding short of the end.
-                while watch.next < task.samples.len() {
-                    let (k, state) = (watch.next, watch.state.clone());
-                    let _ = (watch.output)(k, &state);
-                    watch.next += 1;
-                }
-                next = watch.next;
-                None
-            }
-            Err(IntegrationError::MaxNumStepReached { .. }) => Some(EarlyEnd::TooManySteps),
-            Err(_) => Some(watch.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
-        };
-        if ran.ended.is_some() {
-            break;
+        let mut observer = observer.borrow_mut();
+        observer.count_rejected(accepted_before);
+        match observer.continuation(elapsed, end) {
+            Some(step) => first_step = step,
+            None => ran.ended = observer.ending(result),
         }
     }
+    let observer = observer.into_inner();
+    Ran {
+        statistics: observer.statistics,
+        elapsed: observer.elapsed,
+        state: observer.state,
+        step: observer.step,
+        ..ran
+    }
+}
 
-    let watch = watch.into_inner();
-    Ran { statistics: watch.statistics, elapsed: watch.elapsed, state: watch.state, step: watch.step, ..ran }
+/// The slope at the start, and the first sample behind it: those at the start are delivered.
+///
+/// # Errors
+/// The failure of the right-hand side at the start; a receiver that takes no more samples.
+fn begin<S: Scalar, E>(
+    task: &Integration<'_, S>,
+    f: &mut Rhs<'_, S, E>,
+    output: &mut Output<'_, S>,
+) -> Result<(Vec<S>, usize), EarlyEnd<E>> {
+    let zero = <S as Real>::zero();
+    let mut slope = vec![zero; task.start.len()];
+    f(zero, task.start, &mut slope).map_err(EarlyEnd::Failed)?;
+    let mut next = 0;
+    while task.samples.get(next).is_some_and(|t| t <= zero) {
+        if !output(next, task.start) {
+            return Err(EarlyEnd::Stopped);
+        }
+        next += 1;
+    }
+    Ok((slope, next))
 }
 
 /// One run of the solver from `elapsed` to `end`, its own defaults except for stiffness detection (off: the number of

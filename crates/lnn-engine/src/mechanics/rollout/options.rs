@@ -1,5 +1,6 @@
 //! Options of a roll-out.
 
+use super::thresholds::{LEAST_TOLERANCES, MOST_SAMPLES};
 use super::{Event, RolloutError};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
@@ -158,9 +159,6 @@ pub struct RolloutOptions<S> {
     pub events: Vec<Event<S>>,
 }
 
-/// More samples than this are refused: their memory would be in the tens of gigabytes.
-const MAX_SAMPLES: f64 = 1e8;
-
 impl<S: Scalar> RolloutOptions<S> {
     /// Learned motion as in the paper's tests: `Dopri5`, rtol 1e-6, atol 1e-8, from time 0.
     pub fn new(t_end: S, dt: S) -> Self {
@@ -248,7 +246,7 @@ impl<S: Scalar> RolloutOptions<S> {
     /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
     /// it steps shrink until they no longer advance the time, and never arrive.
     pub fn least_tolerance() -> S {
-        S::of_f64(if S::epsilon().to_f64() > 1e-12 { 1e-6 } else { 2e-15 })
+        S::of_f64(if S::epsilon().to_f64() > 1e-12 { LEAST_TOLERANCES.0 } else { LEAST_TOLERANCES.1 })
     }
 
     /// Refuses options that make no sense for `n` coordinates.
@@ -266,11 +264,11 @@ impl<S: Scalar> RolloutOptions<S> {
             return invalid("dt", "must not be 0".into());
         }
         let samples = ((self.t_end - self.t0) / self.dt).abs();
-        if samples.is_nan() || samples.to_f64() > MAX_SAMPLES {
+        if samples.is_nan() || samples.to_f64() > MOST_SAMPLES {
             return invalid(
                 "dt",
                 format!(
-                    "asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed",
+                    "asks for {:.3e} samples, at most {MOST_SAMPLES:.0e} are allowed",
                     samples.to_f64().min(f64::MAX)
                 ),
             );

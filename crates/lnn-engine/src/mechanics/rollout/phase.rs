@@ -2,13 +2,11 @@
 //! zero for a model that conserves its energy, and an external force, if one acts.
 
 use super::force::Piece;
+use super::thresholds::{MODEL_ROUNDINGS_LOG2, MOST_VELOCITY_SWEEPS};
 use super::{Force, StepFailure};
 use crate::lagrangian::{EulerLagrange, Manifold, ManifoldRows, MechanicsError, Request, Terms};
 use crate::linalg::{self, LinalgError, Workspace};
 use crate::scalar::{Real, Scalar};
-
-/// Newton steps from `p` to `v`.
-const MAX_SWEEPS: usize = 50;
 
 /// A model, the buffers of its evaluation, and the results.
 pub(super) struct PhaseSpace<'a, S> {
@@ -86,7 +84,7 @@ impl<S: Scalar> Defect<S> {
 
     /// Up to the rounding errors of the model.
     pub(super) fn is_small(self) -> bool {
-        self.overall <= S::epsilon().ldexp(12)
+        self.overall <= S::epsilon().ldexp(MODEL_ROUNDINGS_LOG2)
     }
 
     /// `true` if this is less than half of the best so far, in either measure. Comparing with the last one instead would
@@ -288,7 +286,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         let mut residual = vec![<S as Real>::zero(); n];
         let mut change = residual.clone();
         let mut best = Defect::unknown();
-        for sweep in 1..=MAX_SWEEPS {
+        for sweep in 1..=MOST_VELOCITY_SWEEPS {
             self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX, &[])?;
             self.iterations += 1;
             for ((r, &found), &wanted) in residual.iter_mut().zip(&self.terms.momentum).zip(p) {
@@ -302,7 +300,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
                 return Ok(());
             }
-            if sweep == MAX_SWEEPS {
+            if sweep == MOST_VELOCITY_SWEEPS {
                 return Err(StepFailure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
             }
             best = best.best(defect);
@@ -331,7 +329,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         let (mut rows, mut push) = (ManifoldRows::default(), vec![zero; n]);
         let (mut matrix, mut right, mut change) = (vec![zero; k * k], vec![zero; k], vec![zero; k]);
         let mut best = Defect::unknown();
-        for sweep in 1..=MAX_SWEEPS {
+        for sweep in 1..=MOST_VELOCITY_SWEEPS {
             self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX, &[])?;
             self.iterations += 1;
             manifold.rows(q, v, &mut rows);
@@ -355,7 +353,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
                 return Ok(push);
             }
-            if sweep == MAX_SWEEPS {
+            if sweep == MOST_VELOCITY_SWEEPS {
                 return Err(StepFailure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
             }
             best = best.best(defect);

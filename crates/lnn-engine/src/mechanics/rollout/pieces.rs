@@ -5,7 +5,7 @@ use super::event::lost;
 use super::force::pieces;
 use super::gauss::{Tableau, lagrange};
 use super::run::Nodes;
-use super::trajectory::CHUNK;
+use super::thresholds::{QUADRATURE_SAMPLES, STATES_TOGETHER};
 use super::{Force, Integrable, Occurrence, RolloutError, RolloutOptions, StepCounts, Trajectory};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
@@ -74,7 +74,7 @@ pub(super) fn hand_over<S: Integrable>(
     let nodes = exchanged.then_some(&mut node as &mut Nodes<'_, S>);
     let mut keep = |t: S, q: &[S], v: &[S]| {
         piece.push(t, q, v);
-        if piece.len() == CHUNK {
+        if piece.len() == STATES_TOGETHER {
             willing = give(&mut piece);
         }
         willing
@@ -124,9 +124,6 @@ impl<'a, S: Scalar> Exchange<'a, S> {
     }
 }
 
-/// Samples whose interpolating polynomial is integrated.
-const SAMPLES: usize = 6;
-
 /// Energy gained, energy lost to friction and impacts, and work of a force from outside between the first and the last sample, in the
 /// unit of `L`.
 ///
@@ -161,10 +158,10 @@ impl<S: Scalar> EnergyBalance<S> {
         let invalid = |problem: String| RolloutError::Invalid { what: "trajectory", problem };
         let zero = <S as Real>::zero();
         let Trajectory { coordinates, t, q, v, .. } = trajectory;
-        let size = CHUNK * (*coordinates).max(1);
+        let size = STATES_TOGETHER * (*coordinates).max(1);
         let (mut energy, mut power) = (Vec::with_capacity(t.len()), Vec::with_capacity(t.len()));
         let mut terms = Terms::default();
-        for ((q, v), t) in q.chunks(size).zip(v.chunks(size)).zip(t.chunks(CHUNK)) {
+        for ((q, v), t) in q.chunks(size).zip(v.chunks(size)).zip(t.chunks(STATES_TOGETHER)) {
             model
                 .terms_at(t, q, v, Request::ENERGY | Request::FORCE, &mut terms)
                 .map_err(|e| invalid(format!("samples from {}: {e}", energy.len())))?;
@@ -201,15 +198,15 @@ impl<S: Scalar> Trajectory<S> {
 
 /// Index of the first of `window` samples, among `count`, whose polynomial covers the interval before sample `k`.
 fn stencil(k: usize, count: usize, window: usize) -> usize {
-    k.saturating_sub(SAMPLES / 2).min(count - window)
+    k.saturating_sub(QUADRATURE_SAMPLES / 2).min(count - window)
 }
 
 /// Integral of `v.Q` along the samples.
 fn work<S: Scalar>(trajectory: &Trajectory<S>, force: &dyn Force<S>) -> S {
     let Trajectory { coordinates: n, t, q, v, .. } = trajectory;
     let (n, zero) = (*n, <S as Real>::zero());
-    let Tableau { nodes, weights, .. } = Tableau::<S>::new(SAMPLES / 2);
-    let window = SAMPLES.min(t.len());
+    let Tableau { nodes, weights, .. } = Tableau::<S>::new(QUADRATURE_SAMPLES / 2);
+    let window = QUADRATURE_SAMPLES.min(t.len());
     let (mut state, mut value) = (vec![zero; 2 * n], vec![zero; n]);
     let mut sum = zero;
     for k in 1..t.len() {
@@ -249,8 +246,8 @@ fn near<S: Scalar>(breaks: &[S], a: S, b: S) -> &[S] {
 
 /// Integral of samples `y` over the times `t`, in order: each interval by the polynomial through the samples around it.
 fn integral<S: Scalar>(t: &[S], y: &[S]) -> S {
-    let Tableau { nodes, weights, .. } = Tableau::<S>::new(SAMPLES / 2);
-    let window = SAMPLES.min(t.len());
+    let Tableau { nodes, weights, .. } = Tableau::<S>::new(QUADRATURE_SAMPLES / 2);
+    let window = QUADRATURE_SAMPLES.min(t.len());
     let mut sum = <S as Real>::zero();
     for k in 1..t.len() {
         let first = stencil(k, t.len(), window);
@@ -304,7 +301,7 @@ mod tests {
                 let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 99);
                 assert_eq!((&trajectory, ending.statistics), (&whole.trajectory, whole.statistics));
                 assert_eq!((ending.samples, ending.stop), (trajectory.len(), None));
-                assert_eq!(pieces, trajectory.len().div_ceil(CHUNK));
+                assert_eq!(pieces, trajectory.len().div_ceil(STATES_TOGETHER));
             }
         }
     }
@@ -314,7 +311,7 @@ mod tests {
         let options = RolloutOptions::new(5.0, 0.001);
         let (trajectory, _, ending) = joined(&BROKEN, &options, 99);
         let whole = rollout(&BROKEN, &[1.0], &[0.2], &options);
-        assert!(ending.stop.is_some() && trajectory.len() > CHUNK);
+        assert!(ending.stop.is_some() && trajectory.len() > STATES_TOGETHER);
         assert_eq!((trajectory, ending.stop), (whole.trajectory, whole.stop));
         let (nothing, pieces, refused) = joined(&*oscillator(), &RolloutOptions::new(1.0, 0.0), 99);
         assert!(nothing.is_empty() && pieces == 0 && matches!(refused.stop, Some(RolloutError::Invalid { .. })));
@@ -325,7 +322,7 @@ mod tests {
         for method in [Integrator::Dopri5, Integrator::Gauss4] {
             let options = RolloutOptions { method, ..RolloutOptions::new(1e3, 0.001) };
             let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 2);
-            assert_eq!((trajectory.len(), pieces, ending.samples), (2 * CHUNK, 2, 2 * CHUNK));
+            assert_eq!((trajectory.len(), pieces, ending.samples), (2 * STATES_TOGETHER, 2, 2 * STATES_TOGETHER));
             assert!(matches!(ending.stop, Some(RolloutError::Stopped { t }) if t < 5.0), "{:?}", ending.stop);
         }
     }

@@ -3,23 +3,14 @@
 
 use super::StepFailure;
 use super::dense::cubic;
+use super::thresholds::{
+    BRANCH, BRANCH_PLACES, BRANCH_TRISECTIONS, EXACT_HALVINGS, ROUGH_HALVINGS, ROW_PARTS, SUSPICIOUS_COSINE,
+    SUSPICIOUS_SINGULAR_VALUE,
+};
 use crate::lagrangian::{Manifold, ManifoldRows, dot};
 use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
-
-/// The smallest singular value of the rows, over the largest value that it had, below which it counts as 0. Where it passes through 0, the
-/// search finds a minimum far below this; a motion that stays away from its branches by a thousandth is unique.
-const BRANCH: f64 = 1e-3;
-/// A step is looked into if a row turns by more than this cosine, or the singular value is below this share of the largest.
-const LOOKED_INTO: (f64, f64) = (0.9, 0.3);
-/// Parts of a step between which rows are compared: adaptive methods take steps in which wheels make whole turns.
-const PARTS: usize = 8;
-/// Halvings of an interval around the smallest singular value: for a value needed to rounding, and for one used in comparisons.
-const HALVINGS: (usize, usize) = (52, 12);
-/// Points of a step that are examined first, and divisions of the interval around the smallest of them.
-const PLACES: usize = 16;
-const DIVISIONS: usize = 40;
 
 /// Knowledge about the rows so far.
 pub(super) struct Regularity<'a, S> {
@@ -138,7 +129,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
     /// The smallest singular value of the rows over their sizes.
     fn least(&mut self, q: &[S]) -> S {
         match self.sparse {
-            Some(_) => self.halved((<S as Real>::zero(), HALVINGS.0), q),
+            Some(_) => self.halved((<S as Real>::zero(), EXACT_HALVINGS), q),
             None => self.least_direction(q).0,
         }
     }
@@ -167,24 +158,24 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         let starts = self.starts.clone();
         let turns = |before: &[S], after: &[S]| {
             let mut rows = starts.windows(2).map(|at| (&before[at[0]..at[1]], &after[at[0]..at[1]]));
-            rows.any(|(a, b)| dot(a, b) < S::of_f64(LOOKED_INTO.0) * Real::sqrt(dot(a, a) * dot(b, b)))
+            rows.any(|(a, b)| dot(a, b) < S::of_f64(SUSPICIOUS_COSINE) * Real::sqrt(dot(a, a) * dot(b, b)))
         };
         let mut last = self.matrix.clone();
         let mut turned = false;
-        for k in 1..PARTS {
-            let place = self.place(k as f64 / PARTS as f64, h, q, v);
+        for k in 1..ROW_PARTS {
+            let place = self.place(k as f64 / ROW_PARTS as f64, h, q, v);
             let next = self.matrix_at(&place);
             turned |= turns(&last, &next);
             last = next;
         }
         turned |= turns(&last, &matrix);
-        let floor = S::of_f64(LOOKED_INTO.1) * self.largest;
+        let floor = S::of_f64(SUSPICIOUS_SINGULAR_VALUE) * self.largest;
         // With the pattern it suffices to know whether the value exceeds others.
         let (is_low, value) = if self.sparse.is_none() {
             let value = self.least(q);
             (value < floor, value)
         } else if self.is_above(self.largest, q) {
-            (false, self.halved((self.largest, HALVINGS.1), q))
+            (false, self.halved((self.largest, ROUGH_HALVINGS), q))
         } else {
             (are_finite(&matrix) && !self.is_above(floor, q), self.largest)
         };
@@ -212,11 +203,11 @@ impl<'a, S: Scalar> Regularity<'a, S> {
             let place = self.place(x, h, q, v);
             self.least(&place)
         };
-        let width = 1.0 / PLACES as f64;
-        let values: Vec<S> = (0..=PLACES).map(|k| at(k as f64 * width)).collect();
-        let lowest = (0..=PLACES).fold(0, |low, k| if values[k] < values[low] { k } else { low }) as f64 * width;
+        let width = 1.0 / BRANCH_PLACES as f64;
+        let values: Vec<S> = (0..=BRANCH_PLACES).map(|k| at(k as f64 * width)).collect();
+        let lowest = (0..=BRANCH_PLACES).fold(0, |low, k| if values[k] < values[low] { k } else { low }) as f64 * width;
         let (mut low, mut high) = ((lowest - width).max(0.0), (lowest + width).min(1.0));
-        for _ in 0..DIVISIONS {
+        for _ in 0..BRANCH_TRISECTIONS {
             let third = (high - low) / 3.0;
             if at(low + third) < at(high - third) { high -= third } else { low += third }
         }
@@ -248,7 +239,7 @@ mod tests {
                 let (exact, _) = known.least_direction(q);
                 assert!((known.least(q) - exact).abs() < 1e-7, "{name}: {exact}");
                 assert!(known.is_above(0.99 * exact, q) && !known.is_above(1.01 * exact, q), "{name}: {exact}");
-                let near = known.halved((0.5 * exact, HALVINGS.1), q);
+                let near = known.halved((0.5 * exact, ROUGH_HALVINGS), q);
                 assert!(near <= exact && near > 0.999 * exact, "{name}: {near} {exact}");
             }
             assert!(known.least(&vec![f64::NAN; q.len()]).is_nan());

@@ -3,6 +3,7 @@
 use super::error::UnderflowCause;
 use super::fixed::Stepper;
 use super::ode::Adaptive;
+use super::thresholds::NEAR_CONSTRAINTS;
 use super::{
     Force, Integrable, Integrator, Occurrence, RolloutError, RolloutOptions, StepCounts, Trajectory, adaptive, fixed,
 };
@@ -183,9 +184,6 @@ fn integrate_fixed<S: Scalar>(
     fixed::run(model, force, &mut stepper, (&q, &v), options, receivers)
 }
 
-/// A start closer to the constraints than this share of its size is projected onto them.
-const NEAR: f64 = 1e-3;
-
 /// The start, projected onto the constraints of the model.
 ///
 /// # Errors
@@ -201,11 +199,11 @@ fn allowed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Result<
         }
     };
     let size = |x: &[S]| x.iter().map(|x| x.to_f64().powi(2)).sum::<f64>().sqrt();
-    let far = [(moved, size(q)), (turned, size(v))].into_iter().find(|(moved, size)| *moved > NEAR * size);
+    let far = [(moved, size(q)), (turned, size(v))].into_iter().find(|(moved, size)| *moved > NEAR_CONSTRAINTS * size);
     let Some((distance, _)) = far else { return Ok((on_q, on_v)) };
     let mut rows = ManifoldRows::default();
     manifold.rows(q, v, &mut rows);
-    let missed = if moved > NEAR * size(q) { &rows.values } else { &rows.rates };
+    let missed = if moved > NEAR_CONSTRAINTS * size(q) { &rows.values } else { &rows.rates };
     let most = missed.iter().enumerate().max_by(|(_, a), (_, b)| a.abs().to_f64().total_cmp(&b.abs().to_f64()));
     let nearest = on_q.iter().chain(&on_v).map(|x| x.to_f64()).collect();
     let constraint = most.map_or_else(String::new, |(row, _)| name(row));

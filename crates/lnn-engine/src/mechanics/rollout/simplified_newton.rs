@@ -2,6 +2,7 @@
 
 use super::StepFailure;
 use super::phase::{Defect, PhaseSpace, singular};
+use super::thresholds::{MOST_NEWTON_ITERATIONS, MOST_NEWTON_MATRICES, NEWTON_PATIENCE, NEWTON_ROUNDINGS};
 use crate::linalg::{LANES, solve};
 use crate::scalar::{Real, Scalar};
 
@@ -21,21 +22,10 @@ pub(super) trait Equations<S: Scalar> {
     fn rounding(&self, n: usize, x: &[S], i: usize) -> S;
 }
 
-/// Corrections up to this many roundings of the unknowns count as rounding. A stiff spring between two masses has corrections of up to
-/// three: its force is uncertain by the rounding of either position times its constant.
-const ROUNDINGS: f64 = 16.0;
-
 /// The change of velocities that are unknown at `x` which the roundings of them and of coordinates `q`, over a step `h`, explain.
 pub(super) fn rounding<S: Scalar>(q: &[S], h: S, x: &[S], i: usize) -> S {
     S::epsilon() * (x[i].abs() + q[i % q.len()].abs() / h.abs())
 }
-
-/// Evaluations of one step.
-const MAX_ITERATIONS: usize = 60;
-/// New matrices in one step.
-const MAX_MATRICES: usize = 4;
-/// A matrix is replaced before the next step once a step takes this many evaluations more than its best.
-const PATIENCE: usize = 1;
 
 /// The inverse of an iteration matrix and how well it did.
 #[derive(Clone, Debug)]
@@ -55,7 +45,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
         let zero = <S as Real>::zero();
         Self {
             inverse: vec![zero; size * size],
-            least: MAX_ITERATIONS,
+            least: MOST_NEWTON_ITERATIONS,
             stale: true,
             residual: vec![zero; size],
             matrix: vec![zero; size * size],
@@ -87,21 +77,21 @@ impl<S: Scalar> SimplifiedNewton<S> {
             self.refresh(phase, equations, x)?;
             matrices = 1;
         }
-        for iteration in 1..=MAX_ITERATIONS {
+        for iteration in 1..=MOST_NEWTON_ITERATIONS {
             let defect = equations.residual(phase, x, &mut self.residual)?;
             phase.iterations += 1;
             let improves = defect.improves(best);
             if defect.is_rounding() || (!improves && (defect.is_small() || self.is_settled(phase.n, equations, x))) {
                 self.least = self.least.min(iteration);
-                self.stale = matrices > 1 || iteration > self.least + PATIENCE;
+                self.stale = matrices > 1 || iteration > self.least + NEWTON_PATIENCE;
                 return Ok(());
             }
             let failed = StepFailure::NotConverged { iterations: iteration, residual: defect.overall.to_f64() };
-            if iteration == MAX_ITERATIONS {
+            if iteration == MOST_NEWTON_ITERATIONS {
                 return Err(failed);
             }
             if !improves {
-                if matrices == MAX_MATRICES {
+                if matrices == MOST_NEWTON_MATRICES {
                     return Err(failed);
                 }
                 self.refresh(phase, equations, x)?;
@@ -121,7 +111,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
 
     /// `true` if the residual, however large relative to cancelling terms, only requires corrections within the rounding of the unknowns.
     fn is_settled(&self, n: usize, equations: &impl Equations<S>, x: &[S]) -> bool {
-        (0..x.len()).all(|i| self.correction(i).abs() <= S::of_f64(ROUNDINGS) * equations.rounding(n, x, i))
+        (0..x.len()).all(|i| self.correction(i).abs() <= S::of_f64(NEWTON_ROUNDINGS) * equations.rounding(n, x, i))
     }
 
     /// A new matrix at `x`, inverted.
@@ -132,7 +122,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
         x: &[S],
     ) -> Result<(), StepFailure> {
         let size = x.len();
-        (self.stale, self.least) = (true, MAX_ITERATIONS);
+        (self.stale, self.least) = (true, MOST_NEWTON_ITERATIONS);
         equations.jacobian(phase, x, &mut self.matrix)?;
         if size == 1 {
             if self.matrix[0] == <S as Real>::zero() {

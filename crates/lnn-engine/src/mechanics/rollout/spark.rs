@@ -111,6 +111,91 @@ impl<S: Scalar> Stages<'_, S> {
             })
             .collect()
     }
+
+    /// `h a_ij` without `h`.
+    fn ratio(&self, i: usize, j: usize) -> S {
+        self.tableau.ratios[i * self.tableau.nodes.len() + j] * self.tableau.weights[j]
+    }
+
+    /// Adds the equations `phi(R_k) = 0`, and their impulses at the nodes of Lobatto but the last.
+    fn add_holonomic(&self, n: usize, v: &[S], impulses: &[S], sums: &mut Sums<S>) {
+        let (s, held, zero, h) = (self.tableau.nodes.len(), self.kinds.holonomic.len(), <S as Real>::zero(), self.h);
+        for k in (0..=s).filter(|_| held > 0) {
+            let at = self.place(n, row_of(&self.lobatto.positions, s, k), v);
+            self.manifold.rows(&at, &v[..n], &mut sums.rows);
+            if k > 0 {
+                for &row in &self.kinds.holonomic {
+                    let terms = row_of(&sums.rows.matrix, n, row).iter().zip(&at);
+                    let size = terms.fold(zero, |sum, (&a, &q)| sum + (a * q).abs());
+                    sums.defects.push(sums.rows.values[row] / h);
+                    sums.sizes.push(size / h.abs());
+                }
+            }
+            if k < s {
+                sums.node.fill(zero);
+                for (&row, &impulse) in self.kinds.holonomic.iter().zip(row_of(impulses, held, k)) {
+                    let gradient = row_of(&sums.rows.matrix, n, row);
+                    sums.node.iter_mut().zip(gradient).for_each(|(sum, &a)| *sum += impulse * a);
+                }
+                sums.spread(n, |i| self.lobatto.momenta[i * (s + 1) + k], self.lobatto.weights[k]);
+            }
+        }
+    }
+
+    /// Adds the forces at the nodes of Gauss, and there the rows that are linear in the velocities with their multipliers.
+    fn add_forces(&self, n: usize, v: &[S], multipliers: &[S], sums: &mut Sums<S>) {
+        let (zero, h, linear) = (<S as Real>::zero(), self.h, &self.kinds.linear);
+        for j in 0..self.tableau.nodes.len() {
+            sums.node.iter_mut().zip(row_of(&self.buffers.g, n, j)).for_each(|(sum, &g)| *sum = h * g);
+            if !linear.is_empty() {
+                self.manifold.rows(row_of(&self.buffers.q, n, j), row_of(v, n, j), &mut sums.rows);
+                for (&row, &multiplier) in linear.iter().zip(row_of(multipliers, linear.len(), j)) {
+                    let gradient = row_of(&sums.rows.matrix, n, row);
+                    let size = gradient.iter().zip(row_of(v, n, j)).fold(zero, |sum, (&a, &v)| sum + (a * v).abs());
+                    sums.defects.push(sums.rows.rates[row]);
+                    sums.sizes.push(size);
+                    sums.node.iter_mut().zip(gradient).for_each(|(sum, &a)| *sum += multiplier * a);
+                }
+            }
+            sums.spread(n, |i| self.ratio(i, j), self.tableau.weights[j]);
+        }
+    }
+}
+
+/// Sums over the nodes of one evaluation.
+struct Sums<S> {
+    /// Contribution of the current node, `(n)`.
+    node: Vec<S>,
+    /// Change of the momenta of the stages, `(stages, n)`, and of the end without the last impulse, `(n)`.
+    stages: Vec<S>,
+    end: Vec<S>,
+    /// Defects of the constraints' equations, and the sizes of their terms.
+    defects: Vec<S>,
+    sizes: Vec<S>,
+    rows: ManifoldRows<S>,
+}
+
+impl<S: Scalar> Sums<S> {
+    fn new(n: usize, stages: usize, equations: usize) -> Self {
+        let zero = <S as Real>::zero();
+        Self {
+            node: vec![zero; n],
+            stages: vec![zero; stages * n],
+            end: vec![zero; n],
+            defects: Vec::with_capacity(equations),
+            sizes: Vec::with_capacity(equations),
+            rows: ManifoldRows::default(),
+        }
+    }
+
+    /// Adds the contribution of the current node to every stage by its weight, and to the end by another.
+    fn spread(&mut self, n: usize, of_stage: impl Fn(usize) -> S, of_end: S) {
+        for (i, stage) in self.stages.chunks_exact_mut(n).enumerate() {
+            let weight = of_stage(i);
+            stage.iter_mut().zip(&self.node).for_each(|(to, &x)| *to += weight * x);
+        }
+        self.end.iter_mut().zip(&self.node).for_each(|(to, &x)| *to += of_end * x);
+    }
 }
 
 impl<S: Scalar> Equations<S> for Stages<'_, S> {
@@ -121,66 +206,19 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         residual: &mut [S],
     ) -> Result<Defect<S>, StepFailure> {
         let (n, s, zero) = (phase.n, self.tableau.nodes.len(), <S as Real>::zero());
-        let (held, slid) = (self.kinds.holonomic.len(), self.kinds.linear.len());
         let (v, multipliers) = x.split_at(s * n);
-        let (impulses, pulls) = multipliers.split_at(s * held);
-        let a = |i: usize, j: usize| self.tableau.ratios[i * s + j] * self.tableau.weights[j];
+        let (impulses, pulls) = multipliers.split_at(s * self.kinds.holonomic.len());
         for i in 0..s {
-            let weights: Vec<S> = (0..s).map(|j| a(i, j)).collect();
+            let weights: Vec<S> = (0..s).map(|j| self.ratio(i, j)).collect();
             let at = self.place(n, &weights, v);
             self.buffers.q[i * n..(i + 1) * n].copy_from_slice(&at);
         }
         let Buffers { after, q, p, g, .. } = &mut *self.buffers;
         phase.momenta_and_forces(q, v, after, (p, g))?;
-        // Contribution of each node to the momenta of the stages and of the end.
-        let mut wanted = vec![zero; s * n];
-        let mut push = vec![zero; n];
-        let mut sizes = Vec::with_capacity(multipliers.len());
-        let mut defects = Vec::with_capacity(multipliers.len());
-        let mut rows = ManifoldRows::default();
-        let (mut add, h) = (vec![zero; n], self.h);
-        for k in (0..=s).filter(|_| held > 0) {
-            let at = self.place(n, row_of(&self.lobatto.positions, s, k), v);
-            self.manifold.rows(&at, &v[..n], &mut rows);
-            if k > 0 {
-                for &row in &self.kinds.holonomic {
-                    let size =
-                        row_of(&rows.matrix, n, row).iter().zip(&at).fold(zero, |sum, (&a, &q)| sum + (a * q).abs());
-                    defects.push(rows.values[row] / h);
-                    sizes.push(size / h.abs());
-                }
-            }
-            if k < s {
-                add.fill(zero);
-                for (&row, &impulse) in self.kinds.holonomic.iter().zip(row_of(impulses, held, k)) {
-                    let gradient = row_of(&rows.matrix, n, row);
-                    add.iter_mut().zip(gradient).for_each(|(add, &a)| *add += impulse * a);
-                }
-                for i in 0..s {
-                    let weight = self.lobatto.momenta[i * (s + 1) + k];
-                    wanted[i * n..(i + 1) * n].iter_mut().zip(&add).for_each(|(to, &x)| *to += weight * x);
-                }
-                push.iter_mut().zip(&add).for_each(|(to, &x)| *to += self.lobatto.weights[k] * x);
-            }
-        }
-        for j in 0..s {
-            add.iter_mut().zip(row_of(&self.buffers.g, n, j)).for_each(|(add, &g)| *add = h * g);
-            if slid > 0 {
-                self.manifold.rows(row_of(&self.buffers.q, n, j), row_of(v, n, j), &mut rows);
-                for (&row, &pull) in self.kinds.linear.iter().zip(row_of(pulls, slid, j)) {
-                    let gradient = row_of(&rows.matrix, n, row);
-                    let size = gradient.iter().zip(row_of(v, n, j)).fold(zero, |sum, (&a, &v)| sum + (a * v).abs());
-                    defects.push(rows.rates[row]);
-                    sizes.push(size);
-                    add.iter_mut().zip(gradient).for_each(|(add, &a)| *add += pull * a);
-                }
-            }
-            for i in 0..s {
-                let weight = a(i, j);
-                wanted[i * n..(i + 1) * n].iter_mut().zip(&add).for_each(|(to, &x)| *to += weight * x);
-            }
-            push.iter_mut().zip(&add).for_each(|(to, &x)| *to += self.tableau.weights[j] * x);
-        }
+        let mut sums = Sums::new(n, s, multipliers.len());
+        self.add_holonomic(n, v, impulses, &mut sums);
+        self.add_forces(n, v, pulls, &mut sums);
+        let Sums { stages: wanted, end, defects, sizes, .. } = sums;
         let p0 = &self.state.p;
         for (at, residual) in residual[..s * n].iter_mut().enumerate() {
             let k = at % n;
@@ -188,14 +226,13 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         }
         let most = |y: &[S], k: usize| y.iter().skip(k).step_by(n).fold(zero, |most, y| S::max(most, y.abs()));
         let (found, forces) = (&self.buffers.p, &self.buffers.g);
-        let size = |k: usize| p0.high[k].abs() + most(found, k) + h.abs() * most(forces, k) + most(&wanted, k);
+        let size = |k: usize| p0.high[k].abs() + most(found, k) + self.h.abs() * most(forces, k) + most(&wanted, k);
         let of_momenta = Defect::of(n, &residual[..s * n], size);
         residual[s * n..].copy_from_slice(&defects);
         // The equations of constraints consist of velocities.
         let speed = v.iter().fold(zero, |most, v| S::max(most, v.abs()));
         let of_rows = Defect::of(defects.len().max(1), &defects, |i| sizes.get(i).map_or(zero, |&size| size + speed));
-        self.buffers.push = push;
-        self.buffers.sizes = sizes;
+        (self.buffers.push, self.buffers.sizes) = (end, sizes);
         Ok(of_momenta.worst(of_rows))
     }
 

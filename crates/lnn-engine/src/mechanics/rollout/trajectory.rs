@@ -2,6 +2,7 @@
 
 use super::RolloutError;
 use super::options::{RolloutOptions, blur};
+use super::thresholds::STATES_TOGETHER;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
@@ -45,9 +46,6 @@ pub struct Trajectory<S> {
     pub energy: Option<Vec<S>>,
 }
 
-/// States evaluated at once.
-pub(super) const CHUNK: usize = 256;
-
 impl<S: Scalar> Trajectory<S> {
     /// No states of `n` coordinates.
     pub fn empty(coordinates: usize) -> Self {
@@ -82,11 +80,11 @@ impl<S: Scalar> Trajectory<S> {
 
     /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot evaluate it.
     pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
-        let size = CHUNK * self.coordinates.max(1);
+        let size = STATES_TOGETHER * self.coordinates.max(1);
         let mut energy = Vec::with_capacity(self.len());
         let mut terms = Terms::default();
         let states = self.q.chunks(size).zip(self.v.chunks(size));
-        for ((q, v), t) in states.zip(self.t.chunks(CHUNK)) {
+        for ((q, v), t) in states.zip(self.t.chunks(STATES_TOGETHER)) {
             let batch = t.len();
             terms.energy.clear();
             // A row that is not finite is reported and stays `NaN` or infinite in the result.

@@ -74,37 +74,19 @@ pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<I
     let alpha = (one + S::of_f64(17.0).sqrt()) / S::of_f64(8.0);
     let mut k = 0;
     while k < n {
-        let (mut diagonal, mut p) = (zero, k);
-        let (mut off, mut r, mut s) = (zero, k, k);
-        for i in k..n {
-            for j in k..=i {
-                let size = a[i * n + j].abs();
-                if i == j && size > diagonal {
-                    (diagonal, p) = (size, i);
-                } else if i != j && size > off {
-                    (off, r, s) = (size, i, j);
-                }
-            }
-        }
+        let [(diagonal, p, _), (off, r, s)] = largest_elements(n, a, k);
         if diagonal <= floor && off <= floor {
             found.zero += n - k;
             break;
         }
         if diagonal >= alpha * off {
             exchange(n, a, k, p);
-            let pivot = a[k * n + k];
-            if pivot > zero {
+            if a[k * n + k] > zero {
                 found.positive += 1;
             } else {
                 found.negative += 1;
             }
-            for i in k + 1..n {
-                let factor = a[i * n + k] / pivot;
-                for j in k + 1..=i {
-                    let update = factor * a[j * n + k];
-                    a[i * n + j] -= update;
-                }
-            }
+            eliminate_one(n, a, k);
             k += 1;
         } else {
             // A 2x2 block whose determinant is negative: one eigenvalue of each sign. s < r.
@@ -112,22 +94,59 @@ pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<I
             exchange(n, a, k + 1, r);
             found.positive += 1;
             found.negative += 1;
-            let (d, b, e) = (a[k * n + k], a[(k + 1) * n + k], a[(k + 1) * n + k + 1]);
-            // Divided by b twice: no overflow, and d e / b^2 <= alpha^2 < 1.
-            let (x, y) = (d / b, e / b);
-            let scale = (b * (x * y - one)).recip();
-            for i in k + 2..n {
-                let (u, w) = (a[i * n + k], a[i * n + k + 1]);
-                let (first, second) = ((y * u - w) * scale, (x * w - u) * scale);
-                for j in k + 2..=i {
-                    let update = first * a[j * n + k] + second * a[j * n + k + 1];
-                    a[i * n + j] -= update;
-                }
-            }
+            eliminate_two(n, a, k);
             k += 2;
         }
     }
     Ok(found)
+}
+
+/// The largest sizes on the diagonal and below it, each with its row and column, from row `k`.
+#[inline]
+fn largest_elements<S: Scalar>(n: usize, a: &[S], k: usize) -> [(S, usize, usize); 2] {
+    let mut diagonal = (<S as Real>::zero(), k, k);
+    let mut off = diagonal;
+    for i in k..n {
+        for j in k..=i {
+            let size = a[i * n + j].abs();
+            if i == j && size > diagonal.0 {
+                diagonal = (size, i, i);
+            } else if i != j && size > off.0 {
+                off = (size, i, j);
+            }
+        }
+    }
+    [diagonal, off]
+}
+
+/// Eliminates row `k` by its pivot.
+#[inline]
+fn eliminate_one<S: Scalar>(n: usize, a: &mut [S], k: usize) {
+    let pivot = a[k * n + k];
+    for i in k + 1..n {
+        let factor = a[i * n + k] / pivot;
+        for j in k + 1..=i {
+            let update = factor * a[j * n + k];
+            a[i * n + j] -= update;
+        }
+    }
+}
+
+/// Eliminates rows `k` and `k + 1` by their block.
+#[inline]
+fn eliminate_two<S: Scalar>(n: usize, a: &mut [S], k: usize) {
+    let (d, b, e) = (a[k * n + k], a[(k + 1) * n + k], a[(k + 1) * n + k + 1]);
+    // Divided by b twice: no overflow, and d e / b^2 <= alpha^2 < 1.
+    let (x, y) = (d / b, e / b);
+    let scale = (b * (x * y - <S as Real>::one())).recip();
+    for i in k + 2..n {
+        let (u, w) = (a[i * n + k], a[i * n + k + 1]);
+        let (first, second) = ((y * u - w) * scale, (x * w - u) * scale);
+        for j in k + 2..=i {
+            let update = first * a[j * n + k] + second * a[j * n + k + 1];
+            a[i * n + j] -= update;
+        }
+    }
 }
 
 /// Scales of very different size are brought together within this many rounds, which halve their exponents.

@@ -85,23 +85,7 @@ impl Description {
         self.define(&mut compiler, &mut scope)?;
         let size = (n + if timed { 1 + self.inputs.len() } else { 0 }, self.parameters.len());
         let time_like = self.time_like()?;
-        let (value, shell) = match (&self.lagrangian, &self.metric) {
-            (Some(text), None) => (self.written(text, &mut compiler, &scope)?, None),
-            (None, Some(entries)) => {
-                let metric = self.metric_entries(entries, &mut compiler, &scope)?;
-                let shell = time_like.filter(|i| self.coordinates[*i].velocity_bounds.is_none());
-                let shell = shell.map(|i| on_shell(&mut compiler, &metric, i, n));
-                (kinetic(&mut compiler, &metric, n), shell)
-            }
-            (Some(_), Some(_)) => {
-                return Err(DescriptionError::new("metric", "expected `lagrangian` or `[metric]`, found both"));
-            }
-            (None, None) => {
-                let problem =
-                    "expected `lagrangian = \"..\"`, or a table `[metric]` of its coefficients, found neither";
-                return Err(DescriptionError::new("", problem));
-            }
-        };
+        let (value, shell) = self.lagrangian_and_shell(&mut compiler, &scope, time_like)?;
         let dissipation = self.friction(&mut compiler, &scope)?;
         let forces = self.forces(&mut compiler, &scope, size)?;
         let events = self.compiled_events(&mut compiler, &scope)?.into();
@@ -118,11 +102,7 @@ impl Description {
             size: Size::Fixed(n),
             coordinates: PerSize::Given(self.coordinates.iter().map(coordinate).collect()),
             parameters: Cow::Owned(self.checked_parameters()?),
-            time_unit: match (&self.time_unit, time_like) {
-                (Some(unit), _) => Cow::Owned(unit.clone()),
-                (None, Some(_)) => Cow::Borrowed("1"),
-                (None, None) => Cow::Borrowed("s"),
-            },
+            time_unit: self.unit_of_time(time_like.is_some()),
             time_like,
             constraint: shell.map(|_| SHELL),
             training: PerSize::Given(training),
@@ -147,6 +127,41 @@ impl Description {
                 around_centre,
             })),
         })
+    }
+
+    /// The Lagrangian, and for a metric the velocity of the time-like coordinate on its mass shell.
+    fn lagrangian_and_shell(
+        &self,
+        compiler: &mut Compiler,
+        scope: &BTreeMap<String, Meaning>,
+        time_like: Option<usize>,
+    ) -> Outcome<(Value, Option<Value>)> {
+        match (&self.lagrangian, &self.metric) {
+            (Some(text), None) => Ok((self.written(text, compiler, scope)?, None)),
+            (None, Some(entries)) => {
+                let n = self.coordinates.len();
+                let metric = self.metric_entries(entries, compiler, scope)?;
+                let shell = time_like.filter(|i| self.coordinates[*i].velocity_bounds.is_none());
+                let shell = shell.map(|i| on_shell(compiler, &metric, i, n));
+                Ok((kinetic(compiler, &metric, n), shell))
+            }
+            (Some(_), Some(_)) => {
+                Err(DescriptionError::new("metric", "expected `lagrangian` or `[metric]`, found both"))
+            }
+            (None, None) => {
+                let problem =
+                    "expected `lagrangian = \"..\"`, or a table `[metric]` of its coefficients, found neither";
+                Err(DescriptionError::new("", problem))
+            }
+        }
+    }
+
+    /// The unit of the time: seconds, or none for a proper time, unless it is given.
+    fn unit_of_time(&self, is_proper: bool) -> Cow<'static, str> {
+        match &self.time_unit {
+            Some(unit) => Cow::Owned(unit.clone()),
+            None => Cow::Borrowed(if is_proper { "1" } else { "s" }),
+        }
     }
 
     /// Names and units that are shown: short, on one line.

@@ -75,71 +75,97 @@ impl<S: Scalar> Single<S> {
             functions: Vec::new(),
             outputs: program.outputs.iter().map(|&row| row as u8).collect(),
         };
-        let (mut readers, mut products, mut is_joined) = (vec![0; count], vec![None; count], vec![false; count]);
-        let rows = program.steps().filter(|step| step.kind.reads_rows()).flat_map(|step| step.operands);
-        rows.chain(&program.outputs).for_each(|&row| readers[row as usize] += 1);
+        let mut fusion = Fusion::new(program, count);
         for step in program.steps() {
             let (out, named) = (step.out as u8, step.operands[0] as usize);
-            let code = match step.kind {
-                Kind::Input => {
-                    single.inputs[named] = out;
-                    continue;
+            match step.kind {
+                Kind::Input => single.inputs[named] = out,
+                Kind::Parameter => single.parameters[named] = out,
+                Kind::Constant => single.constants.push((out, program.constants[named])),
+                kind => {
+                    let code = Code::of(kind);
+                    let mut operands = [0, 1, 2].map(|k| step.operands.get(k).map_or(0, |&row| row as u8));
+                    if matches!(code, Code::Function) {
+                        operands[2] = single.functions.len() as u8;
+                        single.functions.push(kind);
+                    }
+                    let is_uniform = step.out < program.uniform_rows;
+                    let section = if is_uniform { &mut single.uniform } else { &mut single.lanes };
+                    section.push(fusion.fused(Operation { code, out, operands }));
                 }
-                Kind::Parameter => {
-                    single.parameters[named] = out;
-                    continue;
-                }
-                Kind::Constant => {
-                    single.constants.push((out, program.constants[named]));
-                    continue;
-                }
-                Kind::Binary(Binary::Add) => Code::Add,
-                Kind::Binary(Binary::Sub) => Code::Sub,
-                Kind::Binary(Binary::Mul) => Code::Mul,
-                Kind::Binary(Binary::Div) => Code::Div,
-                Kind::Unary(Unary::Neg) => Code::Neg,
-                Kind::Unary(Unary::Powi(2)) => Code::Square,
-                Kind::SinCos => Code::SinCos,
-                Kind::Select => Code::Select,
-                Kind::Unary(_) | Kind::Binary(_) => Code::Function,
-            };
-            let mut operands = [0, 1, 2].map(|k| step.operands.get(k).map_or(0, |&row| row as u8));
-            if matches!(code, Code::Function) {
-                operands[2] = single.functions.len() as u8;
-                single.functions.push(step.kind);
             }
-            let is_uniform = |row: u8| (row as usize) < program.uniform_rows;
-            let mut operation = Operation { code, out, operands };
-            // A product that one sum or difference alone reads is computed within it.
-            let [first, second, _] = operands;
-            let product = |row: u8| products[row as usize].filter(|_| is_uniform(row) == is_uniform(out));
-            let joined = match code {
-                Code::Mul if readers[step.out] == 1 => {
-                    products[step.out] = Some([first, second]);
-                    None
-                }
-                Code::Add | Code::Sub => {
-                    let of_first = product(first).map(|factors| (first, factors, second));
-                    of_first.or_else(|| product(second).map(|factors| (second, factors, first)))
-                }
-                _ => None,
-            };
-            if let Some((row, [a, b], other)) = joined {
-                is_joined[row as usize] = true;
-                operation.operands = [a, b, other];
-                operation.code = match code {
-                    Code::Add => Code::MulAdd,
-                    _ if row == first => Code::MulSub,
-                    _ => Code::SubMul,
-                };
-            }
-            let section = if is_uniform(out) { &mut single.uniform } else { &mut single.lanes };
-            section.push(operation);
         }
         for section in [&mut single.uniform, &mut single.lanes] {
-            section.retain(|operation| !is_joined[operation.out as usize]);
+            section.retain(|operation| !fusion.is_fused[operation.out as usize]);
         }
         (single.lanes.len() <= OPERATIONS).then_some(single)
+    }
+}
+
+impl Code {
+    /// What an operation on rows does.
+    fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::Binary(Binary::Add) => Self::Add,
+            Kind::Binary(Binary::Sub) => Self::Sub,
+            Kind::Binary(Binary::Mul) => Self::Mul,
+            Kind::Binary(Binary::Div) => Self::Div,
+            Kind::Unary(Unary::Neg) => Self::Neg,
+            Kind::Unary(Unary::Powi(2)) => Self::Square,
+            Kind::SinCos => Self::SinCos,
+            Kind::Select => Self::Select,
+            _ => Self::Function,
+        }
+    }
+}
+
+/// Products that one sum or difference alone reads, which computes them.
+struct Fusion {
+    uniform_rows: usize,
+    /// How many operations and outputs read each row.
+    readers: Vec<usize>,
+    /// Factors of each row that is a product with one reader.
+    products: Vec<Option<[u8; 2]>>,
+    /// Rows whose product is computed by their reader.
+    is_fused: Vec<bool>,
+}
+
+impl Fusion {
+    fn new<S: Scalar>(program: &Program<S>, rows: usize) -> Self {
+        let mut readers = vec![0; rows];
+        let read = program.steps().filter(|step| step.kind.reads_rows()).flat_map(|step| step.operands);
+        read.chain(&program.outputs).for_each(|&row| readers[row as usize] += 1);
+        Self { uniform_rows: program.uniform_rows, readers, products: vec![None; rows], is_fused: vec![false; rows] }
+    }
+
+    /// The factors of a row that an operation of another row may compute: both are uniform, or neither.
+    fn product(&self, row: u8, out: u8) -> Option<[u8; 2]> {
+        let is_uniform = |row: u8| (row as usize) < self.uniform_rows;
+        self.products[row as usize].filter(|_| is_uniform(row) == is_uniform(out))
+    }
+
+    /// The operation, with a product that it alone reads.
+    fn fused(&mut self, operation: Operation) -> Operation {
+        let Operation { code, out, operands: [first, second, _] } = operation;
+        let (row, [a, b], other) = match code {
+            Code::Mul if self.readers[out as usize] == 1 => {
+                self.products[out as usize] = Some([first, second]);
+                return operation;
+            }
+            Code::Add | Code::Sub => match (self.product(first, out), self.product(second, out)) {
+                (Some(factors), _) => (first, factors, second),
+                (None, Some(factors)) => (second, factors, first),
+                (None, None) => return operation,
+            },
+            _ => return operation,
+        };
+        self.is_fused[row as usize] = true;
+        let code = match code {
+            Code::Add => Code::MulAdd,
+            _ if row == first => Code::MulSub,
+            _ => Code::SubMul,
+        };
+        Operation { code, out, operands: [a, b, other] }
     }
 }
 
