@@ -177,9 +177,6 @@ mod physics;
 mod properties;
 
 // Users need not know the floors.
-#[cfg(feature = "training")]
-#[doc(hidden)]
-pub use app::experiments;
 #[cfg(feature = "pipeline")]
 pub use app::pipeline;
 #[cfg(feature = "plot")]
@@ -187,9 +184,6 @@ pub use app::pipeline;
 pub use app::report;
 #[cfg(feature = "data")]
 pub use learning::recording;
-#[cfg(feature = "training")]
-#[doc(hidden)]
-pub use learning::shooting;
 #[cfg(feature = "training")]
 pub use learning::{configuration, data, optimizers, presets, training};
 #[cfg(feature = "std")]
@@ -211,6 +205,9 @@ pub use physics::geometry;
 pub use physics::{analysis, formula, identification};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
+#[cfg(feature = "training")]
+#[doc(hidden)]
+pub use {app::experiments, learning::shooting};
 
 #[cfg(all(any(doc, doctest), feature = "pipeline"))]
 pub mod docs;

@@ -12,7 +12,7 @@ use lnn::constraints::{
     examine, find_constraints,
 };
 use lnn::lagrangian::{EulerLagrange, FormulaConstraints};
-use lnn::recording::smooth::SmoothOptions;
+use lnn::recording::SmoothOptions;
 use lnn::report::found_constraint_figures;
 use lnn::scalar::Scalar;
 use serde::{Deserialize, Serialize};

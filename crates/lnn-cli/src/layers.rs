@@ -4,8 +4,7 @@
 use crate::CliError;
 use crate::config::{self, Lines, line_of};
 use crate::thresholds::MOST_MISTAKES;
-use lnn::configuration::table::{Below, find_key};
-use lnn::configuration::{ConfigError, Key, PENALTY, join};
+use lnn::configuration::{Below, ConfigError, Key, PENALTY, find_key, join};
 use lnn::names::unknown;
 use lnn::pipeline::from_table;
 use serde::Serialize;

@@ -1,8 +1,7 @@
 //! Commented configurations and the reference of all keys: what a key means, its allowed values and the value it has.
 
 use crate::thresholds::COMMENT_WIDTH;
-use lnn::configuration::table::Below;
-use lnn::configuration::{Config, Key, join};
+use lnn::configuration::{Below, Config, Key, join};
 use lnn::lagrangian::configure;
 use lnn::pipeline::FitConfig;
 use lnn::presets::Preset;
@@ -150,7 +149,7 @@ fn comment(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::parse_config;
-    use lnn::configuration::table::find_key;
+    use lnn::configuration::find_key;
     use lnn::configuration::{Known, Lbfgs, Regularizer};
     use lnn::lagrangian::systems;
     use lnn::recording::Targets;

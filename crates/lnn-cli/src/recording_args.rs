@@ -3,8 +3,7 @@
 use crate::spool::read_spooled;
 use crate::{CliError, number, output};
 use lnn::names::pluralize;
-use lnn::recording::read::{DataError, Problem, read_recording};
-use lnn::recording::{ColumnGuess, Columns, Guess, LoadedRecording, guess};
+use lnn::recording::{ColumnGuess, Columns, DataError, Guess, LoadedRecording, Problem, guess, read_recording};
 use std::path::PathBuf;
 
 /// Recorded motion.

@@ -9,7 +9,7 @@ use crate::thresholds::{FARTHEST, MOST_EDGES, NEAREST, PIXEL_BYTES, SKY_OF_EXACT
 use crate::{CliError, interrupt, system_arg};
 use lnn::lagrangian::{EulerLagrange, MechanicsError};
 use lnn::names::pluralize;
-use lnn::pipeline::memory;
+use lnn::pipeline::require_memory;
 use lnn::relativity::{
     Camera, Chart, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, picture, time_moves_alone,
     views,
@@ -215,7 +215,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::usage(format_args!("--width, --height: expected at most {most} pixels together")));
     }
     let pixels = pixels * models.len();
-    memory::require("the picture", (pixels as u64).checked_mul(PIXEL_BYTES))?;
+    require_memory("the picture", (pixels as u64).checked_mul(PIXEL_BYTES))?;
     let stop = interrupt::flag()?;
     let (progress, done) = (Progress::new(pixels as u64, "rays"), AtomicU64::new(0));
     let advance = |rays: usize| {

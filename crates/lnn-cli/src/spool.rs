@@ -2,8 +2,7 @@
 
 use crate::input;
 use crate::thresholds::SPOOL_ATTEMPTS;
-use lnn::recording::LoadedRecording;
-use lnn::recording::read::{DataError, Problem};
+use lnn::recording::{DataError, LoadedRecording, Problem};
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! States from CSV files.
 
 use lnn::names::{nearest, pluralize, unknown};
-use lnn::recording::read::{Separator, comment, line_end, names_in, split};
+use lnn::recording::{Separator, comment, line_end, names_in, split};
 use lnn::scalar::Scalar;
 use thiserror::Error;
 

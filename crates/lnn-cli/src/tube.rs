@@ -119,7 +119,7 @@ impl TubeArgs {
 fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
     let n = part.recording.n();
     let estimated = part.estimated();
-    let first = |(estimate, states): (&StateEstimate<'_>, &lnn::recording::smooth::Smoothed)| {
+    let first = |(estimate, states): (&StateEstimate<'_>, &lnn::recording::Smoothed)| {
         let samples = states.interior().start..states.times.len();
         Window::cut(*estimate, samples, n, seconds).into_iter().next()
     };

@@ -34,14 +34,16 @@ mod support;
 pub use mechanics::rollout;
 pub use mechanics::{lagrangian, network};
 pub(crate) use numerics::platform;
-#[doc(hidden)]
-pub use numerics::{forward, ops};
 pub use numerics::{linalg, random, scalar, tape};
 #[cfg(feature = "std")]
 pub use support::cancellation;
 pub use support::findings;
-#[doc(hidden)]
-pub use support::names;
+// For the packages of this repository.
 #[cfg(feature = "std")]
 #[doc(hidden)]
 pub use support::storage;
+#[doc(hidden)]
+pub use {
+    numerics::{forward, ops},
+    support::names,
+};

@@ -68,8 +68,7 @@ mod judging;
 mod learned_functions;
 mod losses;
 mod members;
-#[doc(hidden)]
-pub mod memory;
+mod memory;
 mod model;
 mod output;
 mod physics;
@@ -117,6 +116,7 @@ pub use {
     file_names::{CAPTIONS, LEARNED, MODEL, PLAY, RECORD, RUN, SUMMARY},
     fit::{fit, usual_force},
     fit_config::unit,
+    memory::require as require_memory,
     model::{CONSTRAINTS_UNSUPPORTED, all_parameters},
     prepared_fit::{PreparedFit, shorten},
     robot::is_robot,

@@ -3,8 +3,7 @@
 mod config;
 mod error;
 mod penalty;
-#[doc(hidden)]
-pub mod table;
+pub(crate) mod table;
 
 pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phase, Precision, Scaling, Shell};
 pub use error::ConfigError;
@@ -15,5 +14,5 @@ pub use penalty::{Penalty, Regularizer};
 pub use {
     config::{FRICTION_UNITS, MOST_EPOCHS, MOST_RATE, MOST_SEED, PENALTY},
     error::{Faults, place},
-    table::{Key, Ranges, join},
+    table::{Below, Key, Ranges, find_key, join},
 };

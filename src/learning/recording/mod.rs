@@ -22,11 +22,9 @@ mod heading;
 mod held;
 mod hermite;
 mod hold_out;
-#[doc(hidden)]
-pub mod read;
+pub(crate) mod read;
 mod reading;
-#[doc(hidden)]
-pub mod smooth;
+pub(crate) mod smooth;
 mod statistics;
 pub(crate) mod survey;
 mod track;
@@ -51,5 +49,6 @@ pub use units::factor;
 pub use {
     clock::Clock,
     columns::{TIME, formula_in},
+    read::{Separator, comment, line_end, names_in, split},
     survey::{FirstOrder, Survey, SurveyOptions, survey},
 };

@@ -17,18 +17,20 @@ pub(crate) mod violations;
 
 pub use checkpoint::CheckpointError;
 pub(crate) use checkpoint::Restored;
-#[doc(hidden)]
-pub use checkpoint::{
-    CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Snapshot, remove_checkpoints, saved,
-};
 pub use epoch::Epoch;
-#[doc(hidden)]
-pub use memory::training_memory;
 pub use objective::{BatchReport, Objective, ThreadsError};
 pub use phase::StopReason;
 pub use problem::TrainingProblem;
 pub use recipe::{RecipeError, TrainingResult, run};
 pub use solver::{Hooks, Progress, StepError, Watcher};
-#[doc(hidden)]
-pub use trainer::{ResumeOptions, resume};
 pub use trainer::{Trained, TrainingError, train};
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {
+    checkpoint::{
+        CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Snapshot, remove_checkpoints, saved,
+    },
+    memory::training_memory,
+    trainer::{ResumeOptions, resume},
+};

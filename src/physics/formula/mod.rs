@@ -58,11 +58,11 @@ mod written;
 pub use error::FormulaError;
 pub use families::Families;
 pub use find::FormulaOptions;
-#[doc(hidden)]
-pub use find::MOST_BOOTSTRAPS;
 pub use found::{FoundDrive, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
 pub use ladder::formula_of_motion;
-#[doc(hidden)]
-pub use regress::MODEL_STATES;
 pub use regress::formula_of_model;
 pub use written::FormulaSummary;
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use {find::MOST_BOOTSTRAPS, regress::MODEL_STATES};
