@@ -10,21 +10,12 @@ use super::determined::{Determined, quadratic};
 use super::found::Bodies;
 use super::linear::{inverse_with, times};
 use super::solve::Problem;
+use super::thresholds::{
+    BARRIER_DECREASE, BARRIER_DECREMENT, BARRIER_HALVINGS, BARRIER_RIDGE, BARRIER_STEPS, BARRIER_WEIGHTS, BODY_ERRORS,
+    LEAST_INERTIA,
+};
 use crate::lagrangian::{SystemInstance, inertia_symbols, loss_symbols};
 use crate::linalg::{Workspace, dot, eigh, inverse, is_positive_definite};
-
-/// Weights of the barrier, from first to last. The last one costs a hundredth of a squared standard error.
-const WEIGHTS: [f64; 8] = [1e5, 1e4, 1e3, 1e2, 1e1, 1.0, 0.1, 0.01];
-/// Largest number of Newton steps for each weight, of halvings of each step, and the decrement at which they end.
-const STEPS: usize = 60;
-const HALVINGS: usize = 50;
-const SETTLED: f64 = 1e-9;
-/// Smallest eigenvalue of a pseudo-inertia, in units of its diagonal, at which a body is left unchanged.
-const LEAST: f64 = 1e-6;
-/// The standard deviations, in standard errors, of the squared distance between estimates and truth within which bodies with the true sums lie.
-const WITHIN: f64 = 4.0;
-/// Share of the diagonal that is added to keep the normal equations regular.
-const RIDGE: f64 = 1e-14;
 
 /// `P` as the values of ten constants times these: row, column, factor.
 const PARTS: [&[(usize, usize, f64)]; 10] = [
@@ -70,7 +61,7 @@ impl Link {
         let scaled: Vec<f64> = matrix.iter().enumerate().map(|(at, x)| x / (root[at / 4] * root[at % 4])).collect();
         let (mut values, mut vectors) = ([0.0; 4], [0.0; 16]);
         let done = eigh(4, &scaled, &mut values, &mut vectors, &mut Workspace::new());
-        done.is_ok() && values.iter().all(|value| *value > LEAST)
+        done.is_ok() && values.iter().all(|value| *value > LEAST_INERTIA)
     }
 
     /// Places a body in `x`: with its current constants if they are physical, otherwise near its moments.
@@ -143,7 +134,7 @@ pub(super) fn physical(
     *x = found;
     search.active.sort_unstable();
     let moved = search.active.iter().map(|k| k + 1).collect();
-    let exist = square <= known + WITHIN * (2.0 * known).sqrt();
+    let exist = square <= known + BODY_ERRORS * (2.0 * known).sqrt();
     Some(Bodies { moved, largest_change: square.sqrt(), exist })
 }
 
@@ -169,10 +160,10 @@ impl Search<'_> {
         let m = y.len();
         let mut pull = self.determined.information.clone();
         self.determined.size.iter().enumerate().for_each(|(k, size)| pull[k * m + k] += (size * size).recip());
-        for weight in WEIGHTS {
-            for _ in 0..STEPS {
+        for weight in BARRIER_WEIGHTS {
+            for _ in 0..BARRIER_STEPS {
                 let decrement = self.step(&pull, weight, &mut y)?;
-                if decrement < SETTLED * weight.max(1.0) {
+                if decrement < BARRIER_DECREMENT * weight.max(1.0) {
                     break;
                 }
             }
@@ -208,13 +199,16 @@ impl Search<'_> {
             (0..m).for_each(|j| (hessian[k * m + j], hessian[j * m + k]) = (0.0, 0.0));
             (hessian[k * m + k], gradient[k]) = (1.0, 0.0);
         }
-        let change = times(m, &inverse_with(m, &hessian, RIDGE)?, &gradient);
+        let change = times(m, &inverse_with(m, &hessian, BARRIER_RIDGE)?, &gradient);
         let decrement = dot(&change, &gradient);
         let before = self.value(pull, weight, y)?;
         let mut part = 1.0;
-        for _ in 0..HALVINGS {
+        for _ in 0..BARRIER_HALVINGS {
             let tried: Vec<f64> = y.iter().zip(&change).map(|(y, change)| y - part * change).collect();
-            if self.value(pull, weight, &tried).is_some_and(|after| after <= before - 0.1 * part * decrement) {
+            if self
+                .value(pull, weight, &tried)
+                .is_some_and(|after| after <= before - BARRIER_DECREASE * part * decrement)
+            {
                 *y = tried;
                 return Some(decrement);
             }

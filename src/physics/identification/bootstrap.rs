@@ -7,21 +7,15 @@
 //! An Introduction to the Bootstrap, 1993, sections 6.5 and 10.2). The residuals of the copies show what a correct model leaves at every sample.
 
 use super::covariance::Root;
-use super::follow::{Follower, LANES};
+use super::follow::Follower;
 use super::smoothed::{Met, States};
 use super::solve::Problem;
+use super::thresholds::{COPIES, LANES, MORE_DEGREES, MOST_DRIFT};
 use crate::linalg::dot;
 use crate::random::{RandomGenerator, RngStream};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::{RecordedTrajectory, Recording, deviation, marks, rms};
 use rand_distr::{Distribution, StandardNormal};
-
-/// Simulated copies of the recording.
-pub(super) const COPIES: usize = 20;
-/// Additional degree of the polynomials of the true motion: windows for this degree are wider than those used for smoothing.
-const MORE_DEGREES: usize = 2;
-/// Largest error of integrated accelerations, as a share of the spread of a coordinate.
-const ASTRAY: f64 = 0.1;
 
 /// Results of fitting simulated copies of the recording.
 pub(super) struct Copies {
@@ -127,7 +121,7 @@ fn integrate(motion: &mut Smoothed, n: usize) {
         let times = || motion.times.iter().map(|t| t - middle);
         let slope = times().zip(&off).map(|(t, off)| t * off).sum::<f64>() / times().map(|t| t * t).sum::<f64>();
         let left = rms(times().zip(&off).map(|(t, off)| off - level - slope * t));
-        if left > ASTRAY * deviation(positions.iter()) {
+        if left > MOST_DRIFT * deviation(positions.iter()) {
             continue;
         }
         let lines: Vec<f64> = times().map(|t| level + slope * t).collect();

@@ -8,30 +8,22 @@
 //! so many.
 
 use super::IdentifyError;
-use super::bootstrap::{self, COPIES};
+use super::bootstrap;
 use super::covariance::Root;
-use super::follow::{Follower, LANES, Segment};
+use super::follow::{Follower, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
-use super::quality::{CHANCE, Evidence, FAR, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
+use super::quality::{Evidence, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
 use super::stages::Fitted;
+use super::thresholds::{
+    AVERAGED_SHARE, COPIES, DRIFT_BLOCKS, LANES, LEAST_FORCE_RESIDUAL, LEAST_FORCE_UNIT, OUTLIER, SIGNIFICANCE,
+    SLOPE_ROUNDING, WEIGHT_CHANGE, WEIGHT_UPDATES,
+};
 use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::{Smoothed, Smoothing, noise};
 use crate::recording::{RecordedTrajectory, Recording, deviation, quantile, rms};
-
-/// Largest number of updates of the coordinates' weights, and the relative change of all weights that ends the updates; failing to reach it is
-/// reported.
-const ROUNDS: usize = 20;
-const SETTLED: f64 = 0.01;
-/// Half-width of the double average of equations, as a share of a smoothing window: two thirds of a window in all. With this value, confidence
-/// intervals have their stated coverage (`lnn-studies rates --part identify`).
-const AVERAGED: usize = 6;
-/// Smallest residual that is assumed, over the spread of a force.
-const LEAST: f64 = 1e-9;
-/// Relative change of slopes that counts as rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Identifies the constants of `problem` from the known forces, beginning at their starting values.
 pub(super) fn identify(
@@ -50,7 +42,7 @@ pub(super) fn identify(
     let wider = bootstrap::wider(recording, smoothing);
     if wider.is_some() {
         let window: usize = smoothing.coordinates.iter().map(|chosen| chosen.quality.window).sum();
-        states.averaged = window / (AVERAGED * n * states.stride);
+        states.averaged = window / (AVERAGED_SHARE * n * states.stride);
     }
     let count = states.places.len();
     if count == 0 {
@@ -66,7 +58,7 @@ pub(super) fn identify(
     // A coordinate without a force gets the weight of the others.
     let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
-    let least: Vec<f64> = sigma.iter().map(|sigma| LEAST * sigma).collect();
+    let least: Vec<f64> = sigma.iter().map(|sigma| LEAST_FORCE_RESIDUAL * sigma).collect();
     if problem.course.equations.rows.is_some() {
         states.units = units(problem, &states, &x, &least);
     }
@@ -87,7 +79,7 @@ pub(super) fn identify(
     // Averages in units of their standard errors, by coordinate.
     let scaled: Vec<Vec<f64>> = (0..n).map(|i| over(&column(&averages, (n, i)), i)).collect();
     let size = |i: usize| {
-        let far = FAR * usual(std::slice::from_ref(&scaled[i]), 1, 0);
+        let far = OUTLIER * usual(std::slice::from_ref(&scaled[i]), 1, 0);
         rms(scaled[i].iter().copied().filter(|z| z.abs() <= far))
     };
     let sizes: Vec<f64> = (0..n).map(size).collect();
@@ -101,7 +93,7 @@ pub(super) fn identify(
         let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
         // Of single equations: neighbouring averages are correlated.
         let autocorrelation = correlation(&[column(&single, (n, i))]).neighbours;
-        let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= CHANCE);
+        let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= SIGNIFICANCE);
         Residual { coordinate, rms: sizes[i] * noise, noise, spread: spread[i], autocorrelation, white }
     };
     let by_coordinate: Vec<Residual> = (0..n).map(left).collect();
@@ -189,7 +181,7 @@ fn weighed(
     let counts = ((n - rows) as f64 / n as f64).sqrt();
     let weights = |states: &States, sigma: &[f64]| (0..states.q.len()).map(|at| counts / sigma[at % n]).collect();
     let mut search = Normal::default();
-    for _ in 0..ROUNDS {
+    for _ in 0..WEIGHT_UPDATES {
         states.weight = weights(states, &sigma);
         problem.cancellation.check()?;
         let fitted = states.fit(problem, x, Met::Forces);
@@ -198,11 +190,11 @@ fn weighed(
         let ForceResiduals { averages, errors, scaled, .. } = ForceResiduals::of(problem, states, x, least);
         states.share = shares(&errors, n);
         let [averages, scaled] = [[averages], [scaled]];
-        let far: Vec<f64> = (0..n).map(|i| FAR * usual(&scaled, n, i)).collect();
+        let far: Vec<f64> = (0..n).map(|i| OUTLIER * usual(&scaled, n, i)).collect();
         let stands_out = scaled[0].iter().enumerate().filter(|(at, z)| z.abs() > far[at % n]);
         stands_out.for_each(|(at, _)| states.share[at] = 0.0);
         let left: Vec<f64> = (0..n).map(|i| usual(&averages, n, i).max(least[i])).collect();
-        let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < SETTLED);
+        let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < WEIGHT_CHANGE);
         sigma = left;
         tracing::debug!(?sigma, "residuals of force");
         search.converged &= settled;
@@ -239,9 +231,6 @@ fn column(values: &[f64], (n, i): (usize, usize)) -> Vec<f64> {
     values.iter().skip(i).step_by(n).copied().collect()
 }
 
-/// Number of samples over which residuals are summed to detect slow ones.
-const BLOCKS: [usize; 3] = [4, 16, 64];
-
 /// Probability that the residuals of a correct model vary as much over many samples, judged by the residuals of the copies: sums over blocks,
 /// whose logarithms are `t`-distributed.
 fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -> f64 {
@@ -264,7 +253,7 @@ fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -
         let t = (slow(residuals, *block) - mean) / scatter.sqrt().max(f64::MIN_POSITIVE);
         if t > 0.0 { tail(t * t, 1.0, count - 1.0) / 2.0 } else { 1.0 }
     };
-    (BLOCKS.iter().map(of).fold(1.0, f64::min) * BLOCKS.len() as f64).min(1.0)
+    (DRIFT_BLOCKS.iter().map(of).fold(1.0, f64::min) * DRIFT_BLOCKS.len() as f64).min(1.0)
 }
 
 /// Weights of equations by their errors: 1 for the typical error or a smaller one.
@@ -300,16 +289,13 @@ fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> V
     all
 }
 
-/// Smallest unit of a force over the largest.
-const LEAST_UNIT: f64 = 1e-3;
-
 /// Units in which forces under constraints are compared, `(n)`: the typical errors of the equations without them.
 fn units(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
     let n = least.len();
     let errors = errors(problem, states, x, least);
     let usual: Vec<f64> = (0..n).map(|i| quantile(&mut column(&errors, (n, i)), 0.5)).collect();
     let most = usual.iter().copied().filter(|unit| unit.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
-    usual.into_iter().map(|unit| if unit.is_finite() { unit.max(LEAST_UNIT * most) } else { most }).collect()
+    usual.into_iter().map(|unit| if unit.is_finite() { unit.max(LEAST_FORCE_UNIT * most) } else { most }).collect()
 }
 
 impl Problem<'_> {
@@ -328,7 +314,7 @@ impl Problem<'_> {
         let (one, other) = (slopes(1.0), slopes(1.7));
         let rows = one.chunks_exact(2 * n + m).zip(other.chunks_exact(2 * n + m));
         rows.into_iter().all(|(one, other)| {
-            one[2 * n..].iter().zip(&other[2 * n..]).all(|(a, b)| (a - b).abs() <= ROUNDING * a.abs().max(1.0))
+            one[2 * n..].iter().zip(&other[2 * n..]).all(|(a, b)| (a - b).abs() <= SLOPE_ROUNDING * a.abs().max(1.0))
         })
     }
 }

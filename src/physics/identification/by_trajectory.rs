@@ -2,8 +2,9 @@
 //! too small, show here first.
 
 use super::found::{Constant, Identified};
-use super::quality::{CHANCE, tail};
+use super::quality::tail;
 use super::says::with_error;
+use super::thresholds::{MOST_SINGLE_TRAJECTORIES, SIGNIFICANCE};
 use super::{IdentifyError, IdentifyOptions, identify};
 use crate::cancellation::Cancelled;
 use crate::findings::Findings;
@@ -11,9 +12,6 @@ use crate::lagrangian::SystemInstance;
 use crate::names::rounded;
 use crate::recording::Recording;
 use serde::Serialize;
-
-/// Most trajectories that are identified alone.
-const MOST: usize = 64;
 
 /// What one trajectory alone says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,8 +63,8 @@ pub(super) fn by_trajectory(
     found: &Identified,
 ) -> Result<ByTrajectory, IdentifyError> {
     let count = recording.tracks.len();
-    if count > MOST {
-        let expected = format!("at most {MOST} trajectories");
+    if count > MOST_SINGLE_TRAJECTORIES {
+        let expected = format!("at most {MOST_SINGLE_TRAJECTORIES} trajectories");
         return Err(IdentifyError::Option { what: "by_trajectory", expected, found: count.to_string() });
     }
     let mut instance = instance.clone();
@@ -117,7 +115,7 @@ fn scatter(symbol: &str, trajectories: &[OfTrajectory], (constants, samples): (u
     let freedom = (known.len() - 1) as f64;
     let square = known.iter().map(|(value, error)| ((value - mean) / error).powi(2)).sum::<f64>() / freedom;
     let probability = tail(square, freedom, samples as f64);
-    let differs = probability < CHANCE / constants as f64;
+    let differs = probability < SIGNIFICANCE / constants as f64;
     Some(Scatter { symbol: symbol.to_string(), mean, count: known.len(), ratio: square.sqrt(), probability, differs })
 }
 

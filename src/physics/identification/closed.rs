@@ -6,8 +6,9 @@
 //! tangent, by the least change where a constant moves the constraints, and back onto them by projection.
 
 use super::IdentifyError;
-use super::follow::{Course, LANES, Segment};
+use super::follow::{Course, Segment};
 use super::solve::Problem;
+use super::thresholds::{FORCE_ROUNDING, LANES};
 use crate::constraints::OBEDIENCE;
 use crate::lagrangian::{
     Bordered, Manifold, ManifoldRows, RowEquations, Tangent, dot, independent_rows, project, take_out,
@@ -16,9 +17,6 @@ use crate::linalg::{self, Workspace};
 use crate::names::rounded;
 use crate::tape::Replay;
 use std::sync::Arc;
-
-/// Share of a force, in units of the forces of its state, that is rounding.
-const ROUNDING: f64 = 1e-12;
 
 /// Constraints of the states that are evaluated side by side; the buffers are reused.
 pub(super) struct Closed {
@@ -127,7 +125,7 @@ impl FreePart<'_> {
         force.iter_mut().zip(self.units).for_each(|(force, unit)| *force /= unit);
         let size = dot(force, force).sqrt();
         take_out(force, carried);
-        let rounded = |x: f64| if x.abs() <= ROUNDING * size { 0.0 } else { x };
+        let rounded = |x: f64| if x.abs() <= FORCE_ROUNDING * size { 0.0 } else { x };
         force.iter_mut().zip(self.units).for_each(|(force, unit)| *force = rounded(*force) * unit);
     }
 

@@ -4,20 +4,15 @@
 //! matrix and `B` the long-run covariance of the scores: from the mean of the outer products of their sums over all windows of one length, which is
 //! Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
-use super::determined::ROUNDING;
-use super::follow::{LANES, Segment};
+use super::follow::Segment;
 use super::linear::times;
 use super::quality::tail;
-use super::solve::{HUBER, Normal, Problem};
+use super::solve::{Normal, Problem};
 use super::stages::{Fitted, choose_steps, joined};
+use super::thresholds::{
+    ELIMINATED_ROUNDING, HUBER, LANES, LEAST_SEGMENT_EIGENVALUE, MOST_START_DECREMENT, MOST_WINDOW,
+};
 use crate::linalg::{Workspace, dot, eigh};
-
-/// Smallest eigenvalue of a segment's correlation matrix at which the segment determines constants of its own.
-const TOLD: f64 = 1e-6;
-/// Largest Newton decrement per number of the initial states at which they count as converged.
-const ARRIVED: f64 = 0.01;
-/// Largest window of correlated residuals, as a share of the samples.
-const MOST_WINDOW: f64 = 0.25;
 
 /// Effect of weighting residuals by size: all numbers are means over residuals in units of the noise.
 #[derive(Clone, Copy, Debug)]
@@ -117,7 +112,8 @@ impl Root {
         let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
         // Finite by construction.
         let _ = eigh(m, &scaled, &mut values, &mut vectors, &mut Workspace::new());
-        let told = || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > ROUNDING);
+        let told =
+            || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > ELIMINATED_ROUNDING);
         let each = |vector: &[f64], of: &dyn Fn(usize, f64) -> f64| {
             vector.iter().enumerate().map(|(k, x)| of(k, *x)).collect::<Vec<f64>>()
         };
@@ -172,7 +168,7 @@ pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighing: Wei
     let [apart, together] = [&fitted.segments, &longer].map(|segments| problem.normal_at(&fitted.x, segments));
     let freedom = together.count - apart.count;
     // Where the motion is too chaotic for the initial states to converge, the test has no power.
-    if together.failed + apart.failed > 0 || together.of_starts > ARRIVED || freedom < 1.0 {
+    if together.failed + apart.failed > 0 || together.of_starts > MOST_START_DECREMENT || freedom < 1.0 {
         return 1.0;
     }
     // The gain that remains at the best constants, to first order.
@@ -201,7 +197,9 @@ pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], 
             continue;
         }
         let right: Vec<f64> = normal.right.iter().enumerate().map(|(k, u)| u / scale(k)).collect();
-        for (value, vector) in values.iter().zip(vectors.chunks_exact(m)).filter(|(value, _)| **value > TOLD) {
+        for (value, vector) in
+            values.iter().zip(vectors.chunks_exact(m)).filter(|(value, _)| **value > LEAST_SEGMENT_EIGENVALUE)
+        {
             sum += dot(vector, &right).powi(2) / value;
             freedom += 1.0;
         }

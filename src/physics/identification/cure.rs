@@ -5,22 +5,12 @@
 //! specific only if it is the same at every point along the open directions where the search may have ended.
 
 use super::determined::{Column, echelon};
-use super::follow::{Follower, LANES, Segment};
+use super::follow::{Follower, Segment};
 use super::moves::Group;
 use super::solve::Problem;
+use super::thresholds::{LANES, LEAST_EFFECT, MOST_PROBED_STATES, RECOMMENDED_GAIN, SINGULAR_ROUNDING, STANDSTILL};
 use crate::lagrangian::system::Bounds;
 use crate::linalg::{dot, singular};
-
-/// Singular value of the effect of directions, relative to the separate effects of their unknowns, below which it is rounding.
-const ROUNDING: f64 = 1e-6;
-/// Largest number of states at which the effect of a direction is evaluated.
-const MOST_STATES: usize = 256;
-/// A motion is recommended if it is this many times as informative as the recorded one.
-const WORTH: f64 = 2.0;
-/// Smallest effect, relative to other states, that is assumed at the recorded states.
-const LEAST: f64 = 1e-6;
-/// A coordinate stands still if its spread, relative to the others, is below this.
-const STILL: f64 = 1e-9;
 
 /// Kinds of numbers that are sampled.
 pub(super) const POSITION: usize = 0;
@@ -75,7 +65,7 @@ pub(super) fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize)
 fn split(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let Some(found) = singular(columns) else { return (Vec::new(), Vec::new()) };
     let vectors = found.values.into_iter().zip(found.vectors);
-    let (seen, unseen): (Vec<_>, Vec<_>) = vectors.partition(|(value, _)| *value > ROUNDING);
+    let (seen, unseen): (Vec<_>, Vec<_>) = vectors.partition(|(value, _)| *value > SINGULAR_ROUNDING);
     [seen, unseen].map(|side| side.into_iter().map(|(_, vector)| vector).collect()).into()
 }
 
@@ -101,7 +91,7 @@ impl Examiner<'_> {
         let n = self.n();
         let mut probe = Probe { q: Vec::new(), v: Vec::new(), force: Vec::new() };
         if self.segments.len() >= LANES {
-            for segment in self.segments.iter().step_by(self.segments.len().div_ceil(MOST_STATES)) {
+            for segment in self.segments.iter().step_by(self.segments.len().div_ceil(MOST_PROBED_STATES)) {
                 probe.q.extend(&segment.start[..n]);
                 probe.v.extend(&segment.start[n..]);
             }
@@ -109,7 +99,7 @@ impl Examiner<'_> {
         }
         let lanes: Vec<&Segment> = self.segments.iter().collect();
         let all: usize = lanes.iter().map(|segment| segment.samples).sum();
-        let stride = all.div_ceil(MOST_STATES).max(1);
+        let stride = all.div_ceil(MOST_PROBED_STATES).max(1);
         Follower::new(&self.problem.course).follow(&self.problem.parameters(x), &lanes, false, |_, sample, state| {
             if sample % stride == 0 {
                 let over = |lane: usize| sample >= lanes[lane].samples;
@@ -261,10 +251,10 @@ impl Examiner<'_> {
         let tells = |probe: &Probe| {
             let columns = effects(probe);
             let values = singular(&columns).map(|found| found.values).unwrap_or_default();
-            let sum: f64 = values.iter().map(|value| value.max(LEAST).ln()).sum();
+            let sum: f64 = values.iter().map(|value| value.max(LEAST_EFFECT).ln()).sum();
             sum / columns.len() as f64
         };
-        let mut best = (WORTH.ln() + tells(recorded), None);
+        let mut best = (RECOMMENDED_GAIN.ln() + tells(recorded), None);
         let range = |[low, high]: [f64; 2]| format!("{low:.3} .. {high:.3}");
         for (i, name) in self.coordinates.iter().enumerate() {
             let mut far = recorded.clone();
@@ -302,7 +292,7 @@ impl Examiner<'_> {
         let (seen, unseen) = split(&scaled(columns, &apart));
         let basis = |rows: &[Vec<f64>]| {
             let own = if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &apart), rows) };
-            let exact = |(x, size): (f64, &f64)| if (x / size).abs() > ROUNDING { x } else { 0.0 };
+            let exact = |(x, size): (f64, &f64)| if (x / size).abs() > SINGULAR_ROUNDING { x } else { 0.0 };
             let of = |column: Column| column.change.into_iter().zip(size).map(exact).collect::<Vec<f64>>();
             echelon(own, size).into_iter().map(of).collect::<Vec<_>>()
         };
@@ -321,7 +311,7 @@ impl Examiner<'_> {
         };
         let all: Vec<f64> = (0..n).map(deviation).collect();
         let most = all.iter().copied().fold(0.0, f64::max);
-        (0..n).filter(|&i| all[i] <= STILL * most).map(|i| self.coordinates[i].clone()).collect()
+        (0..n).filter(|&i| all[i] <= STANDSTILL * most).map(|i| self.coordinates[i].clone()).collect()
     }
 }
 

@@ -12,42 +12,13 @@ use super::closed::advance;
 use super::follow::Segment;
 use super::linear::times;
 use super::solve::{Linear, Normal, Problem, Sensor, SensorKind};
+use super::thresholds::{
+    CONVERGED_DECREMENT, ELIMINATION, FILTERED_DECREMENT, FIRST_DAMPING, LEAST_DAMPING, LEAST_POSITIVE,
+    LEAST_SHARE_LEFT, LEAST_START_DECREASE, LIKE_STARTS, MOST_DAMPING, MOST_DELAY, NO_EFFECT, NO_EFFECT_IN_SEARCH,
+    RIDGE, STALLED_DECREMENT, USUAL_DELAY,
+};
 use crate::lagrangian::system::Range;
 use crate::linalg::{Workspace, dot, eigh};
-
-/// Newton decrement over the variance of the noise at which the search has converged: constants within a thousandth of their standard errors.
-const ARRIVED: f64 = 1e-6;
-/// The same up to which every constant is within a standard error of the minimum: farther away, errors and what is determined are not known.
-pub(super) const NEAR: f64 = 1.0;
-/// The same if no step, however short, gains anything: the effect of rounding and of the integrator's steps.
-const STUCK: f64 = 1e-3;
-/// The same for noisy forces: the derivatives neglect how the filter depends on the unknowns, which shifts the minimum by a tenth of a standard
-/// error.
-const STUCK_FILTERED: f64 = 1e-2;
-/// Share of the diagonal that is added to keep the normal equations regular.
-pub(super) const RIDGE: f64 = 1e-11;
-/// Rounding of an eliminated diagonal, over the diagonal before initial states were eliminated.
-const ELIMINATION: f64 = 1e-14;
-/// Squared share of the effect of an unknown that other initial states cannot reproduce; the accuracy of integrators.
-const LIKE_STARTS: f64 = 1e-8;
-/// Squared effect of an unknown on the motion, over the motion itself, that is only rounding.
-const NO_EFFECT: f64 = 1e-22;
-/// The same during the search, where a constant may be far smaller than its final value.
-pub(super) const SILENT: f64 = 1e-26;
-const FIRST_DAMPING: f64 = 1e-4;
-pub(super) const LEAST_DAMPING: f64 = 1e-10;
-/// Damping beyond which no step improves the fit.
-pub(super) const MOST_DAMPING: f64 = 1e8;
-/// Gain of initial states, over the sum of squares, that counts as zero while they converge.
-const SETTLED: f64 = 1e-4;
-/// Sum of squares per residual that is assumed for a segment that cannot be followed.
-pub(super) const FAILED: f64 = 1e8;
-/// Smallest share of a positive constant that a step leaves.
-const LEAST_PART: f64 = 0.1;
-/// Smallest value of a positive constant, over its starting value: its bound.
-const LEAST_POSITIVE: f64 = 1e-12;
-/// Largest delay of a sensor, in typical steps between samples.
-const MOST_DELAY: f64 = 20.0;
 
 /// A solution of damped normal equations.
 pub(super) struct Step {
@@ -80,7 +51,7 @@ impl Problem<'_> {
             Some(_) => x + d,
             None if self.ranges[self.chosen[k]] == Range::Positive => {
                 let unseen = normal.matrix[k * m + k] * x * x < 1.0;
-                (x + d).max(if unseen { 0.0 } else { LEAST_PART * x }).max(self.bound(k))
+                (x + d).max(if unseen { 0.0 } else { LEAST_SHARE_LEFT * x }).max(self.bound(k))
             }
             None => (x + d).max(self.bound(k)),
         };
@@ -101,7 +72,7 @@ impl Problem<'_> {
             None => x.abs(),
             Some(Sensor { kind: SensorKind::Offset, coordinate }) => self.spread[coordinate],
             Some(Sensor { kind: SensorKind::Gain, .. }) => 1.0,
-            Some(Sensor { kind: SensorKind::Delay, .. }) => 10.0 * self.course.step,
+            Some(Sensor { kind: SensorKind::Delay, .. }) => USUAL_DELAY * self.course.step,
         }
     }
 
@@ -153,11 +124,11 @@ impl Problem<'_> {
         normal.decrement = step.decrement.max(normal.of_starts) / variance;
         let filtered = !self.disturbances.force.is_empty();
         let left = if !stuck {
-            ARRIVED
+            CONVERGED_DECREMENT
         } else if filtered {
-            STUCK_FILTERED
+            FILTERED_DECREMENT
         } else {
-            STUCK
+            STALLED_DECREMENT
         };
         normal.converged = normal.failed == 0 && normal.decrement < left;
     }
@@ -167,7 +138,7 @@ impl Problem<'_> {
         self.bring(x, segments);
         let mut best = self.all(x, segments);
         let mut normal = self.normal(&best, segments);
-        let mut muted = self.muted(x, &normal, SILENT);
+        let mut muted = self.muted(x, &normal, NO_EFFECT_IN_SEARCH);
         self.judge(x, &mut normal, &muted, false);
         let mut damping = FIRST_DAMPING;
         for _ in 0..iterations {
@@ -188,7 +159,7 @@ impl Problem<'_> {
             let after = self.normal(&tried, segments);
             if after.square < normal.square {
                 (*x, best, normal) = (moved, tried, after);
-                muted = self.muted(x, &normal, SILENT);
+                muted = self.muted(x, &normal, NO_EFFECT_IN_SEARCH);
                 self.judge(x, &mut normal, &muted, false);
                 damping = f64::max(damping / 10.0, LEAST_DAMPING);
             } else {
@@ -245,7 +216,7 @@ impl Problem<'_> {
                 }
             }
             let total: f64 = best.iter().flatten().map(|linear| linear.square).sum();
-            settled = gained < SETTLED * total;
+            settled = gained < LEAST_START_DECREASE * total;
             if settled || self.cancellation.is_cancelled() {
                 break;
             }

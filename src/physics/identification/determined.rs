@@ -5,19 +5,10 @@
 //! is if the relative error along it is above 1, or if what shows of it is rounding.
 
 use super::solve::{Normal, Problem};
+use super::thresholds::{
+    EIGENVECTOR_ROUNDING, ELIMINATED_ROUNDING, EQUAL_CHANGE, NO_DEPENDENCE, OVER_ROUNDING, SIZE_FROM_ERROR,
+};
 use crate::linalg::{Workspace, components, dot, eigh};
-
-/// Share of the squared effect of an unknown that is rounding after the elimination of initial states: their ridge is 1e-11, and sums over some
-/// hundred samples lose the remaining digits.
-pub(super) const ROUNDING: f64 = 1e-8;
-/// Size of an unknown that starts at 0, in standard errors with the others held fixed.
-const ALONE: f64 = 10.0;
-/// Share of the largest effect along a direction that is rounding of the eigenvectors; unknowns are scaled to effects of at most 1e4.
-const PART: f64 = 1e-6;
-/// Relative error above which the motion does not depend on a direction: its effect is rounding.
-pub(super) const NOTHING: f64 = 1e6;
-/// Share of the largest change above which another change counts as equally large.
-const EQUAL: f64 = 0.99;
 
 /// What normal equations determine.
 pub(super) struct Determined {
@@ -48,7 +39,7 @@ pub(super) struct Column {
 
 impl Determined {
     /// From undamped normal equations at `x`, found from `start`; `variance` is that of the residuals. A direction is open if its relative error
-    /// exceeds `open`: 1, or [`NOTHING`] for equations that are linear in the unknowns, where a sum with a large error still counts as known.
+    /// exceeds `open`: 1, or [`NO_DEPENDENCE`] for equations that are linear in the unknowns, where a sum with a large error still counts as known.
     pub fn new(
         problem: &Problem<'_>,
         (x, start): (&[f64], &[f64]),
@@ -65,14 +56,14 @@ impl Determined {
         let size = |k: usize| {
             let [now, before] = [x[k], start[k]].map(|x| problem.scale(k, x));
             let least = match (before > 0.0, effect[k] > 0.0) {
-                (false, true) => ALONE / effect[k],
+                (false, true) => SIZE_FROM_ERROR / effect[k],
                 _ => 0.0,
             };
             let size = now.max(before).max(least);
             if size > 0.0 { size } else { 1.0 }
         };
         let size: Vec<f64> = (0..m).map(size).collect();
-        let rounding: Vec<f64> = normal.diagonal.iter().map(|x| ROUNDING * x.max(0.0) / variance).collect();
+        let rounding: Vec<f64> = normal.diagonal.iter().map(|x| ELIMINATED_ROUNDING * x.max(0.0) / variance).collect();
         let resolved = |k: usize| size[k] * open / (1.0 + rounding[k] * (size[k] * open).powi(2)).sqrt();
         let resolved: Vec<f64> = (0..m).map(resolved).collect();
         let (live, silent): (Vec<usize>, Vec<usize>) = (0..m).partition(|&k| effect[k] * resolved[k] >= 1.0);
@@ -110,7 +101,7 @@ impl Determined {
         for column in &mut self.open {
             let seen: Vec<f64> = column.change.iter().zip(&self.effect).map(|(x, effect)| (x * effect).abs()).collect();
             let largest = seen.iter().copied().fold(0.0, f64::max);
-            let least = f64::max(seen_from, PART * largest);
+            let least = f64::max(seen_from, EIGENVECTOR_ROUNDING * largest);
             for (k, x) in column.change.iter_mut().enumerate().filter(|(k, _)| *k != column.pivot) {
                 *x = if seen[k] >= least { *x } else { 0.0 };
             }
@@ -138,7 +129,7 @@ impl Determined {
         let rounding: f64 = change.iter().zip(&self.rounding).map(|(x, rounding)| x * x * rounding).sum();
         let size: f64 = change.iter().zip(&self.size).map(|(x, size)| (x / size).powi(2)).sum();
         let seen = quadratic(&self.information, change);
-        (seen > 10.0 * rounding && seen > size / (NOTHING * NOTHING)).then(|| (size / seen).sqrt())
+        (seen > OVER_ROUNDING * rounding && seen > size / (NO_DEPENDENCE * NO_DEPENDENCE)).then(|| (size / seen).sqrt())
     }
 
     /// Changes of all unknowns without a visible effect.
@@ -175,7 +166,7 @@ pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<Column> {
         let places: Vec<(usize, usize)> = free.flat_map(|k| (at..rows.len()).map(move |row| (row, k))).collect();
         let largest = places.iter().map(relative).fold(0.0, f64::max);
         // The first of equal ones, independent of rounding.
-        let Some(&(row, pivot)) = places.iter().find(|place| relative(place) >= EQUAL * largest) else { break };
+        let Some(&(row, pivot)) = places.iter().find(|place| relative(place) >= EQUAL_CHANGE * largest) else { break };
         rows.swap(at, row);
         let value = rows[at][pivot];
         rows[at].iter_mut().for_each(|x| *x /= value);

@@ -8,9 +8,6 @@ use crate::recording::{RecordedTrajectory, Recording};
 use crate::tape::Replay;
 use std::sync::Arc;
 
-/// Segments that are integrated side by side.
-pub(super) const LANES: usize = 64;
-
 /// Samples that are followed from one initial state.
 #[derive(Clone, Debug)]
 pub(crate) struct Segment {

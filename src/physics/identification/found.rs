@@ -1,8 +1,8 @@
 //! What was identified.
 
 use super::by_trajectory::ByTrajectory;
-use super::descent::NEAR;
 use super::follow::Segment;
+use super::thresholds::NEAR_DECREMENT;
 use super::{Between, Verdict};
 use crate::recording::{LoadedRecording, Recording};
 use serde::{Serialize, Serializer};
@@ -253,7 +253,7 @@ impl Identified {
     /// nothing of errors and of what is determined.
     pub(super) fn named(mut self, recording: &Recording, robust: bool) -> Self {
         self.robust = robust;
-        if !self.converged && (self.decrement.is_nan() || self.decrement >= NEAR) {
+        if !self.converged && (self.decrement.is_nan() || self.decrement >= NEAR_DECREMENT) {
             self.constants.iter_mut().for_each(|constant| constant.standard_error = None);
             self.sensors.iter_mut().for_each(|sensor| sensor.standard_error = None);
             self.correlations.matrix.iter_mut().flatten().for_each(|correlation| *correlation = 0.0);

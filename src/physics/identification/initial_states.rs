@@ -3,25 +3,16 @@
 //! recording that doubles as long as the model follows it; the rest is cut into segments that continue this motion.
 
 use super::cure::{POSITION, VELOCITY, spread};
-use super::follow::{LANES, Segment};
+use super::follow::Segment;
 use super::pieces::Pieces;
 use super::solve::{Normal, Problem};
-use super::stages::{Fitted, ITERATIONS, choose_steps, refit};
+use super::stages::{Fitted, choose_steps, refit};
+use super::thresholds::{
+    CONTINUED_STARTS, ENOUGH_SEGMENTS, EQUAL_STARTS, ITERATIONS, LANES, MOST_CONTINUED_SQUARE, PROMISING_STARTS,
+    SEARCH_ROUNDS, SEGMENTS_BEFORE_CONSTANTS,
+};
 use super::{IdentifyError, measured::Measured};
 use crate::lagrangian::system::Bounds;
-
-/// Rounds in which the initial states are fitted to the beginning of a trajectory, and to twice as much of it.
-const SETTLING: usize = 15;
-/// Initial states that are fitted to twice as much, and those that are followed.
-const PROMISING: usize = 16;
-const FOLLOWED: usize = 5;
-/// Relative difference of the sums of squares up to which two initial states are one.
-const SAME: f64 = 1e-4;
-/// Largest mean square at which a motion is followed farther.
-const FOLLOWS: f64 = 4.0;
-/// Segments that are followed before constants are fitted too, and those after which other initial states are not tried.
-const BEFORE: usize = 4;
-const FAR: usize = 16;
 
 /// What is said where such a search does not lead to a model that fits.
 pub(super) const SEARCHED: &str = "coordinates that no sensor reads were searched from 64 initial states within their bounds: if the form is right, \
@@ -61,7 +52,9 @@ impl Search<'_, '_> {
         self.layout.sort_by_key(|segment| (Some(segment.track) != longest, segment.track, segment.first));
         let candidates = self.candidates(given, 0);
         let (mut best, mut farthest): (Option<Fitted>, usize) = (None, 0);
-        let ways = [BEFORE, 1].into_iter().flat_map(|units| candidates.iter().map(move |start| (start, units)));
+        let ways = [SEGMENTS_BEFORE_CONSTANTS, 1]
+            .into_iter()
+            .flat_map(|units| candidates.iter().map(move |start| (start, units)));
         for (start, units) in ways {
             self.problem.cancellation.check()?;
             let Some((tried, reach)) = self.beginning(given, start.clone(), units) else { continue };
@@ -71,7 +64,7 @@ impl Search<'_, '_> {
             if best.as_ref().is_none_or(better) {
                 (best, farthest) = (Some(tried), reach);
             }
-            if farthest >= FAR.min(self.run(0)) {
+            if farthest >= ENOUGH_SEGMENTS.min(self.run(0)) {
                 break;
             }
         }
@@ -103,10 +96,10 @@ impl Search<'_, '_> {
         let readings = self.pieces.start(segment.track, segment.first);
         let starts = q.chunks_exact(n).zip(v.chunks_exact(n)).map(|(q, v)| measured.state(&readings, &[q, v].concat()));
         let mut tried: Vec<Segment> = starts.map(|start| Segment { start, ..segment.clone() }).collect();
-        for (units, most) in [(1, PROMISING), (2, FOLLOWED)] {
+        for (units, most) in [(1, PROMISING_STARTS), (2, CONTINUED_STARTS)] {
             let samples = self.samples(at, units);
             tried.iter_mut().for_each(|tried| tried.samples = samples);
-            self.problem.settle(x, &mut tried, SETTLING);
+            self.problem.settle(x, &mut tried, SEARCH_ROUNDS);
             tried = self.ranked(x, tried, most);
         }
         choose_steps(self.problem, x, &tried);
@@ -118,7 +111,7 @@ impl Search<'_, '_> {
         let squares = self.problem.all(x, &segments).into_iter().map(|linear| linear.map(|linear| linear.square));
         let mut ranked: Vec<(f64, Segment)> = squares.zip(segments).filter_map(|(a, b)| Some((a?, b))).collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ranked.dedup_by(|next, before| next.0 - before.0 <= SAME * before.0);
+        ranked.dedup_by(|next, before| next.0 - before.0 <= EQUAL_STARTS * before.0);
         ranked.into_iter().take(most).map(|(_, segment)| segment).collect()
     }
 
@@ -130,11 +123,11 @@ impl Search<'_, '_> {
         loop {
             units = units.min(self.run(0));
             segments[0].samples = self.samples(0, units);
-            self.problem.settle(&x, &mut segments, SETTLING);
+            self.problem.settle(&x, &mut segments, SEARCH_ROUNDS);
             choose_steps(self.problem, &x, &segments);
             let mut tried = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
             refit(self.problem, &mut tried, ITERATIONS);
-            let follows = tried.normal.failed == 0 && tried.mean_square() < FOLLOWS;
+            let follows = tried.normal.failed == 0 && tried.mean_square() < MOST_CONTINUED_SQUARE;
             let fails = tried.normal.failed > 0 || !tried.mean_square().is_finite();
             (x, segments) = (tried.x.clone(), tried.segments.clone());
             if follows || fitted.is_none() && !fails {
@@ -188,7 +181,7 @@ impl Search<'_, '_> {
         while units < most {
             let samples = self.samples(at, (2 * units).min(most));
             let Some(longer) = self.settled(&fitted.x, Segment { samples, ..segment.clone() }) else { break };
-            if longer.1 > FOLLOWS.max(square) {
+            if longer.1 > MOST_CONTINUED_SQUARE.max(square) {
                 break;
             }
             ((segment, square), units) = (longer, (2 * units).min(most));
@@ -199,7 +192,7 @@ impl Search<'_, '_> {
     /// A segment with its initial state fitted, and the mean square; `None` if it cannot be followed.
     fn settled(&self, x: &[f64], segment: Segment) -> Option<(Segment, f64)> {
         let mut segments = [segment];
-        self.problem.settle(x, &mut segments, SETTLING);
+        self.problem.settle(x, &mut segments, SEARCH_ROUNDS);
         let linear = self.problem.all(x, &segments).pop()??;
         let [segment] = segments;
         Some((segment, linear.square / linear.count.max(1.0)))

@@ -7,17 +7,14 @@
 //! what comes out are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 7.3).
 
 use super::covariance::Root;
-use super::follow::{LANES, Segment};
+use super::follow::Segment;
 use super::linear::{inverses, part};
 use super::solve::{Linear, Problem};
+use super::thresholds::{
+    FORCE_NOISE_FACTORS, FORCE_NOISE_GAIN, LANES, MOST_FORCE_NOISE, MOST_INNOVATION_VARIANCE, UNKNOWN_START,
+};
 use crate::linalg::dot;
 use crate::recording::smooth::noise;
-
-/// Standard deviation of an unknown initial state, in units of what a single position determines of it.
-const UNKNOWN: f64 = 100.0;
-/// Largest variance of an innovation, over that of the noise, at which it is used to estimate the noise: larger ones come from the unknown
-/// initial state.
-const MOST_VARIANCE: f64 = 100.0;
 
 /// Disturbances of the motion that the equations do not contain.
 #[derive(Clone, Debug, Default)]
@@ -51,7 +48,7 @@ impl Filter {
         let variance = 1.0 + dot(&gain, &slopes);
         let root = variance.sqrt();
         let innovation = (residual - dot(&slopes, &self.expected[0])) / root;
-        if self.unknown_start.is_some_and(|limit| innovation.abs() > limit) && variance < MOST_VARIANCE {
+        if self.unknown_start.is_some_and(|limit| innovation.abs() > limit) && variance < MOST_INNOVATION_VARIANCE {
             return f64::NAN;
         }
         self.log_variance += variance.ln();
@@ -64,7 +61,7 @@ impl Filter {
         for (line, g) in self.variance.chunks_exact_mut(size).zip(&gain) {
             line.iter_mut().zip(&gain).for_each(|(x, other)| *x -= g * other / variance);
         }
-        if self.unknown_start.is_some() && variance > MOST_VARIANCE { f64::NAN } else { innovation }
+        if self.unknown_start.is_some() && variance > MOST_INNOVATION_VARIANCE { f64::NAN } else { innovation }
     }
 
     /// Adds the effect of force errors to the initial state, each by one row of `(n, starts)`.
@@ -77,13 +74,6 @@ impl Filter {
         }
     }
 }
-
-/// Largest noise of forces that is tried, over that of neighbouring samples: the noise of the forces cannot be larger.
-const MOST_FORCE_NOISE: f64 = 1.5;
-/// Factors of that noise that are tried, `4^-k`.
-const FACTORS: i32 = 7;
-/// Decrease of minus twice the log-likelihood above which forces have noise: 1 in 1,000 by chance.
-const PLAIN: f64 = 10.0;
 
 impl Problem<'_> {
     /// Estimates the noise of the known forces by the likelihood of the innovations, up to the noise of neighbouring samples; `true` if the
@@ -125,7 +115,7 @@ impl Problem<'_> {
                 *best = (cost, factor, size);
             }
         };
-        (0..FACTORS).for_each(|k| attempt(&mut best, 0.25_f64.powi(k)));
+        (0..FORCE_NOISE_FACTORS).for_each(|k| attempt(&mut best, 0.25_f64.powi(k)));
         for step in [2.0, 2.0_f64.sqrt(), 2.0_f64.powf(0.25)] {
             let middle = best.1;
             [middle * step, middle / step]
@@ -134,7 +124,7 @@ impl Problem<'_> {
                 .for_each(|factor| attempt(&mut best, factor));
         }
         let before = std::mem::take(&mut self.disturbances.force);
-        if best.0 < exact - PLAIN {
+        if best.0 < exact - FORCE_NOISE_GAIN {
             self.disturbances.force = shown.iter().map(|s| best.1 * best.2 * s).collect();
         }
         tracing::debug!(force = ?self.disturbances.force, "noise of forces");
@@ -156,7 +146,7 @@ impl Problem<'_> {
         for k in (0..starts).filter(|_| unknown_start.is_some() && vague.is_empty()) {
             let time = if k < positions { 1.0 } else { self.course.step };
             let sigma = if closed.is_some() { most } else { self.sigma[k % n] };
-            variance[k * (starts + 1)] = (UNKNOWN * sigma / time).powi(2);
+            variance[k * (starts + 1)] = (UNKNOWN_START * sigma / time).powi(2);
         }
         let expected = vec![vec![0.0; starts]; 1 + width];
         let filter = |lane: usize| Filter {
@@ -176,7 +166,7 @@ impl Problem<'_> {
             let mut variance = vec![0.0; size * size];
             let Some(linear) = linear else { return variance };
             let own: Vec<usize> = (0..size).collect();
-            let factor = UNKNOWN * UNKNOWN * self.readings(std::slice::from_ref(*segment)) / size as f64;
+            let factor = UNKNOWN_START * UNKNOWN_START * self.readings(std::slice::from_ref(*segment)) / size as f64;
             for row in Root::of(size, &part(width, &linear.matrix, &own)).back {
                 for (line, a) in variance.chunks_exact_mut(size).zip(&row) {
                     line.iter_mut().zip(&row).for_each(|(sum, b)| *sum += factor * a * b);

@@ -5,15 +5,7 @@
 //! point: a name is a guess until a finite move has confirmed it.
 
 use super::determined::Column;
-
-/// Largest power of a constant in a product, and largest denominator of a fraction.
-const MOST_POWER: i64 = 6;
-const MOST_DENOMINATOR: i64 = 4;
-/// Distance of an exponent from a fraction that counts as rounding. Exponents along exact symmetries hold to 1e-6; the finite move refutes false
-/// ones.
-const NEAR: f64 = 0.02;
-/// Share of a factor that is rounding.
-const TINY: f64 = 1e-6;
+use super::thresholds::{FACTOR_ROUNDING, FRACTION_ROUNDING, MOST_DENOMINATOR, MOST_POWER};
 
 /// The meaning of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,14 +152,14 @@ pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invar
 /// A factor after removing rounding.
 fn near(x: f64) -> f64 {
     let whole = fraction(x).map(|(p, q)| p as f64 / q as f64);
-    whole.filter(|whole| (whole - x).abs() <= TINY * x.abs().max(1.0)).unwrap_or(x)
+    whole.filter(|whole| (whole - x).abs() <= FACTOR_ROUNDING * x.abs().max(1.0)).unwrap_or(x)
 }
 
 /// The smallest fraction near a number.
 fn fraction(x: f64) -> Option<(i64, i64)> {
     let of = |q: i64| {
         let p = (x * q as f64).round();
-        (((x * q as f64) - p).abs() < NEAR && p.abs() <= (MOST_POWER * q) as f64).then_some((p as i64, q))
+        (((x * q as f64) - p).abs() < FRACTION_ROUNDING && p.abs() <= (MOST_POWER * q) as f64).then_some((p as i64, q))
     };
     (1..=MOST_DENOMINATOR).find_map(of)
 }

@@ -1,10 +1,8 @@
 //! Small dense linear algebra of normal equations and mass matrices: symmetric matrices `(n, n)`, row-major.
 
+use super::thresholds::{PRODUCT_ROWS, RIDGE};
 use crate::linalg::{self, Workspace, dot, gemm};
 use crate::scalar::{MatMut, MatRef};
-
-/// Share of the diagonal that is added: directions that the data do not determine get the smallest solution.
-const RIDGE: f64 = 1e-11;
 
 /// Inverse of a symmetric matrix that is positive semi-definite.
 pub(crate) fn inverse(n: usize, matrix: &[f64]) -> Option<Vec<f64>> {
@@ -65,9 +63,6 @@ pub(super) struct Products {
 }
 
 impl Products {
-    /// Rows of a block.
-    const BLOCK: usize = 64;
-
     /// Of rows of `n` coordinates, `m` numbers each.
     pub fn new(n: usize, m: usize) -> Self {
         Self { m, rows: vec![Vec::new(); n], packed: Vec::new(), product: Vec::new() }
@@ -77,7 +72,7 @@ impl Products {
     pub fn add(&mut self, coordinate: usize, row: &[f64], factor: f64, sum: &mut [f64]) {
         let rows = &mut self.rows[coordinate];
         rows.extend(row.iter().map(|x| factor * x));
-        if rows.len() >= Self::BLOCK * self.m {
+        if rows.len() >= PRODUCT_ROWS * self.m {
             self.multiply(coordinate, sum);
         }
     }

@@ -5,8 +5,8 @@
 
 use super::IdentifyError;
 use super::follow::{Course, Follower, Segment, State};
-use super::pieces::LEAST_SEGMENT;
 use super::solve::Problem;
+use super::thresholds::LEAST_SEGMENT;
 use crate::lagrangian::SystemInstance;
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothed;

@@ -59,6 +59,7 @@ mod solve;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod thresholds;
 mod unknowns;
 mod verdict;
 mod ways;

@@ -5,21 +5,9 @@ use super::determined::{Column, Determined};
 use super::invariants::{Invariant, Kind, products, sums};
 use super::linear::{inverse_with, times};
 use super::solve::{Normal, Problem};
+use super::thresholds::{EQUAL_FIT_INCREASE, MOVE, MOVED_DECREMENT, MOVED_HALVINGS, MOVED_ITERATIONS, RIDGE};
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
-
-/// Factor by which a pivot is moved, up and down.
-const FACTOR: f64 = 2.0;
-/// Largest number of steps of a fit with the pivots held fixed, and of halvings of each.
-const STEPS: usize = 12;
-const HALVINGS: usize = 5;
-/// Newton decrement, in units of the noise variance, at which such a fit ends: a tenth of a standard error.
-const SETTLED: f64 = 1e-2;
-/// Largest increase of the sum of squares, in units of the noise variance, at which a moved motion counts as equally good: three standard
-/// deviations.
-const AS_GOOD: f64 = 9.0;
-/// Share of the diagonal that is added to keep the normal equations regular.
-const RIDGE: f64 = 1e-11;
 
 /// Moves away from fitted unknowns.
 pub(super) struct Moves<'a> {
@@ -79,18 +67,18 @@ impl<'a> Moves<'a> {
         let held: Vec<bool> = (0..m).map(held).collect();
         let followed = |x: &[f64]| (self.normal_at)(x).filter(|n| n.failed == 0 && n.square.is_finite());
         let mut best = followed(&x)?;
-        for _ in 0..STEPS {
+        for _ in 0..MOVED_ITERATIONS {
             if self.problem.cancellation.is_cancelled() {
                 return None;
             }
             let (mut matrix, mut right) = (best.matrix.clone(), best.right.clone());
             mute(&held, &mut matrix, &mut right);
             let mut change = times(m, &inverse_with(m, &matrix, RIDGE)?, &right);
-            if dot(&change, &right) < SETTLED * self.variance {
+            if dot(&change, &right) < MOVED_DECREMENT * self.variance {
                 break;
             }
             let mut better = None;
-            for _ in 0..HALVINGS {
+            for _ in 0..MOVED_HALVINGS {
                 let moved = self.problem.moved(&x, &change, &best);
                 better = followed(&moved).filter(|tried| tried.square < best.square).map(|tried| (moved, tried));
                 if better.is_some() {
@@ -136,7 +124,7 @@ impl<'a> Moves<'a> {
                 break;
             }
             let moved = self.refit(along(x, &moves, kind));
-            let Some((moved, _)) = moved.filter(|(_, after)| after - square < AS_GOOD) else {
+            let Some((moved, _)) = moved.filter(|(_, after)| after - square < EQUAL_FIT_INCREASE) else {
                 left.clear();
                 break;
             };
@@ -175,7 +163,7 @@ impl<'a> Moves<'a> {
     fn moves_of<'c>(&self, x: &[f64], columns: &[&'c Column]) -> Vec<Vec<(&'c Column, f64)>> {
         let factors = |column: &'c Column| {
             let far = self.determined.size[column.pivot] / x[column.pivot].abs();
-            [(column, FACTOR.max(far.min(f64::MAX))), (column, FACTOR.recip())]
+            [(column, MOVE.max(far.min(f64::MAX))), (column, MOVE.recip())]
         };
         let alone = columns.iter().copied().flat_map(|column| factors(column).map(|one| vec![one]));
         let all =
@@ -202,7 +190,7 @@ fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
                 Kind::Product if x != 0.0 => *moved *= factor.powf(change / x * pivot / own),
                 Kind::Product => {}
                 // The change is already as large as the size.
-                Kind::Sum => *moved += (factor.min(FACTOR) - 1.0) * change,
+                Kind::Sum => *moved += (factor.min(MOVE) - 1.0) * change,
             }
         }
     }

@@ -1,13 +1,11 @@
 //! Constants with a value for each trajectory.
 
+use super::thresholds::MOST_OWN_CONSTANTS;
 use super::{IdentifyError, IdentifyOptions};
 use crate::lagrangian::{PerTrajectory, SystemInstance, configure_system};
 use crate::recording::{RecordedTrajectory, Recording};
 use std::borrow::Cow;
 use std::path::Path;
-
-/// Most trajectories with constants of their own.
-const MOST: usize = 64;
 
 /// The system with a constant for each trajectory in place of every parameter that has such values, and the options that mark the trajectories;
 /// `None` for a system without such parameters.
@@ -22,8 +20,8 @@ pub(super) fn per_trajectory(
     let mut names: Vec<String> = recording.tracks.iter().map(label).collect();
     names.sort();
     names.dedup();
-    if names.len() > MOST {
-        let expected = format!("at most {MOST} trajectories with constants of their own");
+    if names.len() > MOST_OWN_CONSTANTS {
+        let expected = format!("at most {MOST_OWN_CONSTANTS} trajectories with constants of their own");
         return Err(IdentifyError::Option { what: "per", expected, found: names.len().to_string() });
     }
     let mut own = description.clone();

@@ -4,21 +4,13 @@
 
 use super::follow::Segment;
 use super::stages::thinned;
+use super::thresholds::{LEAST_SAMPLES, LEAST_SEGMENT, LEAST_SMOOTHED_SAMPLES, LEAST_TRACK, POLYNOMIAL_RIDGE};
 use super::{IdentifyError, IdentifyOptions};
 use crate::linalg::{self, Workspace};
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::survey::{Stillness, stillness};
 use crate::recording::{Clock, Filled, RecordedTrajectory, Recording};
 use std::ops::Range;
-
-/// Smallest number of samples in all trajectories together.
-const LEAST_SAMPLES: usize = 12;
-/// Smallest number of samples in a piece that is smoothed.
-const SMOOTHED: usize = 12;
-/// Smallest number of samples in a first segment.
-pub(super) const LEAST_SEGMENT: usize = 6;
-/// Smallest number of samples in a useful trajectory: its initial state uses up two.
-const LEAST_TRACK: usize = 3;
 
 /// A piece of a trajectory.
 pub(super) struct Piece {
@@ -79,7 +71,9 @@ impl<'a> Pieces<'a> {
         }
         let mut long = Recording { tracks: Vec::new(), ..recording.clone() };
         let mut origin = Vec::new();
-        for (piece, (part, states)) in all.iter_mut().zip(&parts).filter(|(_, (part, _))| part.len() >= SMOOTHED) {
+        for (piece, (part, states)) in
+            all.iter_mut().zip(&parts).filter(|(_, (part, _))| part.len() >= LEAST_SMOOTHED_SAMPLES)
+        {
             piece.long = Some(origin.len());
             long.tracks.push(part.clone());
             origin.push((piece.track, states.clone()));
@@ -257,7 +251,7 @@ fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usiz
         }
     }
     // Pieces of fewer than three times the smallest polynomial.
-    (0..3).for_each(|i| matrix[4 * i] += 1e-9);
+    (0..3).for_each(|i| matrix[4 * i] += POLYNOMIAL_RIDGE);
     let mut start = vec![0.0; 2 * n];
     for (i, right) in rights.iter().enumerate() {
         let mut solved = [0.0; 3];

@@ -1,35 +1,16 @@
 //! Tests of residuals: whether they are noise, and which samples are outliers.
 
-use super::follow::{LANES, Segment};
+use super::follow::Segment;
 use super::found::{Outlier, Residual};
 use super::innovations::Disturbances;
 use super::solve::Problem;
+use super::thresholds::{
+    COARSE_INTEGRATION, COARSE_OVER_NOISE, LANES, MOST_LISTED_OUTLIERS, MOST_NOISE_SHARE, MOST_OUTLIERS,
+    MOST_OVER_NOISE, OUTLIER, SEGMENT_SIGNIFICANCE, SIGNIFICANCE, UNCORRELATED, WHITENESS_LAGS,
+};
 use super::verdict::Verdict;
 use crate::recording::robust_deviation;
 use crate::scalar::Real;
-
-/// Largest ratio of residuals to noise at which a model fits.
-pub(super) const EXPLAINED: f64 = 1.3;
-/// Significance level of the test that residuals are independent. Together with [`DIFFERENT`] it rejects one and a half in a hundred correct
-/// models.
-pub(super) const CHANCE: f64 = 0.01;
-/// Significance level of the tests that segments have the same constants and continue each other.
-const DIFFERENT: f64 = 0.0025;
-/// Residual over the spread of the fitted quantity above which the noise dominates.
-const NOISY: f64 = 0.5;
-/// How many times the precision of the integration motion from another integrator may be off, and the largest residual over the noise that this
-/// may explain: such an error is smooth, but no smoother than noise estimated from differences of neighbouring samples.
-const COARSER: f64 = 40.0;
-const ALMOST_NOISE: f64 = 4.0;
-/// Largest share of outliers.
-const FEW: f64 = 0.01;
-/// A sample is an outlier if its residual is this many times the typical one.
-pub(super) const FAR: f64 = 5.5;
-/// Largest number of outliers that are listed.
-const MOST_LISTED: usize = 100;
-/// Lags of the test of independence. A missing term is correlated over many samples, and a sum over as many lags detects it best; more lags
-/// detect no more (`lnn-studies rates --part identify`).
-const LAGS: usize = 20;
 
 /// Probability that a variable of the F distribution with these degrees of freedom is larger: Paulson's normal approximation of its cube root
 /// (Annals of Mathematical Statistics 13 (1942) 233), and Wilson and Hilferty's of chi squared for many of the second.
@@ -70,9 +51,9 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
         if square > 0.0 && pairs > 0.0 { (sum / square / f64::sqrt(pairs), pairs) } else { (0.0, 0.0) }
     };
     let (first, pairs) = at(1);
-    let lags = LAGS.min(longest / 4).max(1);
+    let lags = WHITENESS_LAGS.min(longest / 4).max(1);
     let statistic: f64 = (1..=lags).map(|lag| at(lag).0.powi(2)).sum();
-    let length = (1..longest / 2).find(|&lag| at(lag).0 < 2.0).unwrap_or(longest / 2);
+    let length = (1..longest / 2).find(|&lag| at(lag).0 < UNCORRELATED).unwrap_or(longest / 2);
     Correlation {
         neighbours: first / f64::sqrt(pairs.max(1.0)),
         probability: tail(statistic / lags as f64, lags as f64, 1e9),
@@ -84,7 +65,7 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
 pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<Vec<f64>>> {
     let n = problem.sigma.len();
     let mut open = problem.clone();
-    open.disturbances = Disturbances { unknown_start: Some(FAR), ..problem.disturbances.clone() };
+    open.disturbances = Disturbances { unknown_start: Some(OUTLIER), ..problem.disturbances.clone() };
     let runs = || segments.iter().map(|segment| vec![f64::NAN; segment.samples]).collect::<Vec<_>>();
     let mut found: Vec<Vec<Vec<f64>>> = (0..n).map(|_| runs()).collect();
     let mut order: Vec<usize> = (0..segments.len()).collect();
@@ -117,7 +98,7 @@ pub(super) fn outliers(
         let of = |segment: &Vec<f64>| segment.iter().skip(i).step_by(n).copied().collect::<Vec<_>>();
         let usual = usual(residuals, n, i);
         for (segment, residuals) in segments.iter().zip(residuals) {
-            for (sample, r) in of(residuals).into_iter().enumerate().filter(|(_, r)| r.abs() > FAR * usual) {
+            for (sample, r) in of(residuals).into_iter().enumerate().filter(|(_, r)| r.abs() > OUTLIER * usual) {
                 found.push((segment.track, segment.first + sample, i, r / usual.max(f64::MIN_POSITIVE)));
             }
         }
@@ -125,7 +106,11 @@ pub(super) fn outliers(
     found.sort_by(|a, b| b.3.abs().total_cmp(&a.3.abs()));
     let count = found.len();
     (
-        found.into_iter().take(MOST_LISTED).map(|(track, sample, i, size)| describe(track, sample, i, size)).collect(),
+        found
+            .into_iter()
+            .take(MOST_LISTED_OUTLIERS)
+            .map(|(track, sample, i, size)| describe(track, sample, i, size))
+            .collect(),
         count,
     )
 }
@@ -163,9 +148,10 @@ impl Evidence<'_> {
     /// Accepts residuals that are as small as integration and rounding allow.
     pub fn verdict(&self) -> Verdict {
         let all = |times: f64| self.sizes.iter().zip(&self.exact).all(|(size, exact)| *size <= times * exact);
-        let near = |(size, residual): (&f64, &Residual)| *size <= ALMOST_NOISE * residual.noise;
+        let near = |(size, residual): (&f64, &Residual)| *size <= COARSE_OVER_NOISE * residual.noise;
         let refusal = self.refusal();
-        let exact = all(1.0) || refusal.is_some() && all(COARSER) && self.sizes.iter().zip(self.residuals).all(near);
+        let exact =
+            all(1.0) || refusal.is_some() && all(COARSE_INTEGRATION) && self.sizes.iter().zip(self.residuals).all(near);
         match refusal {
             Some(refusal) if !self.converged => refusal,
             _ if exact => Verdict::Exact,
@@ -187,24 +173,24 @@ impl Evidence<'_> {
         if !self.converged {
             return Some(Verdict::NotConverged);
         }
-        if let Some(i) = all().find(|&i| share(i) > NOISY && over(&i) <= EXPLAINED) {
+        if let Some(i) = all().find(|&i| share(i) > MOST_NOISE_SHARE && over(&i) <= MOST_OVER_NOISE) {
             return Some(Verdict::Uninformative { coordinate: name(i), share: share(i) });
         }
-        if over(&worst) > EXPLAINED {
+        if over(&worst) > MOST_OVER_NOISE {
             return Some(Verdict::Large { coordinate: name(worst), over_noise: over(&worst), share: share(worst) });
         }
-        if self.outliers > FEW {
+        if self.outliers > MOST_OUTLIERS {
             return Some(Verdict::Outliers { share: self.outliers });
         }
-        if self.probabilities[least] < CHANCE {
+        if self.probabilities[least] < SIGNIFICANCE {
             let probability = self.probabilities[least];
             return Some(Verdict::Correlated { coordinate: name(least), probability, share: share(least) });
         }
-        if self.agreement < DIFFERENT {
+        if self.agreement < SEGMENT_SIGNIFICANCE {
             return Some(Verdict::Disagreement { probability: self.agreement });
         }
         let (probability, seconds) = self.continuation;
-        if probability < DIFFERENT {
+        if probability < SEGMENT_SIGNIFICANCE {
             return Some(Verdict::Discontinuous { probability, seconds });
         }
         None
@@ -241,11 +227,11 @@ mod tests {
             };
             correlation(&[(0..600).map(|_| next()).collect::<Vec<f64>>(), (0..400).map(|_| next()).collect()])
         };
-        let refused = (0..200).filter(|_| series(0.0).probability < CHANCE).count();
+        let refused = (0..200).filter(|_| series(0.0).probability < SIGNIFICANCE).count();
         assert!(refused <= 8, "{refused}");
         let coloured = series(0.9);
         assert!(coloured.probability < 1e-30 && (coloured.neighbours - 0.9).abs() < 0.05, "{coloured:?}");
         assert!((10..80).contains(&coloured.length), "{coloured:?}");
-        assert!(series(0.15).probability < CHANCE);
+        assert!(series(0.15).probability < SIGNIFICANCE);
     }
 }

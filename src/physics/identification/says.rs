@@ -1,13 +1,9 @@
 //! Report of identified constants.
 
 use super::found::{Bodies, Combination, Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
+use super::thresholds::{MOST_REPORTED, REPORTED_CORRELATION};
 use crate::findings::Findings;
 use crate::names::{number, pluralize, rounded};
-
-/// Largest number of outliers and correlations that are listed.
-const SHOWN: usize = 10;
-/// Smallest correlation of errors that is listed.
-const CORRELATED: f64 = 0.9;
 
 impl Identified {
     /// The constants, the undetermined combinations, the residuals and the verdict, as tables and sentences.
@@ -61,12 +57,13 @@ impl Identified {
         let (names, matrix) = (&self.correlations.names, &self.correlations.matrix);
         let below = (0..names.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
         let mut pairs: Vec<(usize, usize, f64)> =
-            below.map(|(i, j)| (i, j, matrix[i][j])).filter(|(_, _, c)| c.abs() > CORRELATED).collect();
+            below.map(|(i, j)| (i, j, matrix[i][j])).filter(|(_, _, c)| c.abs() > REPORTED_CORRELATION).collect();
         pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
         if !pairs.is_empty() {
-            let listed = pairs.iter().take(SHOWN).map(|(i, j, c)| format!("{} and {} {c:.3}", names[*j], names[*i]));
+            let listed =
+                pairs.iter().take(MOST_REPORTED).map(|(i, j, c)| format!("{} and {} {c:.3}", names[*j], names[*i]));
             let listed = listed.collect::<Vec<_>>().join(", ");
-            findings.gap().line(format!("correlations of errors beyond {CORRELATED}: {listed}"));
+            findings.gap().line(format!("correlations of errors beyond {REPORTED_CORRELATION}: {listed}"));
         }
     }
 
@@ -95,7 +92,7 @@ impl Identified {
         let advice = if self.robust || self.segments == 0 { "" } else { "; --robust limits their influence" };
         let samples = pluralize(self.outlier_count, "sample", "samples");
         let headers = ["trajectory", "row", "t", "coordinate", "residual / typical"];
-        let rows = self.outliers.iter().take(SHOWN).map(Outlier::line);
+        let rows = self.outliers.iter().take(MOST_REPORTED).map(Outlier::line);
         findings.gap().line(format!("{samples} far from the fitted motion{advice}")).table(&headers, rows);
     }
 }

@@ -2,20 +2,16 @@
 
 use super::averages::Averages;
 use super::closed::FreePart;
-use super::descent::{LEAST_DAMPING, MOST_DAMPING, SILENT};
-use super::follow::{Follower, LANES, forces};
+use super::follow::{Follower, forces};
 use super::linear::Products;
 use super::solve::{Normal, Problem};
+use super::thresholds::{
+    DOUBLED_PHASE_VALUES, FAILED_EQUATION, HUBER, LANES, LEAST_COSINE, LEAST_DAMPING, LEAST_PHASE_DECREASE,
+    MATRIX_KEPT, MOST_DAMPING, MOST_PHASE_VALUES, MOST_SMOOTHED_STATES, MOST_WEIGHT, NO_EFFECT_IN_SEARCH,
+    PHASE_HALVINGS, PHASE_RANGE, SHORTEST_BEGINNING, SMOOTHED_ITERATIONS,
+};
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
-
-/// Largest number of states.
-const MOST_STATES: usize = 12_000;
-/// Errors beyond so many standard deviations count linearly.
-const HUBER: f64 = 3.0;
-const ITERATIONS: usize = 60;
-/// Share of the decrement that a step leaves at most if the next goes on with its matrix.
-const KEEPS: f64 = 0.01;
 
 /// States with their accelerations, `(states, n)`, and the expected errors of these.
 #[derive(Default)]
@@ -53,7 +49,7 @@ impl States {
         let (mut states, mut force) = (Self::default(), vec![0.0; n]);
         let full = |s: &Smoothed| s.interior().filter(|&at| s.is_full(at)).collect::<Vec<_>>();
         let all: usize = smoothed.iter().flatten().map(|s| full(s).len()).sum();
-        let stride = all.div_ceil(MOST_STATES).max(1);
+        let stride = all.div_ceil(MOST_SMOOTHED_STATES).max(1);
         states.stride = stride;
         for (at, (track, smoothed)) in problem.course.recording.tracks.iter().zip(smoothed).enumerate() {
             let Some(smoothed) = smoothed else { continue };
@@ -76,7 +72,7 @@ impl States {
         // A single sample that happens to look exact must not outweigh all others.
         let mut sorted = states.weight.clone();
         sorted.sort_by(f64::total_cmp);
-        let most = 5.0 * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+        let most = MOST_WEIGHT * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
         states.weight.iter_mut().for_each(|w| *w = w.min(most));
         states
     }
@@ -183,7 +179,7 @@ impl States {
                 let (weight, row) = (self.weight[first + k], &slopes[k * m..(k + 1) * m]);
                 let residual = residual * weight;
                 if !(residual.is_finite() && row.iter().all(|x| x.is_finite())) {
-                    normal.square += 1e6;
+                    normal.square += FAILED_EQUATION;
                     continue;
                 }
                 normal.count += 1.0;
@@ -222,10 +218,10 @@ impl States {
         let mut linear = met == Met::Forces;
         let mut damping = if linear { 1e-9 } else { 1e-3 };
         let (mut kept, mut before) = (false, f64::INFINITY);
-        for _ in 0..ITERATIONS {
-            let muted = problem.too_weak(x, &best, SILENT * size);
+        for _ in 0..SMOOTHED_ITERATIONS {
+            let muted = problem.too_weak(x, &best, NO_EFFECT_IN_SEARCH * size);
             problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
-            if kept && !best.converged && best.decrement > KEEPS * before {
+            if kept && !best.converged && best.decrement > MATRIX_KEPT * before {
                 best = self.normal(problem, x, met)?;
                 (linear, kept) = (false, false);
                 continue;
@@ -257,25 +253,10 @@ impl States {
     }
 }
 
-/// Part of the given value of a constant of a phase on either side of it that is searched, and most values that are tried on either side.
-const SEARCHED: f64 = 0.5;
-const TRIED: usize = 40;
-/// Smallest cosine of the angle between the derivatives by a constant before and after a small change: a phase has turned by 0.6 to 1.1 rad at
-/// the end of the recording (`lnn-studies rates --part machines`).
-const ALIKE: f64 = 0.7;
-/// Most halvings of a change until it is small.
-const HALVINGS: i32 = 20;
-/// Smallest relative decrease of the sum of squares that makes a fit farther from the given constants the better one. Fits within it are the
-/// same law written in two ways, such as a drive of the other sign half a turn away, and differ by how far they have converged.
-const BETTER: f64 = 1e-3;
-/// Shortest part of a recording that is searched first, and values that are tried on either side after it doubled.
-const SHORTEST: f64 = 1.0 / 16.0;
-const DOUBLED: usize = 3;
-
 impl Normal {
     /// `true` if the sum of squares is smaller than that of a fit nearer to the given constants by more than two ways to write a law differ.
     fn is_better(&self, nearer: &Self) -> bool {
-        self.square < (1.0 - BETTER) * nearer.square
+        self.square < (1.0 - LEAST_PHASE_DECREASE) * nearer.square
     }
 }
 
@@ -290,14 +271,14 @@ impl States {
         let mut cut = Vec::new();
         for k in 0..problem.chosen.len() {
             let Some(whole) = self.phase_step(problem, (&given, k)) else { continue };
-            let reach = if given[k] == 0.0 { TRIED as f64 * whole } else { SEARCHED * given[k].abs() };
+            let reach = if given[k] == 0.0 { MOST_PHASE_VALUES as f64 * whole } else { PHASE_RANGE * given[k].abs() };
             let mut share = 1.0;
             let mut step = whole;
-            while TRIED as f64 * step < reach && share > SHORTEST {
+            while MOST_PHASE_VALUES as f64 * step < reach && share > SHORTEST_BEGINNING {
                 share /= 2.0;
                 step = self.beginning(problem, share).phase_step(problem, (&given, k)).unwrap_or(reach);
             }
-            let mut count = ((reach / step).ceil() as usize).min(TRIED);
+            let mut count = ((reach / step).ceil() as usize).min(MOST_PHASE_VALUES);
             if count as f64 * step < reach {
                 let widest = count as f64 * step;
                 cut.push((k, [given[k] - widest, given[k] + widest]));
@@ -313,7 +294,7 @@ impl States {
                     }
                     break;
                 }
-                (from, share, count) = (tried, (2.0 * share).min(1.0), DOUBLED);
+                (from, share, count) = (tried, (2.0 * share).min(1.0), DOUBLED_PHASE_VALUES);
                 step = (step / 2.0).max(whole);
             }
         }
@@ -388,10 +369,10 @@ impl States {
             let there = derivatives(*change);
             let pairs = here.iter().zip(&there).filter(|(a, b)| a.is_finite() && b.is_finite());
             let [ab, aa, bb] = pairs.fold([0.0; 3], |[ab, aa, bb], (a, b)| [ab + a * b, aa + a * a, bb + b * b]);
-            ab >= ALIKE * (aa * bb).sqrt()
+            ab >= LEAST_COSINE * (aa * bb).sqrt()
         };
-        let range = if x[k] == 0.0 { 1.0 } else { SEARCHED * x[k].abs() };
-        let step = (0..HALVINGS).map(|halvings| range * 0.5f64.powi(halvings)).find(alike)?;
+        let range = if x[k] == 0.0 { 1.0 } else { PHASE_RANGE * x[k].abs() };
+        let step = (0..PHASE_HALVINGS).map(|halvings| range * 0.5f64.powi(halvings)).find(alike)?;
         (step < range).then_some(step)
     }
 }

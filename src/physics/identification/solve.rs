@@ -2,23 +2,16 @@
 //!
 //! Every segment has an initial state of its own, which is eliminated from the normal equations.
 
-use super::descent::{FAILED, RIDGE, Spectrum};
-use super::follow::{Course, Follower, LANES, Segment, State};
+use super::descent::Spectrum;
+use super::follow::{Course, Follower, Segment, State};
 use super::innovations::Disturbances;
 use super::linear::{inverse_with, times};
 use super::measured::{Measured, ReadingSlopes};
+use super::thresholds::{FAILED_SQUARE, GIVEN_WEIGHT, HUBER, LANES, RIDGE, START_ROUNDS};
 use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 use std::f64::consts::TAU;
-
-/// Residuals beyond so many standard deviations count linearly if the user chose so.
-pub(super) const HUBER: f64 = 3.0;
-/// Number of rounds in which initial states are adapted to other unknowns.
-const SETTLING: usize = 6;
-
-/// Share of the normal equations of a constant that counts as given.
-const GIVEN: f64 = 1e100;
 
 /// A constant of a sensor: measured positions are `gain q(t - delay) + offset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,7 +119,7 @@ impl Normal {
         self.spectrum = None;
         for k in (0..m).filter(|&k| self.held[k]) {
             (0..m).for_each(|l| (self.matrix[k * m + l], self.matrix[l * m + k]) = (0.0, 0.0));
-            (self.matrix[k * m + k], self.diagonal[k], self.right[k]) = (GIVEN, GIVEN, 0.0);
+            (self.matrix[k * m + k], self.diagonal[k], self.right[k]) = (GIVEN_WEIGHT, GIVEN_WEIGHT, 0.0);
         }
         self
     }
@@ -379,7 +372,7 @@ impl Problem<'_> {
         for (linear, segment) in found.iter().zip(segments) {
             let Some(linear) = linear else {
                 normal.failed += 1;
-                normal.square += FAILED * (segment.samples * self.width()) as f64;
+                normal.square += FAILED_SQUARE * (segment.samples * self.width()) as f64;
                 normal.count += (segment.samples * self.width()) as f64;
                 continue;
             };
@@ -426,7 +419,7 @@ impl Problem<'_> {
     /// Undamped normal equations at other unknowns, with the initial states of the segments fitted to them.
     pub fn normal_at(&self, x: &[f64], segments: &[Segment]) -> Normal {
         let mut segments = segments.to_vec();
-        self.settle(x, &mut segments, SETTLING);
+        self.settle(x, &mut segments, START_ROUNDS);
         self.normal(&self.all(x, &segments), &segments)
     }
 }

@@ -3,7 +3,6 @@
 use super::by_trajectory::by_trajectory;
 use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
 use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
-use super::descent::NEAR;
 use super::first_fit::first_fit;
 use super::follow::{Course, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
@@ -11,12 +10,17 @@ use super::initial_states::SEARCHED;
 use super::innovations::Disturbances;
 use super::measured::{Measured, check_columns};
 use super::per_trajectory::per_trajectory;
-use super::pieces::{LEAST_SEGMENT, Pieces};
-use super::quality::{
-    CHANCE, Correlation, EXPLAINED, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual,
-};
+use super::pieces::Pieces;
+use super::quality::{Correlation, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual};
 use super::smoothed::{Met, States};
 use super::solve::{Normal, Problem};
+use super::thresholds::{
+    EQUAL_SQUARES, EXACT_RESIDUAL, FEW_START_ROUNDS, FIRST_SEGMENT, INTEGRATION_ERROR, ITERATIONS, LAST_ITERATIONS,
+    LEAST_ERROR_DECREASE, LEAST_FREEDOM, LEAST_NOISE, LEAST_NOISE_LEFT, LEAST_OWN_NOISE_SAMPLES,
+    LEAST_SCATTERED_SEGMENTS, LEAST_SEGMENT, MOST_FIRST_SAMPLES, MOST_INCREASE, MOST_OVER_NOISE, MOST_SAMPLES,
+    MOST_SUBSTEPS, NEAR_DECREMENT, OWN_NOISE_ERRORS, OWN_NOISE_RATIO, SCATTER_ERRORS, SEGMENTS_OF_RUN, SHORT_OF_CHOSEN,
+    SIGNIFICANCE, START_ROUNDS, STEP_PROBES, USUAL_FIRST_SAMPLES,
+};
 use super::unknowns::unknowns;
 use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
@@ -25,35 +29,6 @@ use crate::lagrangian::{Equations, SystemInstance};
 use crate::names::rounded;
 use crate::recording::{Filled, Recording, deviation, filled, rms};
 use std::f64::consts::TAU;
-
-/// Smallest share of degrees of freedom that initial states and constants leave.
-const LEAST_LEFT: f64 = 0.25;
-/// Length of a first segment, in time scales of the motion.
-const PACES: f64 = 2.5;
-/// Largest number of samples that are followed.
-const MOST_SAMPLES: usize = 60_000;
-/// Relative change of the sum of squares up to which a full turn of a constant changes nothing.
-const SAME: f64 = 1e-6;
-/// Smallest noise that is assumed, over the spread of a coordinate: the accuracy of the integration.
-const LEAST_NOISE: f64 = 1e-9;
-/// Error of the integrator over the noise.
-const INTEGRATOR: f64 = 0.05;
-const MOST_SUBSTEPS: usize = 64;
-/// Largest factor by which longer segments may increase the mean square.
-const WORSE: f64 = 1.5;
-/// Smallest decrease of the mean log standard error that longer segments must bring.
-const GAIN: f64 = 0.01;
-/// Smallest number of segments whose scatter is used to widen errors.
-const MANY: usize = 8;
-/// Residual over the spread of a coordinate up to which it is due to the integration, a few times [`LEAST_NOISE`].
-const EXACT: f64 = 5.0 * LEAST_NOISE;
-pub(super) const ITERATIONS: usize = 40;
-/// Smallest number of samples from which the noise of a single trajectory is estimated.
-const MANY_SAMPLES: usize = 40;
-/// Log ratio of the noise of a trajectory to that of all above which it has a noise of its own.
-const UNLIKE: f64 = 0.25;
-/// Largest number of steps of the last fit, which gives the result: if it takes more, it has not converged.
-const LAST_ITERATIONS: usize = 200;
 
 /// Constants, sensors and initial states with the normal equations there.
 #[derive(Clone)]
@@ -73,7 +48,7 @@ impl Fitted {
     /// `true` for a fit that reached the noise with every constant inside its range: no better fit is to be expected.
     fn is_plain(&self) -> bool {
         let inside = !self.normal.held.contains(&true);
-        self.normal.converged && inside && self.mean_square() < EXPLAINED * EXPLAINED
+        self.normal.converged && inside && self.mean_square() < MOST_OVER_NOISE * MOST_OVER_NOISE
     }
 
     /// Variance of the unknowns over that of independent noise of the given size: the mean square of the residuals, or the scatter of the
@@ -81,7 +56,7 @@ impl Fitted {
     pub fn inflation(&self) -> (f64, f64) {
         let square = self.mean_square();
         let (m, count) = (self.x.len(), self.normal.parts.len());
-        if count < MANY {
+        if count < LEAST_SCATTERED_SEGMENTS {
             return (square, 1.0);
         }
         let ratio = |k: usize| {
@@ -92,7 +67,7 @@ impl Fitted {
         ratios.sort_by(f64::total_cmp);
         let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(square) / square;
         // Scatter of noise itself is not exactly one.
-        let plain = scatter <= 1.0 + 2.0 * (2.0 / count as f64).sqrt();
+        let plain = scatter <= 1.0 + SCATTER_ERRORS * (2.0 / count as f64).sqrt();
         if plain { (square, 1.0) } else { (square * scatter, scatter) }
     }
 
@@ -115,7 +90,7 @@ impl Fitted {
     /// `true` if it determines the unknowns better than another fit: those with a visible effect in either; errors of the others are rounding.
     fn tells_more_than(&self, other: &Self) -> bool {
         let either: Vec<bool> = self.seen().into_iter().zip(other.seen()).map(|(a, b)| a || b).collect();
-        self.spread(&either) < other.spread(&either) - GAIN
+        self.spread(&either) < other.spread(&either) - LEAST_ERROR_DECREASE
     }
 }
 
@@ -246,7 +221,7 @@ fn together(
     if forced {
         // Force errors accumulate: longer segments show them best.
         let mut longer = joined(&fitted.segments);
-        problem.settle(&fitted.x, &mut longer, 6);
+        problem.settle(&fitted.x, &mut longer, START_ROUNDS);
         problem.estimate_force_noise(&fitted.x, &longer);
     }
     if !known {
@@ -318,8 +293,8 @@ pub(super) fn first_samples(
     let size = |values: &[f64], i: usize| deviation(values.iter().skip(i).step_by(n));
     let paces = (0..n).map(|i| size(v, i) / size(a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
     let pace = paces.fold(f64::INFINITY, f64::min);
-    let samples = if pace.is_finite() { PACES * pace / step } else { 20.0 };
-    let samples = samples.clamp(LEAST_SEGMENT as f64, 400.0) as usize;
+    let samples = if pace.is_finite() { FIRST_SEGMENT * pace / step } else { USUAL_FIRST_SAMPLES };
+    let samples = samples.clamp(LEAST_SEGMENT as f64, MOST_FIRST_SAMPLES) as usize;
     let Some(seconds) = wanted else { return Ok(samples) };
     let wanted = (seconds / step).round() as usize;
     if wanted < LEAST_SEGMENT {
@@ -331,14 +306,13 @@ pub(super) fn first_samples(
 
 /// Segments up to the number of samples that can be followed: runs of consecutive segments, so that they can be joined later.
 pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
-    const RUN: usize = 16;
     let all: usize = segments.iter().map(|segment| segment.samples).sum();
     if all <= MOST_SAMPLES {
         return segments;
     }
-    let runs = segments.len().div_ceil(RUN);
+    let runs = segments.len().div_ceil(SEGMENTS_OF_RUN);
     let kept = (runs * MOST_SAMPLES / all).max(1);
-    let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
+    let keep = |at: usize| (at / SEGMENTS_OF_RUN + 1) * kept / runs > at / SEGMENTS_OF_RUN * kept / runs;
     segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }
 
@@ -378,7 +352,7 @@ fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>
     if segments.is_empty() {
         return None;
     }
-    problem.settle(&x, &mut segments, 6);
+    problem.settle(&x, &mut segments, START_ROUNDS);
     let mut fitted = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
     refit(problem, &mut fitted, ITERATIONS);
     if choose_steps(problem, &fitted.x, &fitted.segments) {
@@ -409,7 +383,7 @@ fn unturned(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted 
         tried[k] -= turns * TAU;
         if turns != 0.0 && turns.is_finite() {
             let square = problem.normal_at(&tried, &fitted.segments).square;
-            if (square - fitted.normal.square).abs() <= SAME * fitted.normal.square {
+            if (square - fitted.normal.square).abs() <= EQUAL_SQUARES * fitted.normal.square {
                 tracing::debug!(parameter, turns, "full turns");
                 fitted.x = tried;
             }
@@ -450,7 +424,7 @@ fn log(fitted: &Fitted, what: &str) {
 /// Chooses as many integration steps between samples as keep the integrator's error below a share of the noise; `true` if their number changes.
 pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
     let before = problem.course.substeps;
-    let stride = segments.len().div_ceil(32).max(1);
+    let stride = segments.len().div_ceil(STEP_PROBES).max(1);
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.width();
@@ -464,7 +438,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
         });
         let mut errors: Vec<f64> = errors.collect();
         errors.sort_by(f64::total_cmp);
-        if errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATOR) {
+        if errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATION_ERROR) {
             break;
         }
         (problem.course.substeps, coarse) = (finer.course.substeps, fine);
@@ -487,18 +461,19 @@ fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
     let mut of = vec![vec![0.0; n]; tracks];
     let mut unlike = false;
     for i in 0..n {
-        let least = (LEAST_NOISE * problem.spread[i]).max(1e-3 * problem.sigma[i]);
+        let least = (LEAST_NOISE * problem.spread[i]).max(LEAST_NOISE_LEFT * problem.sigma[i]);
         let size = |values: Vec<f64>| (deviation_of(values, problem.robust) / taken.sqrt()).max(least);
         let whole = size(own.iter().skip(i).step_by(n).flatten().copied().collect());
         // Integration errors of exact motion are not noise.
-        let noisy = whole > EXACT * problem.spread[i];
+        let noisy = whole > EXACT_RESIDUAL * problem.spread[i];
         problem.sigma[i] = whole;
         for (track, of) in of.iter_mut().enumerate() {
             let values = &own[track * n + i];
             let count = independent(values);
-            of[i] = if values.len() < MANY_SAMPLES { whole } else { size(values.clone()) };
+            of[i] = if values.len() < LEAST_OWN_NOISE_SAMPLES { whole } else { size(values.clone()) };
             // The log of a standard deviation has a standard error of one over the root of twice the count.
-            unlike |= noisy && (of[i] / whole).ln().abs() > UNLIKE.max(5.0 / (2.0 * count).sqrt());
+            unlike |=
+                noisy && (of[i] / whole).ln().abs() > OWN_NOISE_RATIO.max(OWN_NOISE_ERRORS / (2.0 * count).sqrt());
         }
     }
     problem.sigma_of = if unlike { of } else { Vec::new() };
@@ -563,13 +538,13 @@ fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
 /// For a model that does not fit, shortens segments while that reduces the standard errors: the effect of a missing term accumulates along a
 /// segment.
 fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
-    while fitted.mean_square() > EXPLAINED * EXPLAINED && !problem.cancellation.is_cancelled() {
+    while fitted.mean_square() > MOST_OVER_NOISE * MOST_OVER_NOISE && !problem.cancellation.is_cancelled() {
         let segments = halved(problem, &fitted);
         if segments.len() == fitted.segments.len() {
             break;
         }
         let mut shorter = Fitted { segments, ..fitted.clone() };
-        problem.settle(&shorter.x, &mut shorter.segments, 3);
+        problem.settle(&shorter.x, &mut shorter.segments, FEW_START_ROUNDS);
         refit(problem, &mut shorter, ITERATIONS);
         log(&shorter, "shorter");
         if shorter.normal.failed > 0 || !shorter.tells_more_than(&fitted) {
@@ -583,7 +558,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
 /// Joins segments while that reduces the standard errors.
 fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
     let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
-    let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * 1.5 < wanted);
+    let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * SHORT_OF_CHOSEN < wanted);
     while wanted_more != Some(false) && !problem.cancellation.is_cancelled() {
         let segments = joined(&fitted.segments);
         if segments.len() == fitted.segments.len() {
@@ -596,19 +571,20 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
             problem.course.substeps = fitted.substeps;
             break;
         }
-        problem.settle(&longer.x, &mut longer.segments, 6);
+        problem.settle(&longer.x, &mut longer.segments, START_ROUNDS);
         refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");
         // Along chaotic motion the search gets stuck on the roughness of the sum of squares.
-        let is_followed = longer.normal.decrement < NEAR || !fitted.normal.converged;
-        let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square() && is_followed;
+        let is_followed = longer.normal.decrement < NEAR_DECREMENT || !fitted.normal.converged;
+        let met =
+            longer.normal.failed == 0 && longer.mean_square() < MOST_INCREASE * fitted.mean_square() && is_followed;
         if wanted.is_none() && !(met && longer.tells_more_than(&fitted)) {
             problem.course.substeps = fitted.substeps;
             break;
         }
         fitted = longer;
         let seconds = usual_samples(&fitted.segments) as f64 * problem.course.step;
-        wanted_more = wanted.map(|wanted| seconds * 1.5 < wanted);
+        wanted_more = wanted.map(|wanted| seconds * SHORT_OF_CHOSEN < wanted);
     }
     fitted
 }
@@ -636,7 +612,7 @@ fn result(
     let weighing = Weighing::of(&residuals, problem.robust, taken);
     let follow: Vec<Correlation> =
         innovations(problem, &fitted.x, &fitted.segments).iter().map(|runs| correlation(runs)).collect();
-    let is_white = |of: &Correlation| of.probability * n as f64 >= CHANCE;
+    let is_white = |of: &Correlation| of.probability * n as f64 >= SIGNIFICANCE;
     // Outliers do not excuse the other samples.
     let size = |i: usize| usual(&residuals, n, i) * problem.sigma[i] / taken.sqrt();
     let of = |i: usize| {
@@ -668,7 +644,7 @@ fn result(
     let verdict = Evidence {
         converged: fitted.normal.converged,
         sizes: (0..n).map(size).collect(),
-        exact: (0..n).map(|i| EXACT * problem.spread[i]).collect(),
+        exact: (0..n).map(|i| EXACT_RESIDUAL * problem.spread[i]).collect(),
         residuals: &by_coordinate,
         probabilities: follow.iter().map(|of| (of.probability * n as f64).min(1.0)).collect(),
         outliers: outlier_count as f64 / numbers,
@@ -744,7 +720,7 @@ fn informed(
     // than independent ones.
     let numbers = problem.readings(&fitted.segments);
     let taken = (numbers - fitted.normal.count + m as f64) / numbers;
-    let hidden = (1.0 - taken) / (1.0 - taken * inflation).max(LEAST_LEFT);
+    let hidden = (1.0 - taken) / (1.0 - taken * inflation).max(LEAST_FREEDOM);
     seen.iter_mut().for_each(|x| *x *= hidden);
     (root.informed(&fitted.normal, &seen, least), inflation * hidden)
 }

@@ -2,18 +2,16 @@
 
 use super::bodies;
 use super::cure::{ByForces, Examiner};
-use super::determined::{Determined, NOTHING, echelon};
+use super::determined::{Determined, echelon};
 use super::found::{Combination, Constant, Correlations, Identified, SensorConstant, Undetermined};
 use super::invariants::{Invariant, Kind, unit_of, written};
 use super::moves::{Group, Moves, nearest};
 use super::smoothed::Met;
 use super::solve::{Normal, Problem, Sensor, SensorKind};
 use super::stages::Fitted;
+use super::thresholds::{NO_DEPENDENCE, SUM_ROUNDING};
 use crate::lagrangian::SystemInstance;
 use crate::names::rounded;
-
-/// Factor in a sum, relative to the effect of the first constant, below which a constant does not take part in it: rounding.
-const PIVOT: f64 = 1e-5;
 
 /// Names and units of the unknowns.
 struct Names<'a> {
@@ -38,7 +36,7 @@ pub(super) fn unknowns(
     let before: Vec<f64> = start.iter().copied().chain(problem.sensors.iter().map(|sensor| sensor.perfect())).collect();
     // The determined sums show what is not determined.
     let is_linear = met == Met::Forces && problem.is_linear(&fitted.segments);
-    let from = if is_linear { NOTHING } else { 1.0 };
+    let from = if is_linear { NO_DEPENDENCE } else { 1.0 };
     let determined = Determined::new(problem, (&fitted.x, &before), &fitted.normal, (variance, from));
     let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
     let sensor_name = |sensor: &Sensor| {
@@ -246,7 +244,7 @@ fn base_parameters(determined: &Determined, names: &Names<'_>, x: &[f64]) -> Vec
         let most = (0..open.len()).max_by(|&a, &b| size(&open[a], k).total_cmp(&size(&open[b], k)));
         let Some(at) = most else { break };
         let largest = (0..m).map(|j| size(&open[at], j)).fold(0.0, f64::max);
-        if size(&open[at], k) < PIVOT * largest {
+        if size(&open[at], k) < SUM_ROUNDING * largest {
             continue;
         }
         let mut row = open.swap_remove(at);
@@ -262,7 +260,7 @@ fn base_parameters(determined: &Determined, names: &Names<'_>, x: &[f64]) -> Vec
     let sum = |k: usize| {
         let mut factors = vec![0.0; m];
         factors[k] = 1.0;
-        for (gone, row) in done.iter().filter(|(gone, row)| size(row, k) > PIVOT * size(row, *gone)) {
+        for (gone, row) in done.iter().filter(|(gone, row)| size(row, k) > SUM_ROUNDING * size(row, *gone)) {
             factors[*gone] = -row[k];
         }
         let mut found = names.combination(determined, &Invariant { kind: Kind::Sum, factors }, x);

@@ -3,11 +3,9 @@
 
 use super::found::Identified;
 use super::solve::Problem;
-use super::stages::{Fitted, ITERATIONS, refit};
+use super::stages::{Fitted, refit};
+use super::thresholds::{FEW_START_ROUNDS, ITERATIONS, RIVAL_DIFFERENCE, RIVAL_INCREASE};
 use super::{Between, IdentifyOptions};
-
-/// Increase of the sum of squares, in units of the variance, up to which an interpolation is not excluded: three standard deviations.
-const RIVAL: f64 = 9.0;
 
 /// Interpolations that the motion does not exclude, the best first, and the largest difference of the unknowns for one of the others.
 #[derive(Default)]
@@ -35,7 +33,7 @@ pub(super) fn best_between(problem: &mut Problem<'_>, fitted: Fitted, rivals: &R
     for between in rivals.ways.iter().copied().filter(|way| *way != first) {
         problem.course.between = between;
         let mut own = tried[best].1.clone();
-        problem.settle(&own.x, &mut own.segments, 3);
+        problem.settle(&own.x, &mut own.segments, FEW_START_ROUNDS);
         refit(problem, &mut own, ITERATIONS);
         tracing::debug!(?between, square = own.normal.square, "forces");
         if own.normal.square < tried[best].1.normal.square {
@@ -45,7 +43,7 @@ pub(super) fn best_between(problem: &mut Problem<'_>, fitted: Fitted, rivals: &R
     }
     let (between, fitted) = tried.swap_remove(best);
     problem.course.between = between;
-    let limit = fitted.normal.square + RIVAL * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
+    let limit = fitted.normal.square + RIVAL_INCREASE * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
     let mut rivals = Rivals { ways: vec![between], farthest: vec![0.0; fitted.x.len()] };
     for (between, own) in tried.iter().filter(|(_, own)| own.normal.failed == 0 && own.normal.square < limit) {
         rivals.ways.push(*between);
@@ -66,7 +64,7 @@ impl Rivals {
         let mut doubled = Vec::new();
         for ((error, off), name) in errors.zip(&self.farthest).zip(names) {
             if let Some(error) = error {
-                if *off > 1.7 * *error {
+                if *off > RIVAL_DIFFERENCE * *error {
                     doubled.push(name);
                 }
                 *error = error.hypot(*off);
