@@ -78,8 +78,7 @@ pub fn textbook(arms: usize, given: &[(&str, f64)]) -> Outcome<SystemInstance<f6
 
 /// The constants of the textbook's arms, and the offsets of the encoders.
 pub fn identified(recording: &Recording) -> Outcome<Identified> {
-    let offsets = recording.coordinates.clone();
-    let options = IdentifyOptions { offsets, segment: Some(SEGMENT), threads: 2, ..IdentifyOptions::default() };
+    let options = IdentifyOptions::new().offsets(&recording.coordinates).segment(SEGMENT).threads(2);
     Ok(identify(&textbook(recording.n(), &[])?, recording, &options)?)
 }
 

@@ -167,7 +167,7 @@ fn as_csv(tracks: &[RecordedTrajectory]) -> String {
 fn found(tracks: Vec<RecordedTrajectory>) -> Outcome<Identified> {
     let coordinates = ["x", "y", "z"].map(String::from).to_vec();
     let recording = Recording { coordinates, periodic: vec![false; 3], tracks };
-    Ok(identify(&earth(&[])?, &recording, &IdentifyOptions { threads: 2, ..IdentifyOptions::default() })?)
+    Ok(identify(&earth(&[])?, &recording, &IdentifyOptions::new().threads(2))?)
 }
 
 fn show(found: &Identified) {

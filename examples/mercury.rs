@@ -137,13 +137,8 @@ fn as_csv(track: &RecordedTrajectory) -> String {
 fn found(track: &RecordedTrajectory, constants: &[&str], given: &[(&str, f64)]) -> Outcome<Identified> {
     let coordinates = ["x", "y", "z"].map(String::from).to_vec();
     let recording = Recording { coordinates, periodic: vec![false; 3], tracks: vec![track.clone()] };
-    let options = IdentifyOptions {
-        constants: constants.iter().map(|name| name.to_string()).collect(),
-        between: Some(Between::Cubic),
-        segment: Some(SEGMENT),
-        threads: 2,
-        ..IdentifyOptions::default()
-    };
+    let options =
+        IdentifyOptions::new().constants(constants.iter().copied()).between(Between::Cubic).segment(SEGMENT).threads(2);
     Ok(identify(&sun(given)?, &recording, &options)?)
 }
 

@@ -27,7 +27,7 @@ fn system(file: &str, given: &[(&str, f64)]) -> Outcome<SystemInstance<f64>> {
 }
 
 fn options(constants: &[&str]) -> IdentifyOptions {
-    IdentifyOptions { constants: constants.iter().map(|c| c.to_string()).collect(), threads: 2, ..Default::default() }
+    IdentifyOptions::new().constants(constants.iter().copied()).threads(2)
 }
 
 fn normal(rng: &mut impl rand::Rng) -> f64 {
@@ -112,7 +112,7 @@ fn duffing(samples: usize) -> Outcome<()> {
     for between in [None, Some(Between::Held), Some(Between::Linear), Some(Between::Cubic), Some(Between::BandLimited)]
     {
         let started = Instant::now();
-        let found = identify(&system("duffing.toml", &[])?, &part, &IdentifyOptions { between, ..options(&[]) })?;
+        let found = identify(&system("duffing.toml", &[])?, &part, &options(&[]).between(between))?;
         let seconds = started.elapsed().as_secs_f64();
         let values: Vec<(&str, f64)> = found.constants.iter().map(|c| (c.symbol.as_str(), c.value)).collect();
         let model = system("duffing.toml", &values)?.build()?;

@@ -105,23 +105,22 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
     system_arg::note_impacts(&instance);
     let reading = read(args, &instance)?;
-    let options = IdentifyOptions {
-        constants: args.constants.clone(),
-        offsets: args.offset.clone(),
-        gains: args.gain.clone(),
-        delays: args.delay.clone(),
-        noise: args.noise.clone(),
-        errors: reading.errors.clone(),
-        inputs: reading.inputs.clone(),
-        missing: reading.missing.clone(),
-        targets: args.targets,
-        between: args.between,
-        segment: args.segment,
-        robust: args.robust,
-        by_trajectory: args.by_trajectory,
-        threads: threads(args.threads),
-        cancellation: search()?,
-    };
+    let options = IdentifyOptions::new()
+        .constants(&args.constants)
+        .offsets(&args.offset)
+        .gains(&args.gain)
+        .delays(&args.delay)
+        .noise(args.noise.clone())
+        .errors(reading.errors.clone())
+        .inputs(reading.inputs.clone())
+        .missing(reading.missing.clone())
+        .targets(args.targets)
+        .between(args.between)
+        .segment(args.segment)
+        .robust(args.robust)
+        .by_trajectory(args.by_trajectory)
+        .threads(threads(args.threads))
+        .cancellation(search()?);
     let found = identify(&instance, &reading.recording, &options).map_err(refused)?;
     drop(options);
     if let Some(out) = &out {

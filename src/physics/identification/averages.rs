@@ -1,9 +1,9 @@
-//! Means of force equations over neighbouring states, taken as the states come, so that only a window of them is held.
+//! Means of force equations over neighbouring states. States are processed in order, so that only a window of them is stored.
 
 use super::smoothed::States;
 use std::collections::VecDeque;
 
-/// Moving sums over `half` rows on either side.
+/// Moving sums over a row and `half` rows on either side.
 struct Sums {
     half: usize,
     /// The rows of the window, and their sum.
@@ -17,8 +17,8 @@ impl Sums {
         Self { half, rows: VecDeque::new(), sum: vec![0.0; size], steps: 0 }
     }
 
-    /// Adds a row, or none behind the last one, and hands on the sum about the row `half` before it.
-    fn step(&mut self, row: Option<&[f64]>, mut then: impl FnMut(&[f64])) {
+    /// Adds a row, or none after the last one, and passes on the sum around the row `half` rows earlier.
+    fn step(&mut self, row: Option<&[f64]>, mut emit: impl FnMut(&[f64])) {
         let mut place = Vec::new();
         if let Some(row) = row {
             self.sum.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
@@ -33,56 +33,57 @@ impl Sums {
             self.rows.push_back(place);
         }
         if self.steps >= self.half {
-            then(&self.sum);
+            emit(&self.sum);
         }
         self.steps += 1;
     }
 
-    /// Hands on the sums about the last rows, and begins anew.
-    fn finish(&mut self, mut then: impl FnMut(&[f64])) {
-        (0..self.half).for_each(|_| self.step(None, &mut then));
+    /// Passes on the sums around the last rows, and starts over.
+    fn finish(&mut self, mut emit: impl FnMut(&[f64])) {
+        (0..self.half).for_each(|_| self.step(None, &mut emit));
         self.rows.clear();
         self.sum.fill(0.0);
         self.steps = 0;
     }
 }
 
-/// Weighted means over neighbouring states of every trajectory, of equations of some numbers each.
+/// Weighted means of equations over neighbouring states of every trajectory.
 ///
-/// Averages of equations, forces included, hold as well as the equations themselves: the noise of accelerations is averaged out of the regressors
-/// before these are squared, so that least squares are hardly biased by it, and the polynomials may have a degree that misses nothing. Robots are
-/// identified this way ("parallel filtering", Gautier, IEEE ICRA 1997). Sums are taken twice: the weights form a triangle.
+/// The true constants satisfy averages of equations, forces included, as they satisfy each equation. Averaging removes the noise of the accelerations
+/// from the regressors before these are squared, so that it hardly biases least squares, and the smoothing polynomials can have a higher degree.
+/// Robots are identified this way ("parallel filtering", Gautier, IEEE ICRA 1997). Sums are taken twice, so that the weights form a triangle.
 pub(super) struct Averages<'a> {
     states: &'a States,
-    /// Equations of a state.
+    /// Number of equations of a state.
     n: usize,
     sums: [Sums; 2],
     /// The numbers of a state, then the weights of its equations.
     row: Vec<f64>,
     mean: Vec<f64>,
-    /// Equations of states that came and are not finite, from the state on that is handed on next.
+    /// Marks the equations that are not finite, from the next state that is passed on.
     failed: VecDeque<bool>,
-    come: usize,
+    /// Number of states that were processed.
+    received: usize,
 }
 
 impl<'a> Averages<'a> {
-    /// Of states with `n` equations of `width` numbers.
+    /// For states with `n` equations of `width` numbers each.
     pub fn new(states: &'a States, (n, width): (usize, usize)) -> Self {
         let size = n * (width + 1);
         let sums = [(); 2].map(|()| Sums::new(states.averaged, size));
-        Self { states, n, sums, row: vec![0.0; size], mean: vec![0.0; n * width], failed: VecDeque::new(), come: 0 }
+        Self { states, n, sums, row: vec![0.0; size], mean: vec![0.0; n * width], failed: VecDeque::new(), received: 0 }
     }
 
-    /// Takes the numbers of the next state, `(n, width)`, and hands on the means of those whose windows are complete, in order.
-    pub fn take(&mut self, values: &[f64], mut then: impl FnMut(&[f64])) {
+    /// Adds the numbers of the next state, `(n, width)`, and passes on the means of states whose windows are complete, in order.
+    pub fn take(&mut self, values: &[f64], mut emit: impl FnMut(&[f64])) {
         if self.states.averaged == 0 {
-            return then(values);
+            return emit(values);
         }
         let (n, width, states) = (self.n, values.len() / self.n, self.states);
         let (numbers, weights) = self.row.split_at_mut(values.len());
         for (i, (own, given)) in numbers.chunks_exact_mut(width).zip(values.chunks_exact(width)).enumerate() {
             let finite = given.iter().all(|x| x.is_finite());
-            weights[i] = if finite { states.share.get(self.come * n + i).copied().unwrap_or(1.0) } else { 0.0 };
+            weights[i] = if finite { states.share.get(self.received * n + i).copied().unwrap_or(1.0) } else { 0.0 };
             own.iter_mut().zip(given).for_each(|(own, x)| *own = if finite { x * weights[i] } else { 0.0 });
             self.failed.push_back(!finite);
         }
@@ -99,15 +100,15 @@ impl<'a> Averages<'a> {
                     _ => own.fill(0.0),
                 }
             }
-            then(mean);
+            emit(mean);
         };
         first.step(Some(&self.row), |sum| second.step(Some(sum), &mut divide));
-        let (here, next) = (states.places[self.come], states.places.get(self.come + 1));
-        if next.is_none_or(|next| next.0 != here.0 || next.1 > here.1 + states.stride) {
+        let (current, next) = (states.places[self.received], states.places.get(self.received + 1));
+        if next.is_none_or(|next| next.0 != current.0 || next.1 > current.1 + states.stride) {
             first.finish(|sum| second.step(Some(sum), &mut divide));
             second.finish(&mut divide);
         }
-        self.come += 1;
+        self.received += 1;
     }
 }
 
@@ -117,7 +118,7 @@ mod tests {
 
     #[test]
     fn equations_are_averaged_along_their_trajectory_by_their_weights() {
-        // Two trajectories, the second with a sample missing between its parts; one equation takes no part, one has failed.
+        // Two trajectories, the second with a sample missing between its parts; one equation has a weight of 0, one is not finite.
         let places: Vec<(usize, usize)> =
             (0..9).map(|k| (0, k)).chain((0..4).map(|k| (1, k))).chain((5..9).map(|k| (1, k))).collect();
         let mut states = States { places, stride: 1, averaged: 1, share: vec![1.0; 17], ..States::default() };

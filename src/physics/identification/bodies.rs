@@ -1,10 +1,10 @@
-//! Physical inertias for a chain of links. Often only sums of the constants of links are determined; of all constants with these sums, this
-//! module chooses ones that rigid bodies can have.
+//! Physical inertias for a chain of links. Often only sums of the constants of links are determined. Among all constants with these sums, this module
+//! chooses ones that rigid bodies can have.
 //!
 //! A rigid body of mass `m`, first moments `h` and inertia `I` about the origin has a positive definite pseudo-inertia
 //! `P = [[tr(I)/2 E - I, h], [h', m]]` (Wensing, Kim and Slotine, 2018), and a chain of bodies a positive definite mass matrix at every pose.
-//! With the normal matrix `S` and the size `D` of each constant, `(y - x)' (S + D^-2) (y - x)/2 - w sum ln det P(y)` is convex: what is known
-//! is held by `S`, what is open stays near `x`.
+//! With the normal matrix `S` and the size `D` of each constant, `(y - x)' (S + D^-2) (y - x)/2 - w sum ln det P(y)` is convex: `S` keeps the
+//! determined sums, and `D` keeps the other constants close to `x`.
 
 use super::determined::{Determined, quadratic};
 use super::found::Bodies;
@@ -17,8 +17,8 @@ use super::thresholds::{
 use crate::lagrangian::{SystemInstance, inertia_symbols, loss_symbols};
 use crate::linalg::{Workspace, dot, eigh, inverse, is_positive_definite};
 
-/// `P` as the values of ten constants times these: row, column, factor.
-const PARTS: [&[(usize, usize, f64)]; 10] = [
+/// `P` is linear in the ten constants of a link: row, column and factor for each constant.
+const ENTRIES: [&[(usize, usize, f64)]; 10] = [
     &[(3, 3, 1.0)],
     &[(0, 3, 1.0), (3, 0, 1.0)],
     &[(1, 3, 1.0), (3, 1, 1.0)],
@@ -31,13 +31,14 @@ const PARTS: [&[(usize, usize, f64)]; 10] = [
     &[(0, 0, 0.5), (1, 1, 0.5), (2, 2, -0.5)],
 ];
 
-/// A link: the value of each of its ten constants, and its place among the unknowns.
+/// A link: the value of each of its ten constants, and its index among the unknowns.
 struct Link {
     given: [f64; 10],
     unknown: [Option<usize>; 10],
 }
 
 impl Link {
+    /// The ten constants with unknowns `x`.
     fn constants(&self, x: &[f64]) -> [f64; 10] {
         std::array::from_fn(|j| self.unknown[j].map_or(self.given[j], |k| x[k]))
     }
@@ -45,13 +46,13 @@ impl Link {
     /// The pseudo-inertia.
     fn matrix(&self, x: &[f64]) -> [f64; 16] {
         let mut matrix = [0.0; 16];
-        for (parts, value) in PARTS.iter().zip(self.constants(x)) {
+        for (parts, value) in ENTRIES.iter().zip(self.constants(x)) {
             parts.iter().for_each(|&(i, j, factor)| matrix[4 * i + j] += factor * value);
         }
         matrix
     }
 
-    /// `true` if bodies have these constants, with a margin.
+    /// `true` if a rigid body can have these constants, with a margin.
     fn is_body(&self, x: &[f64]) -> bool {
         let matrix = self.matrix(x);
         let root: [f64; 4] = std::array::from_fn(|i| matrix[5 * i].sqrt());
@@ -64,7 +65,8 @@ impl Link {
         done.is_ok() && values.iter().all(|value| *value > LEAST_INERTIA)
     }
 
-    /// Places a body in `x`: with its current constants if they are physical, otherwise near its moments.
+    /// Writes a rigid body to `x`: its current constants if they are physical, otherwise ones close to its moments. `false` if given constants prevent
+    /// this.
     fn place_body(&self, x: &mut [f64]) -> bool {
         if !self.is_body(x) {
             let [mass, hx, hy, hz, ..] = self.constants(x);
@@ -79,7 +81,7 @@ impl Link {
     }
 }
 
-/// Links of a chain among whose constants there are unknown ones.
+/// The links of a chain.
 fn links(instance: &SystemInstance<f64>, problem: &Problem<'_>, x: &[f64]) -> Vec<Link> {
     let values = problem.parameters(x);
     let place = |symbol: &String| instance.system.parameters.iter().position(|known| known.symbol == *symbol);
@@ -91,7 +93,7 @@ fn links(instance: &SystemInstance<f64>, problem: &Problem<'_>, x: &[f64]) -> Ve
     (1..=instance.system.links()).map(of).collect()
 }
 
-/// Moves the constants of a chain to physical ones, as near as the determined sums allow; `None` for a system that is not a chain.
+/// Moves the constants of a chain to the closest physical ones that keep the determined sums; `None` for a system that is not a chain.
 pub(super) fn physical(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
@@ -110,7 +112,7 @@ pub(super) fn physical(
         .collect();
     let mut search = Search { determined, centre: x.clone(), links: &links, active: Vec::new(), held: Vec::new() };
     let mut found = x.clone();
-    // Every round adds a link or a loss at least.
+    // Every round adds at least one link or loss.
     loop {
         let bad = |k: &usize| !search.active.contains(k) && !links[*k].is_body(&found) && links[*k].has_unknown();
         let bad: Vec<usize> = (0..links.len()).filter(bad).collect();
@@ -127,10 +129,10 @@ pub(super) fn physical(
         found = next;
     }
     let change: Vec<f64> = found.iter().zip(x.iter()).map(|(after, before)| after - before).collect();
-    // The squared distance in standard errors has a chi-squared distribution at the truth, so that no determined sum changes by more standard
-    // errors than its root.
+    // At the truth, the squared distance in standard errors has a chi-squared distribution. No determined sum changes by more standard errors than
+    // its root.
     let square = quadratic(&determined.information, &change).max(0.0);
-    let known = (change.len() - determined.silent.len() - determined.open.len()) as f64;
+    let known = (change.len() - determined.without_effect.len() - determined.open.len()) as f64;
     *x = found;
     search.active.sort_unstable();
     let moved = search.active.iter().map(|k| k + 1).collect();
@@ -138,19 +140,19 @@ pub(super) fn physical(
     Some(Bodies { moved, largest_change: square.sqrt(), exist })
 }
 
-/// The convex search.
+/// The convex optimization.
 struct Search<'a> {
     determined: &'a Determined,
     centre: Vec<f64>,
     links: &'a [Link],
     /// Links that must be physical; the others keep their constants.
     active: Vec<usize>,
-    /// Losses that are held at 0.
+    /// Losses that are fixed at 0.
     held: Vec<usize>,
 }
 
 impl Search<'_> {
-    /// The nearest constants; `None` if given constants belong to no body.
+    /// The closest physical constants; `None` if no rigid body has the given constants.
     fn solve(&self) -> Option<Vec<f64>> {
         let mut y = self.centre.clone();
         self.held.iter().for_each(|&k| y[k] = 0.0);
@@ -214,12 +216,13 @@ impl Search<'_> {
             }
             part /= 2.0;
         }
-        // Nothing but rounding is gained.
+        // Any further decrease is rounding.
         Some(0.0)
     }
 }
 
 impl Link {
+    /// `true` if a constant of the link is unknown.
     fn has_unknown(&self) -> bool {
         self.unknown.iter().any(Option::is_some)
     }
@@ -230,7 +233,7 @@ impl Link {
         let mut inverted = [0.0; 16];
         inverse(4, &self.matrix(y), &mut inverted, &mut Workspace::new()).ok()?;
         // P^-1 P_j.
-        let products: Vec<[f64; 16]> = PARTS
+        let products: Vec<[f64; 16]> = ENTRIES
             .iter()
             .map(|parts| {
                 let mut product = [0.0; 16];

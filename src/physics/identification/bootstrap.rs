@@ -1,14 +1,14 @@
-//! Errors of constants that are fitted to forces, by a parametric bootstrap.
+//! Standard errors of constants that are fitted to forces, by a parametric bootstrap.
 //!
-//! Neighbouring smoothed accelerations have correlated errors and are regressors themselves, so that the standard errors of least squares are
-//! too small by factors and some bias remains. The recording is therefore simulated: the true motion is given by polynomials of a higher degree,
-//! the true forces are those that the fitted constants need along it; noise of encoders and forces is drawn again, and everything is smoothed and
-//! fitted again. The mean change of the constants is their bias, which is subtracted; the scatter is their standard error (Efron and Tibshirani,
-//! An Introduction to the Bootstrap, 1993, sections 6.5 and 10.2). The residuals of the copies show what a correct model leaves at every sample.
+//! Neighbouring smoothed accelerations have correlated errors and are regressors themselves, so that the standard errors of least squares are several
+//! times too small, and some bias remains. The recording is therefore simulated. Polynomials of a higher degree give the true motion, and the fitted
+//! constants the true forces along it. New noise of encoders and forces is drawn, and every copy is smoothed and fitted again. The mean change of the
+//! constants is their bias, which is subtracted; their scatter is the standard error (Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
+//! sections 6.5 and 10.2). The residuals of the copies show how large the residuals of a right model are at every sample.
 
 use super::covariance::Root;
 use super::follow::Follower;
-use super::smoothed::{Met, States};
+use super::smoothed::{Quantity, States};
 use super::solve::Problem;
 use super::thresholds::{COPIES, LANES, MORE_DEGREES, MOST_DRIFT};
 use crate::linalg::dot;
@@ -21,31 +21,31 @@ use rand_distr::{Distribution, StandardNormal};
 pub(super) struct Copies {
     /// Constants fitted to each copy.
     constants: Vec<Vec<f64>>,
-    /// Force residuals of each copy at each sample: `(samples, n)` per trajectory, `NaN` where there are none.
+    /// Force residuals of each copy at each sample, `(samples, n)` per trajectory; `NaN` at samples that are not fitted.
     residuals: Vec<Vec<Vec<f64>>>,
 }
 
 /// The smoothing that gives the motion of the copies; `None` if the recording cannot be smoothed by polynomials of a higher degree.
-pub(super) fn wider(recording: &Recording, smoothing: &Smoothing) -> Option<Smoothing> {
+pub(super) fn wider_smoothing(recording: &Recording, smoothing: &Smoothing) -> Option<Smoothing> {
     let given = smoothing.coordinates.iter().map(|chosen| chosen.noise.sigma).collect();
     let options =
         SmoothOptions { degree: smoothing.degree + MORE_DEGREES, noise: Some(given), ..SmoothOptions::default() };
     Smoothing::choose(recording, &options).ok()
 }
 
-/// Fits copies of the recording; `None` if one of them fails.
+/// Simulates and fits copies of the recording; `None` if one of them fails.
 ///
-/// `usual` gives the sizes of the residuals, which bound the noise of the forces. `share` gives the weights of equations in averages.
+/// `sizes` are the sizes of the residuals, which bound the noise of the forces. `share` gives the weights of equations in averages.
 pub(super) fn copies(
     problem: &Problem<'_>,
     [smoothing, wider]: [&Smoothing; 2],
-    (states, x, usual): (&States, &[f64], &[f64]),
+    (states, x, sizes): (&States, &[f64], &[f64]),
     share: &(impl Fn(&States) -> Vec<f64> + Sync),
 ) -> Option<Copies> {
     let recording = problem.course.recording;
     let n = recording.n();
     let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
-    let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma.min(usual[i])).collect();
+    let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma.min(sizes[i])).collect();
     let truth: Vec<Option<(Smoothed, Vec<f64>)>> = recording
         .tracks
         .iter()
@@ -53,7 +53,7 @@ pub(super) fn copies(
         .map(|(at, track)| {
             let mut motion = wider.apply(track).ok()?;
             integrate(&mut motion, n);
-            let force = asked(problem, (states, x), (at, &motion));
+            let force = required_forces(problem, (states, x), (at, &motion));
             Some((motion, force))
         })
         .collect();
@@ -61,7 +61,7 @@ pub(super) fn copies(
     let one = |copy: usize| {
         let mut rng = RngStream::Copies.generator(copy as u64);
         let again = |(track, truth): (&RecordedTrajectory, &Option<(Smoothed, Vec<f64>)>)| match truth {
-            Some((motion, force)) => drawn(track, motion, force, (smoothing, &of_force, &marks), &mut rng),
+            Some((motion, force)) => with_new_noise(track, motion, force, (smoothing, &of_force, &marks), &mut rng),
             None => track.clone(),
         };
         let tracks = recording.tracks.iter().zip(&truth).map(again).collect();
@@ -79,7 +79,7 @@ pub(super) fn copies(
         let weights = states.weight.iter().take(n).copied().collect::<Vec<_>>();
         own.weight = (0..own.places.len() * n).map(|at| weights[at % n]).collect();
         let mut constants = x.to_vec();
-        own.fit(&problem, &mut constants, Met::Forces);
+        own.fit(&problem, &mut constants, Quantity::Forces);
         let mut residuals: Vec<Vec<f64>> = recording.tracks.iter().map(|t| vec![f64::NAN; t.len() * n]).collect();
         let [_, found] = own.force_residuals(&problem, &constants);
         for ((track, sample), row) in own.places.iter().zip(found.chunks_exact(n)) {
@@ -101,8 +101,8 @@ pub(super) fn copies(
     (constants.len() == COPIES).then_some(Copies { constants, residuals })
 }
 
-/// Replaces velocities and positions by integrals of the accelerations, which are interpolated linearly between the samples. Derivatives by
-/// local polynomials are not derivatives of the positions, so that smoothing would miss less of them than of the motion. The initial state fits
+/// Replaces velocities and positions by integrals of the accelerations, which are interpolated linearly between the samples. Without this they would
+/// not be consistent, because derivatives by local polynomials are not the derivatives of the smoothed positions. The initial state is the one that fits
 /// the positions best. A coordinate whose integral drifts too far stays unchanged.
 fn integrate(motion: &mut Smoothed, n: usize) {
     let count = motion.times.len();
@@ -120,8 +120,8 @@ fn integrate(motion: &mut Smoothed, n: usize) {
         let (middle, level) = (mean(&motion.times), mean(&off));
         let times = || motion.times.iter().map(|t| t - middle);
         let slope = times().zip(&off).map(|(t, off)| t * off).sum::<f64>() / times().map(|t| t * t).sum::<f64>();
-        let left = rms(times().zip(&off).map(|(t, off)| off - level - slope * t));
-        if left > MOST_DRIFT * deviation(positions.iter()) {
+        let drift = rms(times().zip(&off).map(|(t, off)| off - level - slope * t));
+        if drift > MOST_DRIFT * deviation(positions.iter()) {
             continue;
         }
         let lines: Vec<f64> = times().map(|t| level + slope * t).collect();
@@ -132,8 +132,12 @@ fn integrate(motion: &mut Smoothed, n: usize) {
     }
 }
 
-/// The forces that a motion needs, `(samples, n)`: under constraints their part that these cannot balance.
-fn asked(problem: &Problem<'_>, (states, x): (&States, &[f64]), (track, motion): (usize, &Smoothed)) -> Vec<f64> {
+/// The forces that a motion requires, `(samples, n)`; under constraints, the part that the constraints cannot balance.
+fn required_forces(
+    problem: &Problem<'_>,
+    (states, x): (&States, &[f64]),
+    (track, motion): (usize, &Smoothed),
+) -> Vec<f64> {
     let (n, values) = (problem.course.equations.n, problem.parameters(x));
     let mut follower = Follower::new(&problem.course);
     let mut force = vec![0.0; motion.q.len()];
@@ -148,16 +152,16 @@ fn asked(problem: &Problem<'_>, (states, x): (&States, &[f64]), (track, motion):
             &mut scratch[..range.len()],
         );
         let found = &mut force[range.clone()];
-        follower.lacking_forces(&motion.a[range], found);
-        states.free_part(&follower, |free| free.take_all(found, 1));
+        follower.unbalanced_forces(&motion.a[range], found);
+        states.with_free_part(&follower, |free| free.project_all(found, 1));
     }
-    // Without known forces, the force that the motion needs is missing, with opposite sign.
+    // Without known forces, the residual is the required force with the opposite sign.
     force.iter_mut().for_each(|f| *f = -*f);
     force
 }
 
 /// A trajectory with new noise.
-fn drawn(
+fn with_new_noise(
     track: &RecordedTrajectory,
     motion: &Smoothed,
     force: &[f64],
@@ -171,10 +175,10 @@ fn drawn(
         let chosen = &smoothing.coordinates[at % n];
         let mut noise = |sigma: f64| sigma * normal();
         copy.q[at] = match marks[at % n] {
-            // Quantization is part of the noise, and contributes little where the motion is slow.
+            // Quantization is part of the noise, and contributes little if the motion is slow.
             Some(mark) => {
-                let beside = (chosen.noise.sigma.powi(2) - mark * mark / 12.0).max(0.0).sqrt();
-                mark * ((motion.q[at] + noise(beside)) / mark).round()
+                let other = (chosen.noise.sigma.powi(2) - mark * mark / 12.0).max(0.0).sqrt();
+                mark * ((motion.q[at] + noise(other)) / mark).round()
             }
             None => motion.q[at] + noise(chosen.noise.sigma),
         };
@@ -189,7 +193,7 @@ fn drawn(
 }
 
 impl Copies {
-    /// The bias of the constants along the directions of the root of the normal matrix, and their covariance in these directions.
+    /// The bias of the constants, and their covariance in the directions of the root of the normal matrix.
     pub fn bias(&self, root: &Root, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (m, count, copies) = (x.len(), root.forward.len(), self.constants.len() as f64);
         let change = |constants: &Vec<f64>| {
@@ -198,9 +202,9 @@ impl Copies {
         };
         let changes: Vec<Vec<f64>> = self.constants.iter().map(change).collect();
         let mean: Vec<f64> = (0..count).map(|k| changes.iter().map(|c| c[k]).sum::<f64>() / copies).collect();
-        // The variance of a new draw about the mean of a few copies, which is itself estimated from a few.
+        // The variance of a new draw about the mean of a few copies, estimated from a few copies.
         let factor = (1.0 + 1.0 / copies) / (copies - 3.0);
-        // A few copies do not determine the correlations of many constants.
+        // A few copies do not determine the correlations of many constants, which are therefore shrunk.
         let kept = copies / (copies + count as f64);
         let covariance = |at: usize| {
             let (i, j) = (at / count, at % count);
@@ -211,7 +215,7 @@ impl Copies {
         (bias, (0..count * count).map(covariance).collect())
     }
 
-    /// Mean square of the residual of coordinate `i` at every place, `(places)`; 0 where no copy has one.
+    /// Mean square of the residual of coordinate `i` at every place, `(places)`; 0 if too few copies have a residual there.
     pub fn squares(&self, places: &[(usize, usize)], (n, i): (usize, usize)) -> Vec<f64> {
         let at = |&(track, sample): &(usize, usize)| {
             let own = self.residuals.iter().map(|copy| copy[track][sample * n + i]).filter(|r| r.is_finite());
@@ -222,7 +226,7 @@ impl Copies {
         places.iter().map(at).collect()
     }
 
-    /// Residuals of a copy at places, of coordinate `i`.
+    /// Residuals of coordinate `i` of one copy at every place.
     pub fn residuals(&self, copy: usize, places: &[(usize, usize)], (n, i): (usize, usize)) -> Vec<f64> {
         places.iter().map(|&(track, sample)| self.residuals[copy][track][sample * n + i]).collect()
     }

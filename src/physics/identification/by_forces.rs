@@ -1,19 +1,19 @@
-//! Constants by known forces: least squares on the residuals of force of smoothed motion.
+//! Fits constants to known forces, by least squares on the force residuals of the smoothed motion.
 //!
 //! The residual is `r = M a + c - dL/dq + dD/dv - Q`. It does not solve for accelerations, so the mass matrix may be singular during the search.
 //! The weight of a coordinate is the inverse of the size of its residuals. If the equations are linear in the constants, a single step suffices
 //! for given weights.
 //!
-//! Under constraints the residual is the part that no force of constraint can balance. Of its `n` numbers `n - m` are independent, and count as
-//! so many.
+//! Under constraints the residual is the part that no force of constraint can balance. Of its `n` numbers, `n - m` are independent, and it counts
+//! as `n - m` numbers.
 
 use super::IdentifyError;
-use super::bootstrap;
+use super::bootstrap::{self, Copies};
 use super::covariance::Root;
 use super::follow::{Follower, Segment};
 use super::found::{Identified, Outlier, Residual, ResidualPath};
-use super::quality::{Evidence, correlation, mean_eigenvalue, outliers, over_noise, tail, usual};
-use super::smoothed::{Met, States};
+use super::quality::{Evidence, correlation, mean_eigenvalue, outliers, over_noise, tail, typical_size};
+use super::smoothed::{Quantity, States};
 use super::solve::{Normal, Problem};
 use super::stages::Fitted;
 use super::thresholds::{
@@ -25,113 +25,44 @@ use crate::lagrangian::SystemInstance;
 use crate::recording::smooth::{Smoothed, Smoothing, noise};
 use crate::recording::{RecordedTrajectory, Recording, deviation, quantile, rms};
 
-/// Identifies the constants of `problem` from the known forces, beginning at their starting values.
+/// Identifies the constants of `problem` from the known forces; the search begins at `x`.
 pub(super) fn identify(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
     smoothing: &Smoothing,
     (mut x, segments): (Vec<f64>, Vec<Segment>),
 ) -> Result<Identified, IdentifyError> {
-    let n = problem.course.equations.n;
     let recording = problem.course.recording;
     let start = x.clone();
-    let sharper = smoothing.sharper();
-    let smoothed: Vec<Option<Smoothed>> = recording.tracks.iter().map(|track| sharper.apply(track).ok()).collect();
-    let mut states = States::new(problem, &smoothed);
-    problem.cancellation.check()?;
-    let wider = bootstrap::wider(recording, smoothing);
-    if wider.is_some() {
-        let window: usize = smoothing.coordinates.iter().map(|chosen| chosen.quality.window).sum();
-        states.averaged = window / (AVERAGED_SHARE * n * states.stride);
-    }
-    let count = states.places.len();
-    if count == 0 {
-        return Err(IdentifyError::Lost);
-    }
-    problem.require_constraints(&x, (&states.q, &states.v))?;
-    let moving = problem.moves_constraints(&x, (&states.q, &states.v));
-    if !moving.is_empty() {
-        let symbol = |k: usize| instance.system.parameters[problem.chosen[k]].symbol.to_string();
-        return Err(IdentifyError::MovesConstraints { symbols: moving.into_iter().map(symbol).collect() });
-    }
-    let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
-    // A coordinate without a force gets the weight of the others.
-    let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
-    let least: Vec<f64> = sigma.iter().map(|sigma| LEAST_FORCE_RESIDUAL * sigma).collect();
+    let (mut states, smoothings) = smoothed_states(problem, smoothing)?;
+    check_constraints(instance, problem, &x, &states)?;
+    let (sigma, scales) = Scales::of(&states, problem.course.equations.n);
     if problem.course.equations.rows.is_some() {
-        states.units = units(problem, &states, &x, &least);
+        states.units = units(problem, &states, &x, &scales.least);
     }
-    let normal = weighed(problem, (&mut states, &mut x), (sigma, &least))?;
-    let ForceResiduals { raw, averages, errors, scaled: single } = ForceResiduals::of(problem, &states, &x, &least);
-    let usual_raw: Vec<f64> = (0..n).map(|i| usual(std::slice::from_ref(&raw), n, i).max(least[i])).collect();
-    let of_copies = |states: &States| shares(&self::errors(problem, states, &x, &least), n);
-    let copies =
-        wider.and_then(|wider| bootstrap::copies(problem, [&sharper, &wider], (&states, &x, &usual_raw), &of_copies));
-    let expected: Vec<Vec<f64>> = match &copies {
-        Some(copies) => (0..n).map(|i| copies.squares(&states.places, (n, i))).collect(),
-        None => (0..n).map(|i| column(&errors, (n, i)).iter().map(|error| error * error).collect()).collect(),
-    };
-    let over = |residuals: &[f64], i: usize| {
-        let of = |(r, square): (&f64, &f64)| if *square > 0.0 { r / square.sqrt().max(least[i]) } else { f64::NAN };
-        residuals.iter().zip(&expected[i]).map(of).collect::<Vec<f64>>()
-    };
-    // Averages in units of their standard errors, by coordinate.
-    let scaled: Vec<Vec<f64>> = (0..n).map(|i| over(&column(&averages, (n, i)), i)).collect();
-    let size = |i: usize| {
-        let far = OUTLIER * usual(std::slice::from_ref(&scaled[i]), 1, 0);
-        rms(scaled[i].iter().copied().filter(|z| z.abs() <= far))
-    };
-    let sizes: Vec<f64> = (0..n).map(size).collect();
-    let probability = |i: usize| {
-        let Some(copies) = &copies else { return 1.0 };
-        let others = (0..COPIES).map(|copy| over(&copies.residuals(copy, &states.places, (n, i)), i));
-        drifting(&scaled[i], &others.collect::<Vec<_>>(), &states.places)
-    };
-    let probabilities: Vec<f64> = (0..n).map(|i| (n as f64 * probability(i)).min(1.0)).collect();
-    let left = |i: usize| {
-        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
-        // Of single equations: neighbouring averages are correlated.
-        let autocorrelation = correlation(&[column(&single, (n, i))]).neighbours;
-        let (coordinate, white) = (recording.coordinates[i].clone(), probabilities[i] >= SIGNIFICANCE);
-        Residual { coordinate, rms: sizes[i] * noise, noise, spread: spread[i], autocorrelation, white }
-    };
-    let by_coordinate: Vec<Residual> = (0..n).map(left).collect();
-    let whole = Segment { track: 0, first: 0, samples: count, start: Vec::new() };
-    let far = |_, state: usize, i: usize, size: f64| {
-        let (track, sample) = states.places[state];
-        let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
-        Outlier { track, sample, trajectory: String::new(), row: 0, time, coordinate, size }
-    };
-    // States of all trajectories, one after another.
-    let (outliers, outlier_count) = outliers((&[whole], &[single]), n, far);
+    let normal = weighted_fit(problem, (&mut states, &mut x), (sigma, &scales.least))?;
+    let residuals = ForceResiduals::of(problem, &states, &x, &scales.least);
+    let copies = simulated(problem, smoothings, (&states, &x), (&residuals.raw, &scales.least));
+    let (by_coordinate, probabilities) = by_coordinate(recording, (&states, &scales), &residuals, copies.as_ref());
+    let (outliers, outlier_count) = residuals.outliers(recording, &states.places);
     let verdict = Evidence {
         converged: normal.converged,
         residuals: &by_coordinate,
         sizes: by_coordinate.iter().map(|r| r.rms).collect(),
-        exact: least.clone(),
+        exact: scales.least.clone(),
         probabilities,
-        outliers: outlier_count as f64 / (count * n) as f64,
+        outliers: outlier_count as f64 / states.q.len() as f64,
         agreement: 1.0,
         continuation: (1.0, 0.0),
     }
     .verdict();
     let over_noise = over_noise(&by_coordinate);
     let (normal, inflation) = match &copies {
-        Some(copies) => {
-            let root = Root::of(x.len(), &normal.matrix);
-            let (bias, mut covariance) = copies.bias(&root, &x);
-            let away: Vec<f64> = bias.iter().map(|bias| -bias).collect();
-            x = problem.moved(&x, &away, &normal);
-            // Residuals larger than those of the copies imply larger standard errors.
-            covariance.iter_mut().for_each(|c| *c *= over_noise.max(1.0).powi(2));
-            let inflation = mean_eigenvalue(&covariance, root.forward.len());
-            (root.informed(&normal, &covariance, f64::MIN_POSITIVE), inflation)
-        }
+        Some(copies) => without_bias(problem, &mut x, normal, (copies, over_noise)),
         None => (normal, 1.0),
     };
     let fitted = Fitted { x, segments, normal: normal.with_held(), substeps: 0 };
-    let normal_at = |x: &[f64]| states.normal(problem, x, Met::Forces);
+    let normal_at = |x: &[f64]| states.normal(problem, x, Quantity::Forces);
     problem.cancellation.check()?;
     Ok(Identified {
         converged: fitted.normal.converged,
@@ -142,11 +73,138 @@ pub(super) fn identify(
         over_noise,
         outliers,
         outlier_count,
-        paths: paths(recording, &states.places, &raw),
+        paths: paths(recording, &states.places, &residuals.raw),
         inflation,
-        samples: count,
-        ..unknowns(instance, problem, &fitted, (&start, 1.0), (Met::Forces, &normal_at))
+        samples: states.places.len(),
+        ..unknowns(instance, problem, &fitted, (&start, 1.0), (Quantity::Forces, &normal_at))
     })
+}
+
+/// Smoothings of a recording: the one that is fitted, and a wider one that gives the motion of simulated copies, if there is one.
+struct Smoothings {
+    sharper: Smoothing,
+    wider: Option<Smoothing>,
+}
+
+/// The smoothed states at which the forces are fitted.
+fn smoothed_states(problem: &Problem<'_>, smoothing: &Smoothing) -> Result<(States, Smoothings), IdentifyError> {
+    let recording = problem.course.recording;
+    let sharper = smoothing.sharper();
+    let smoothed: Vec<Option<Smoothed>> = recording.tracks.iter().map(|track| sharper.apply(track).ok()).collect();
+    let mut states = States::new(problem, &smoothed);
+    problem.cancellation.check()?;
+    let wider = bootstrap::wider_smoothing(recording, smoothing);
+    if wider.is_some() {
+        let window: usize = smoothing.coordinates.iter().map(|chosen| chosen.quality.window).sum();
+        states.averaged = window / (AVERAGED_SHARE * problem.course.equations.n * states.stride);
+    }
+    if states.places.is_empty() {
+        return Err(IdentifyError::Lost);
+    }
+    Ok((states, Smoothings { sharper, wider }))
+}
+
+/// Refuses states off the constraints, and unknown constants that move constraints.
+fn check_constraints(
+    instance: &SystemInstance<f64>,
+    problem: &Problem<'_>,
+    x: &[f64],
+    states: &States,
+) -> Result<(), IdentifyError> {
+    problem.require_constraints(x, (&states.q, &states.v))?;
+    let moving = problem.moves_constraints(x, (&states.q, &states.v));
+    if moving.is_empty() {
+        return Ok(());
+    }
+    let symbol = |k: usize| instance.system.parameters[problem.chosen[k]].symbol.to_string();
+    Err(IdentifyError::MovesConstraints { symbols: moving.into_iter().map(symbol).collect() })
+}
+
+/// Scales of the forces on every coordinate.
+struct Scales {
+    /// Standard deviation of the known force.
+    spread: Vec<f64>,
+    /// Smallest residual that is assumed.
+    least: Vec<f64>,
+}
+
+impl Scales {
+    /// The scales, and the residuals that the first weights assume.
+    fn of(states: &States, n: usize) -> (Vec<f64>, Self) {
+        let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
+        // A coordinate without a force gets the weight of the others.
+        let most = spread.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let sigma: Vec<f64> = spread.iter().map(|s| if *s > 0.0 { *s } else { most }).collect();
+        let least = sigma.iter().map(|sigma| LEAST_FORCE_RESIDUAL * sigma).collect();
+        (sigma, Self { spread, least })
+    }
+}
+
+/// Fits of simulated copies of the recording; `None` if these cannot be made.
+fn simulated(
+    problem: &Problem<'_>,
+    Smoothings { sharper, wider }: Smoothings,
+    (states, x): (&States, &[f64]),
+    (raw, least): (&Vec<f64>, &[f64]),
+) -> Option<Copies> {
+    let (n, wider) = (least.len(), wider?);
+    let sizes: Vec<f64> = (0..n).map(|i| typical_size(std::slice::from_ref(raw), n, i).max(least[i])).collect();
+    let shares = |states: &States| shares(&errors(problem, states, x, least), n);
+    bootstrap::copies(problem, [&sharper, &wider], (states, x, &sizes), &shares)
+}
+
+/// The residual of every coordinate, and the probability that the residuals of a right model vary as slowly.
+fn by_coordinate(
+    recording: &Recording,
+    (states, scales): (&States, &Scales),
+    residuals: &ForceResiduals,
+    copies: Option<&Copies>,
+) -> (Vec<Residual>, Vec<f64>) {
+    let (n, places, least) = (scales.least.len(), &states.places, &scales.least);
+    let expected: Vec<Vec<f64>> = match copies {
+        Some(copies) => (0..n).map(|i| copies.squares(places, (n, i))).collect(),
+        None => (0..n).map(|i| column(&residuals.errors, (n, i)).iter().map(|error| error * error).collect()).collect(),
+    };
+    let over = |residuals: &[f64], i: usize| {
+        let of = |(r, square): (&f64, &f64)| if *square > 0.0 { r / square.sqrt().max(least[i]) } else { f64::NAN };
+        residuals.iter().zip(&expected[i]).map(of).collect::<Vec<f64>>()
+    };
+    let of = |i: usize| {
+        // Averages in units of their standard errors.
+        let scaled = over(&column(&residuals.averages, (n, i)), i);
+        let far = OUTLIER * typical_size(std::slice::from_ref(&scaled), 1, 0);
+        let size = rms(scaled.iter().copied().filter(|z| z.abs() <= far));
+        let probability = copies.map_or(1.0, |copies| {
+            let others = (0..COPIES).map(|copy| over(&copies.residuals(copy, places, (n, i)), i));
+            drift_probability(&scaled, &others.collect::<Vec<_>>(), places)
+        });
+        let probability = (n as f64 * probability).min(1.0);
+        let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
+        // Of single equations, because neighbouring averages overlap.
+        let autocorrelation = correlation(&[column(&residuals.scaled, (n, i))]).at_lag_one;
+        let (coordinate, white) = (recording.coordinates[i].clone(), probability >= SIGNIFICANCE);
+        let spread = scales.spread[i];
+        (Residual { coordinate, rms: size * noise, noise, spread, autocorrelation, white }, probability)
+    };
+    (0..n).map(of).unzip()
+}
+
+/// Removes the bias that the copies show from the constants. Returns normal equations with the covariance of the copies, and the factor by which
+/// it exceeds that of independent residuals.
+fn without_bias(
+    problem: &Problem<'_>,
+    x: &mut Vec<f64>,
+    normal: Normal,
+    (copies, over_noise): (&Copies, f64),
+) -> (Normal, f64) {
+    let root = Root::of(x.len(), &normal.matrix);
+    let (bias, mut covariance) = copies.bias(&root, x);
+    let change: Vec<f64> = bias.iter().map(|bias| -bias).collect();
+    *x = problem.stepped(x, &change, &normal);
+    // Residuals larger than those of the copies imply larger standard errors.
+    covariance.iter_mut().for_each(|c| *c *= over_noise.max(1.0).powi(2));
+    let inflation = mean_eigenvalue(&covariance, root.forward.len());
+    (root.with_covariance(&normal, &covariance, f64::MIN_POSITIVE), inflation)
 }
 
 /// Known forces at successive places of each trajectory, and their residuals `(states, n)`.
@@ -168,15 +226,15 @@ fn paths(recording: &Recording, places: &[(usize, usize)], residuals: &[f64]) ->
     rows.chunk_by(|a, b| a.0 == b.0).map(path).collect()
 }
 
-/// Fits the constants and updates the weights of coordinates by the sizes of their averages until both settle; returns the normal equations
-/// there.
-fn weighed(
+/// Fits the constants and updates the weights of the coordinates by the sizes of their averaged residuals, until the weights converge. Returns the
+/// normal equations at the end.
+fn weighted_fit(
     problem: &Problem<'_>,
     (states, x): (&mut States, &mut Vec<f64>),
     (mut sigma, least): (Vec<f64>, &[f64]),
 ) -> Result<Normal, IdentifyError> {
     let n = sigma.len();
-    // Equations of which constraints leave fewer.
+    // Constraints leave fewer independent equations.
     let rows = problem.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len());
     let counts = ((n - rows) as f64 / n as f64).sqrt();
     let weights = |states: &States, sigma: &[f64]| (0..states.q.len()).map(|at| counts / sigma[at % n]).collect();
@@ -184,36 +242,40 @@ fn weighed(
     for _ in 0..WEIGHT_UPDATES {
         states.weight = weights(states, &sigma);
         problem.cancellation.check()?;
-        let fitted = states.fit(problem, x, Met::Forces);
+        let fitted = states.fit(problem, x, Quantity::Forces);
         problem.cancellation.check()?;
         search = fitted.ok_or(IdentifyError::Singular)?;
         let ForceResiduals { averages, errors, scaled, .. } = ForceResiduals::of(problem, states, x, least);
         states.share = shares(&errors, n);
         let [averages, scaled] = [[averages], [scaled]];
-        let far: Vec<f64> = (0..n).map(|i| OUTLIER * usual(&scaled, n, i)).collect();
+        let far: Vec<f64> = (0..n).map(|i| OUTLIER * typical_size(&scaled, n, i)).collect();
         let stands_out = scaled[0].iter().enumerate().filter(|(at, z)| z.abs() > far[at % n]);
         stands_out.for_each(|(at, _)| states.share[at] = 0.0);
-        let left: Vec<f64> = (0..n).map(|i| usual(&averages, n, i).max(least[i])).collect();
-        let settled = left.iter().zip(&sigma).all(|(left, sigma)| (left / sigma - 1.0).abs() < WEIGHT_CHANGE);
-        sigma = left;
+        let residual: Vec<f64> = (0..n).map(|i| typical_size(&averages, n, i).max(least[i])).collect();
+        let converged = residual.iter().zip(&sigma).all(|(r, sigma)| (r / sigma - 1.0).abs() < WEIGHT_CHANGE);
+        sigma = residual;
         tracing::debug!(?sigma, "residuals of force");
-        search.converged &= settled;
-        if settled {
+        search.converged &= converged;
+        if converged {
             break;
         }
     }
     states.weight = weights(states, &sigma);
-    let normal = states.normal(problem, x, Met::Forces);
+    let normal = states.normal(problem, x, Quantity::Forces);
     problem.cancellation.check()?;
     let normal = normal.ok_or(IdentifyError::Singular)?;
     Ok(Normal { converged: search.converged, decrement: search.decrement, held: search.held, ..normal })
 }
 
-/// Residuals of the force equations, `(states, n)`: of single equations, of averages, and of single equations in units of their errors.
+/// Residuals of the force equations, `(states, n)`.
 struct ForceResiduals {
+    /// Those of single equations.
     raw: Vec<f64>,
+    /// Those of averages over neighbouring equations.
     averages: Vec<f64>,
+    /// Standard errors of single equations.
     errors: Vec<f64>,
+    /// Residuals of single equations in units of these errors.
     scaled: Vec<f64>,
 }
 
@@ -224,6 +286,17 @@ impl ForceResiduals {
         let scaled = raw.iter().zip(&errors).map(|(r, error)| r / error).collect();
         Self { raw, averages, errors, scaled }
     }
+
+    /// Outliers, the farthest first, and their number; the states of all trajectories follow one another.
+    fn outliers(&self, recording: &Recording, places: &[(usize, usize)]) -> (Vec<Outlier>, usize) {
+        let whole = Segment { track: 0, first: 0, samples: places.len(), start: Vec::new() };
+        let describe = |_, state: usize, i: usize, size: f64| {
+            let (track, sample) = places[state];
+            let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
+            Outlier { track, sample, trajectory: String::new(), row: 0, time, coordinate, size }
+        };
+        outliers((&[whole], std::slice::from_ref(&self.scaled)), recording.n(), describe)
+    }
 }
 
 /// Column `i` of `(states, n)`.
@@ -231,9 +304,9 @@ fn column(values: &[f64], (n, i): (usize, usize)) -> Vec<f64> {
     values.iter().skip(i).step_by(n).copied().collect()
 }
 
-/// Probability that the residuals of a correct model vary as much over many samples, judged by the residuals of the copies: sums over blocks,
-/// whose logarithms are `t`-distributed.
-fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -> f64 {
+/// Probability that the residuals of a right model vary as slowly: the logarithms of their squared sums over blocks are compared with those of the
+/// copies by a t test.
+fn drift_probability(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -> f64 {
     let slow = |values: &[f64], block: usize| {
         let mut square = f64::MIN_POSITIVE;
         for (part, places) in values.chunks(block).zip(places.chunks(block)) {
@@ -258,12 +331,11 @@ fn drifting(residuals: &[f64], copies: &[Vec<f64>], places: &[(usize, usize)]) -
 
 /// Weights of equations by their errors: 1 for the typical error or a smaller one.
 fn shares(errors: &[f64], n: usize) -> Vec<f64> {
-    let usual: Vec<f64> = (0..n).map(|i| quantile(&mut column(errors, (n, i)), 0.5)).collect();
-    errors.iter().enumerate().map(|(at, error)| (usual[at % n] / error).powi(2).min(1.0)).collect()
+    let typical: Vec<f64> = (0..n).map(|i| quantile(&mut column(errors, (n, i)), 0.5)).collect();
+    errors.iter().enumerate().map(|(at, error)| (typical[at % n] / error).powi(2).min(1.0)).collect()
 }
 
-/// Error of every force equation that noise alone causes, `(states, n)`: the noise of the force and the contribution of the errors of the
-/// accelerations.
+/// Standard error of every force equation, `(states, n)`: the noise of the force, and the mass matrix times the errors of the accelerations.
 fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
     let n = problem.course.equations.n;
     let tracks =
@@ -278,7 +350,7 @@ fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> V
             let square: f64 = row.iter().zip(&of_acceleration[first..first + n]).map(|(m, e)| (m * e).powi(2)).sum();
             *error = of_force[at % n].hypot(square.sqrt()).max(least[at % n]);
         }
-        states.free_part(follower, |free| {
+        states.with_free_part(follower, |free| {
             let of_states = follower.mass().chunks_exact(n * n).zip(of_acceleration.chunks_exact(n));
             for (state, ((mass, of_acceleration), all)) in of_states.zip(all.chunks_exact_mut(n)).enumerate() {
                 let found = free.errors(state, mass, (of_acceleration, &of_force));
@@ -289,17 +361,17 @@ fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> V
     all
 }
 
-/// Units in which forces under constraints are compared, `(n)`: the typical errors of the equations without them.
+/// Units in which forces under constraints are compared, `(n)`: the typical errors of the unconstrained equations.
 fn units(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
     let n = least.len();
     let errors = errors(problem, states, x, least);
-    let usual: Vec<f64> = (0..n).map(|i| quantile(&mut column(&errors, (n, i)), 0.5)).collect();
-    let most = usual.iter().copied().filter(|unit| unit.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
-    usual.into_iter().map(|unit| if unit.is_finite() { unit.max(LEAST_FORCE_UNIT * most) } else { most }).collect()
+    let typical: Vec<f64> = (0..n).map(|i| quantile(&mut column(&errors, (n, i)), 0.5)).collect();
+    let most = typical.iter().copied().filter(|unit| unit.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
+    typical.into_iter().map(|unit| if unit.is_finite() { unit.max(LEAST_FORCE_UNIT * most) } else { most }).collect()
 }
 
 impl Problem<'_> {
-    /// `true` if the equations are linear in all unknown constants together, tried at the starts of segments.
+    /// `true` if the equations are linear in all unknown constants together, as tested at the initial states of segments.
     pub(super) fn is_linear(&self, segments: &[Segment]) -> bool {
         let (n, m) = (self.course.equations.n, self.chosen.len());
         let stride = segments.len().div_ceil(LANES).max(1);
@@ -308,7 +380,7 @@ impl Problem<'_> {
         let v: Vec<f64> = starts().flat_map(|(_, v)| v.to_vec()).collect();
         let slopes = |factor: f64| {
             let x: Vec<f64> = (0..m).map(|k| factor * (1.0 + k as f64 / m as f64)).collect();
-            // The acceleration of the state does not matter here.
+            // Any acceleration shows it.
             Follower::new(&self.course).force_slopes(&self.parameters(&x), (&q, &v, &q)).to_vec()
         };
         let (one, other) = (slopes(1.0), slopes(1.7));

@@ -1,9 +1,9 @@
-//! The constants of every trajectory alone, and whether they differ by more than their errors: a model that lacks something, or errors that are
-//! too small, show here first.
+//! Identifies the constants from every trajectory alone, and tests whether they differ by more than their errors. A difference is often the first
+//! sign of a missing term, or of standard errors that are too small.
 
 use super::found::{Constant, Identified};
 use super::quality::tail;
-use super::says::with_error;
+use super::report::with_error;
 use super::thresholds::{MOST_SINGLE_TRAJECTORIES, SIGNIFICANCE};
 use super::{IdentifyError, IdentifyOptions, identify};
 use crate::cancellation::Cancelled;
@@ -13,49 +13,49 @@ use crate::names::rounded;
 use crate::recording::Recording;
 use serde::Serialize;
 
-/// What one trajectory alone says.
+/// Constants identified from one trajectory alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfTrajectory {
     /// Its name.
     pub trajectory: String,
-    /// The constants; none of a trajectory from which they cannot be identified.
+    /// The constants; empty if they cannot be identified from this trajectory.
     pub constants: Vec<Constant>,
-    /// The verdict in words, or why there are no constants.
+    /// The verdict in words, or the reason why there are no constants.
     pub says: String,
-    /// `true` if the model fits it.
+    /// `true` if the model fits the trajectory.
     pub explained: bool,
 }
 
-/// The scatter of a constant over the trajectories that determine it, at least two.
+/// The scatter of a constant over the trajectories that determine it, of which there are at least two.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scatter {
     /// Its symbol.
     pub symbol: String,
-    /// Mean of its values, each weighted by its variance.
+    /// Mean of its values, weighted by their inverse variances.
     pub mean: f64,
     /// Number of these values.
     pub count: usize,
-    /// Standard deviation of the values from the mean, in standard errors: 1 if the errors are right.
+    /// Standard deviation of the values from the mean, in standard errors; 1 is expected if the errors are right.
     pub ratio: f64,
-    /// Probability that values of one and the same constant scatter as much.
+    /// Probability that values of the same constant scatter at least as much.
     pub probability: f64,
-    /// `true` if that is less than 1 % over the number of constants: one recording of a right model in a hundred has such a constant.
+    /// `true` if the probability is below 1 %, divided by the number of constants: a right model has such a constant in one of a hundred recordings.
     pub differs: bool,
 }
 
-/// The constants by trajectory.
+/// The constants of every trajectory alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ByTrajectory {
-    /// Every trajectory.
+    /// The constants by trajectory.
     pub trajectories: Vec<OfTrajectory>,
     /// The scatter of every constant.
     pub scatter: Vec<Scatter>,
 }
 
-/// Identifies every trajectory alone, from the constants of all together.
+/// Identifies the constants from every trajectory alone, starting at those of all trajectories together.
 ///
 /// # Errors
-/// More than 64 trajectories, a search that is cancelled.
+/// [`IdentifyError`] for more than 64 trajectories, and for a search that is cancelled.
 pub(super) fn by_trajectory(
     instance: &SystemInstance<f64>,
     recording: &Recording,
@@ -76,9 +76,9 @@ pub(super) fn by_trajectory(
     for at in 0..count {
         let one = Recording { tracks: vec![recording.tracks[at].clone()], ..recording.clone() };
         let options = IdentifyOptions {
-            errors: of(&options.errors, at),
-            missing: of(&options.missing, at),
-            inputs: of(&options.inputs, at),
+            errors: entry(&options.errors, at),
+            missing: entry(&options.missing, at),
+            inputs: entry(&options.inputs, at),
             by_trajectory: false,
             ..options.clone()
         };
@@ -96,12 +96,12 @@ pub(super) fn by_trajectory(
     Ok(ByTrajectory { scatter: scatter.collect(), trajectories })
 }
 
-/// What belongs to one trajectory, of a list that is empty or has an entry for each.
-fn of<T: Clone>(all: &[T], at: usize) -> Vec<T> {
+/// The entry of one trajectory in a list that is empty or has one entry for each.
+fn entry<T: Clone>(all: &[T], at: usize) -> Vec<T> {
     all.get(at).cloned().into_iter().collect()
 }
 
-/// The scatter of one of so many constants; `None` if fewer than two trajectories determine it.
+/// The scatter of one constant; `None` if fewer than two trajectories determine it.
 fn scatter(symbol: &str, trajectories: &[OfTrajectory], (constants, samples): (usize, usize)) -> Option<Scatter> {
     let own = trajectories.iter().flat_map(|alone| &alone.constants).filter(|constant| constant.symbol == symbol);
     let known: Vec<(f64, f64)> = own
@@ -120,8 +120,8 @@ fn scatter(symbol: &str, trajectories: &[OfTrajectory], (constants, samples): (u
 }
 
 impl ByTrajectory {
-    /// The table log by log, and the constants that differ.
-    pub(super) fn say(&self, findings: &mut Findings) {
+    /// Adds tables of the constants by trajectory and of their scatter.
+    pub(super) fn report(&self, findings: &mut Findings) {
         let symbols: Vec<&str> = self.scatter.iter().map(|scatter| scatter.symbol.as_str()).collect();
         let cell = |alone: &OfTrajectory, symbol: &str| {
             let own = alone.constants.iter().find(|constant| constant.symbol == symbol);
@@ -162,7 +162,7 @@ mod tests {
             let mut recording =
                 recorded(&oscillator(4.0), &[&[1.0, 0.3], &[0.2, 1.9], &[-0.8, 1.0]], (8.0, 0.02), &[2e-3], 1);
             recording.tracks.extend(recorded(&oscillator(last), &[&[0.9, -0.7]], (8.0, 0.02), &[2e-3], 2).tracks);
-            let options = IdentifyOptions { by_trajectory: true, ..IdentifyOptions::default() };
+            let options = IdentifyOptions::new().by_trajectory(true);
             identify(&oscillator(3.5), &recording, &options).unwrap().by_trajectory.unwrap()
         };
         let (alike, unlike) = (each(4.0), each(4.04));

@@ -1,14 +1,14 @@
-//! The user's choices: unknown constants, sensors, position errors, and the quantity that is fitted.
+//! Checks the options and resolves them: unknown constants, sensors, errors of positions, inputs, and the quantity that is fitted.
 
 use super::follow::Inputs;
-use super::smoothed::Met;
+use super::smoothed::Quantity;
 use super::solve::{Sensor, SensorKind};
 use super::{IdentifyError, IdentifyOptions};
 use crate::lagrangian::SystemInstance;
 use crate::names::pluralize;
 use crate::recording::{RecordedTrajectory, Recording, Targets};
 
-/// Position errors: one positive number for each position.
+/// Checks the standard errors of positions: one positive number for each position.
 pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result<(), IdentifyError> {
     if errors.is_empty() {
         return Ok(());
@@ -27,7 +27,8 @@ pub(super) fn check_errors(recording: &Recording, errors: &[Vec<f64>]) -> Result
     Ok(())
 }
 
-/// What is said of readings that are missing; tracks without any may have no marks.
+/// Checks the marks of missing readings, and returns a message for each coordinate with missing readings. Trajectories without missing readings
+/// may have no marks.
 pub(super) fn missing(recording: &Recording, missing: &[Vec<bool>]) -> Result<Vec<String>, IdentifyError> {
     let n = recording.n();
     let wrong = recording.tracks.iter().zip(missing).find(|(track, own)| !own.is_empty() && own.len() != track.q.len());
@@ -43,7 +44,7 @@ pub(super) fn missing(recording: &Recording, missing: &[Vec<bool>]) -> Result<Ve
     Ok(recording.coordinates.iter().enumerate().filter_map(of).collect())
 }
 
-/// The inputs of every trajectory, for which the options must have as many numbers as the system takes.
+/// The inputs of every trajectory. The options must give one finite number for each input and sample.
 pub(super) fn inputs<'a>(
     instance: &SystemInstance<f64>,
     recording: &'a Recording,
@@ -66,18 +67,18 @@ pub(super) fn inputs<'a>(
     recording.tracks.iter().enumerate().map(of).collect()
 }
 
-/// What the constants are fitted to.
-pub(super) fn met(
+/// The quantity that the constants are fitted to.
+pub(super) fn fitted_quantity(
     instance: &SystemInstance<f64>,
     recording: &Recording,
     options: &IdentifyOptions,
-) -> Result<Met, IdentifyError> {
+) -> Result<Quantity, IdentifyError> {
     let driven = recording.is_driven();
     // A joint without an actuator has a known force of 0.
     let mut forces = recording.tracks.iter().flat_map(|track| &track.force);
-    let pushed = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
-    // Both need a fit to the motion.
-    let follows = options.segment.is_some()
+    let known = recording.tracks.iter().all(|track| !track.force.is_empty()) && forces.any(|force| *force != 0.0);
+    // Each of these options requires a fit to the motion.
+    let needs_motion = options.segment.is_some()
         || !options.errors.is_empty()
         || [&options.offsets, &options.gains, &options.delays].iter().any(|names| !names.is_empty());
     let refused = |expected: &str, found: &str| {
@@ -85,20 +86,20 @@ pub(super) fn met(
         Err(IdentifyError::Option { what: "targets", expected, found })
     };
     match options.targets {
-        Some(Targets::Motion) => Ok(Met::Accelerations),
-        Some(Targets::Forces) if !pushed => refused("motion, because the recording has no known forces", "forces"),
-        Some(Targets::Forces) if follows => {
+        Some(Targets::Motion) => Ok(Quantity::Accelerations),
+        Some(Targets::Forces) if !known => refused("motion, because the recording has no known forces", "forces"),
+        Some(Targets::Forces) if needs_motion => {
             refused("motion, because sensor constants, position errors or a segment length are given", "forces")
         }
-        Some(Targets::Forces) => Ok(Met::Forces),
+        Some(Targets::Forces) => Ok(Quantity::Forces),
         Some(Targets::Measured) => refused("motion or forces", "measured"),
         Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),
-        None if instance.system.is_chain() && driven && !follows => Ok(Met::Forces),
-        None => Ok(Met::Accelerations),
+        None if instance.system.is_chain() && driven && !needs_motion => Ok(Quantity::Forces),
+        None => Ok(Quantity::Accelerations),
     }
 }
 
-/// Parameters that are unknown.
+/// Indices of the unknown parameters, in the order of the system.
 pub(super) fn chosen(instance: &SystemInstance<f64>, options: &IdentifyOptions) -> Result<Vec<usize>, IdentifyError> {
     let parameters = &instance.system.parameters;
     let mut chosen = Vec::new();
@@ -122,7 +123,7 @@ pub(super) fn chosen(instance: &SystemInstance<f64>, options: &IdentifyOptions) 
     }
 }
 
-/// Sensors with unknown constants.
+/// The unknown constants of sensors.
 pub(super) fn sensors(
     instance: &SystemInstance<f64>,
     recording: &Recording,

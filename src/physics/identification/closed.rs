@@ -1,9 +1,9 @@
-//! Systems under constraints, such as closed chains: their accelerations, the initial states that they allow, and the part of forces that no
-//! force of constraint can balance.
+//! Systems under constraints, such as closed chains: their accelerations, their consistent initial states, and the part of forces that constraint
+//! forces cannot balance.
 //!
-//! With multipliers `lambda` the equations are `M a - h - A^T lambda = Q`, `A a = -gamma`. A change of anything that they depend on changes
-//! accelerations by the solution with the same matrix `[M A^T; A 0]`. Initial states move within the constraints: along the directions of a
-//! tangent, by the least change where a constant moves the constraints, and back onto them by projection.
+//! With multipliers `lambda` the equations are `M a - h - A^T lambda = Q`, `A a = -gamma`. Derivatives of the accelerations are solutions with the same
+//! matrix `[M A^T; A 0]`. Initial states move within the constraints: along their tangent directions, by the smallest possible change if a constant
+//! changes the constraints, and back onto the constraints by projection.
 
 use super::IdentifyError;
 use super::follow::{Course, Segment};
@@ -18,7 +18,7 @@ use crate::names::rounded;
 use crate::tape::Replay;
 use std::sync::Arc;
 
-/// Constraints of the states that are evaluated side by side; the buffers are reused.
+/// Evaluates the constraints of many states side by side, with reused buffers.
 pub(super) struct Closed {
     size: (usize, usize),
     rows: Replay<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Closed {
     matrix: Vec<f64>,
     drift: Vec<f64>,
     bordered: Bordered<f64>,
-    /// The multipliers with opposite sign, `(lanes, m)`.
+    /// The multipliers with the opposite sign, `(lanes, m)`.
     load: Vec<f64>,
     /// Derivatives of the equations, `(lanes, n + m, columns)`.
     by_state: Vec<f64>,
@@ -53,7 +53,7 @@ impl Closed {
         &self.matrix
     }
 
-    /// Accelerations of states `(q, v)` with these mass matrices and forces; those that have none are `NaN`.
+    /// Accelerations of states `(q, v)` with the given mass matrices and forces; `NaN` if the equations have no solution.
     pub fn accelerate(
         &mut self,
         values: &[f64],
@@ -73,8 +73,8 @@ impl Closed {
         self.bordered.solve(forces, &self.drift, a, &mut self.load, workspace);
     }
 
-    /// The equations' derivatives, `(lanes, n + m, columns)`, of which `unconstrained`, `(lanes, n, columns)`, are those without forces of
-    /// constraint, and the matrices `[M A^T; A 0]`, at the states whose accelerations were found last.
+    /// Derivatives of the equations, `(lanes, n + m, columns)`, and the matrices `[M A^T; A 0]`, at the states whose accelerations were found last.
+    /// `unconstrained`, `(lanes, n, columns)`, are the derivatives without constraint forces.
     pub fn slopes(&mut self, values: &[f64], [q, v, a]: [&[f64]; 3], unconstrained: &[f64]) -> (&[f64], &[f64]) {
         let (n, m) = self.size;
         let lanes = q.len() / n;
@@ -87,7 +87,7 @@ impl Closed {
         (&self.by_state, self.bordered.matrices())
     }
 
-    /// What a unit of force on each coordinate accelerates at the states whose accelerations were found last, `(lanes, n, n)`.
+    /// Accelerations by a unit force on each coordinate at the states whose accelerations were found last, `(lanes, n, n)`.
     pub fn mobility(&self) -> Vec<f64> {
         let (n, m) = self.size;
         let k = n + m;
@@ -102,8 +102,8 @@ impl Closed {
     }
 }
 
-/// The part of forces that no force of constraint can balance, at states with rows `A`, `(states, m, n)`. Forces are compared in units of
-/// their own, `(n)`.
+/// Projects forces to the part that constraint forces cannot balance, at states with rows `A`, `(states, m, n)`. Forces on the coordinates are
+/// compared in the given units, `(n)`.
 #[derive(Clone, Copy)]
 pub(super) struct FreePart<'a> {
     pub rows: &'a [f64],
@@ -112,7 +112,7 @@ pub(super) struct FreePart<'a> {
 }
 
 impl FreePart<'_> {
-    /// An orthonormal basis of what the constraints of a state can carry, in the units.
+    /// An orthonormal basis of the constraint forces at a state, in the units.
     fn carried(&self, state: usize) -> Vec<f64> {
         let n = self.units.len();
         let size = self.constraints * n;
@@ -120,8 +120,8 @@ impl FreePart<'_> {
         independent_rows(n, &rows.map(|(a, unit)| a / unit).collect::<Vec<_>>()).1
     }
 
-    /// Takes out of forces on one state what its constraints can carry.
-    fn take(&self, carried: &[f64], force: &mut [f64]) {
+    /// Removes the part of the forces on one state that its constraints balance.
+    fn project(&self, carried: &[f64], force: &mut [f64]) {
         force.iter_mut().zip(self.units).for_each(|(force, unit)| *force /= unit);
         let size = dot(force, force).sqrt();
         take_out(force, carried);
@@ -129,26 +129,26 @@ impl FreePart<'_> {
         force.iter_mut().zip(self.units).for_each(|(force, unit)| *force = rounded(*force) * unit);
     }
 
-    /// The same with rows of numbers for every coordinate, `(states, n, numbers)`.
-    pub fn take_all(&self, forces: &mut [f64], numbers: usize) {
+    /// The same for all states, with several numbers for every coordinate, `(states, n, numbers)`.
+    pub fn project_all(&self, forces: &mut [f64], numbers: usize) {
         let n = self.units.len();
         let mut column = vec![0.0; n];
         for (state, block) in forces.chunks_exact_mut(n * numbers).enumerate() {
             let carried = self.carried(state);
             for k in 0..numbers {
                 (0..n).for_each(|i| column[i] = block[i * numbers + k]);
-                self.take(&carried, &mut column);
+                self.project(&carried, &mut column);
                 (0..n).for_each(|i| block[i * numbers + k] = column[i]);
             }
         }
     }
 
-    /// Standard deviations, `(n)`, of the part for independent errors of accelerations and of forces at one state.
+    /// Standard deviations of the projected forces at one state, `(n)`, for independent errors of accelerations and of forces.
     pub fn errors(&self, state: usize, mass: &[f64], (of_acceleration, of_force): (&[f64], &[f64])) -> Vec<f64> {
         let (n, carried) = (self.units.len(), self.carried(state));
         let mut squares = vec![0.0; n];
         let mut add = |mut effect: Vec<f64>| {
-            self.take(&carried, &mut effect);
+            self.project(&carried, &mut effect);
             squares.iter_mut().zip(&effect).for_each(|(square, x)| *square += x * x);
         };
         for k in 0..n {
@@ -159,7 +159,7 @@ impl FreePart<'_> {
     }
 }
 
-/// Moves initial states within the constraints when unknowns change.
+/// Moves initial states within the constraints while the constants change.
 pub(super) struct Mover<'a> {
     rows: &'a RowEquations,
     values: Vec<f64>,
@@ -175,7 +175,7 @@ impl Course<'_> {
         self.equations.rows.as_ref().map_or(2 * self.equations.n, RowEquations::freedom)
     }
 
-    /// How initial states may change within the constraints; none of a system without constraints.
+    /// Directions in which initial states can change within the constraints; empty for a system without constraints.
     pub(super) fn tangents(&self, values: &[f64], segments: &[&Segment]) -> Vec<Tangent> {
         let Some((rows, manifold)) = self.manifold(values) else { return Vec::new() };
         segments.iter().map(|segment| rows.tangent(&*manifold, values, &segment.start)).collect()
@@ -183,24 +183,24 @@ impl Course<'_> {
 
     fn manifold(&self, values: &[f64]) -> Option<(&RowEquations, Box<dyn Manifold<f64>>)> {
         let rows = self.equations.rows.as_ref()?;
-        // As many values as the constraints were recorded with.
+        // The number of values is that of the recorded constraints.
         Some((rows, Box::new(rows.manifold(values).ok()?)))
     }
 }
 
 impl Mover<'_> {
-    /// Moves a start by a step along its free directions, lets it follow the constants, and brings it back to the constraints.
+    /// Moves an initial state by a step along its free directions and with the changing constants, and projects it onto the constraints.
     fn advance(&self, start: &mut [f64], step: &[f64]) {
         let Tangent { free, following } = self.rows.tangent(&*self.before, &self.values, start);
         let directions =
             free.chunks_exact(start.len()).zip(step).chain(following.chunks_exact(start.len()).zip(&self.change));
         directions.for_each(|(direction, size)| start.iter_mut().zip(direction).for_each(|(x, d)| *x += size * d));
-        bring(&*self.after, start);
+        project_start(&*self.after, start);
     }
 }
 
-/// Brings a start to the constraints by the least change; one from which no way leads there stays.
-fn bring(manifold: &dyn Manifold<f64>, start: &mut [f64]) {
+/// Projects an initial state onto the constraints; one that cannot be projected stays.
+fn project_start(manifold: &dyn Manifold<f64>, start: &mut [f64]) {
     let mut state = start.to_vec();
     let (q, v) = state.split_at_mut(start.len() / 2);
     if project(manifold, q, v).is_ok() {
@@ -208,19 +208,19 @@ fn bring(manifold: &dyn Manifold<f64>, start: &mut [f64]) {
     }
 }
 
-/// How far smoothed positions are from a constraint.
+/// Distance of smoothed positions from a constraint.
 struct Distance {
     name: String,
     /// Root mean squares across the constraint: the distance, the noise of the positions, their spread.
-    missed: f64,
+    distance: f64,
     noise: f64,
     size: f64,
-    /// `true` if an unknown constant moves the constraint.
+    /// `true` if the constraint depends on an unknown constant.
     open: bool,
 }
 
 impl Problem<'_> {
-    /// Takes the step from unknowns `x` to others.
+    /// Moves initial states while the unknowns change from `x` to `moved`; `None` without constraints.
     pub(super) fn mover(&self, x: &[f64], moved: &[f64]) -> Option<Mover<'_>> {
         let values = self.parameters(x);
         let (rows, before) = self.course.manifold(&values)?;
@@ -229,15 +229,15 @@ impl Problem<'_> {
         Some(Mover { rows, values, change, before, after })
     }
 
-    /// Brings the starts of segments to the constraints that constants give.
-    pub(super) fn bring(&self, x: &[f64], segments: &mut [Segment]) {
+    /// Projects the initial states of segments onto the constraints.
+    pub(super) fn project_starts(&self, x: &[f64], segments: &mut [Segment]) {
         if let Some((_, manifold)) = self.course.manifold(&self.parameters(x)) {
-            segments.iter_mut().for_each(|segment| bring(&*manifold, &mut segment.start));
+            segments.iter_mut().for_each(|segment| project_start(&*manifold, &mut segment.start));
         }
     }
 
-    /// The same for states `(q, v)`; those from which no way leads to the constraints become `NaN`.
-    pub(super) fn bring_states(&self, x: &[f64], (q, v): (&mut [f64], &mut [f64])) {
+    /// The same for states `(q, v)`; those that cannot be projected become `NaN`.
+    pub(super) fn project_states(&self, x: &[f64], (q, v): (&mut [f64], &mut [f64])) {
         let (n, found) = (self.course.equations.n, self.course.manifold(&self.parameters(x)));
         let Some((_, manifold)) = found else { return };
         for (q, v) in q.chunks_exact_mut(n).zip(v.chunks_exact_mut(n)) {
@@ -247,7 +247,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Constraints of coordinates alone from which smoothed states `(q, v)` are farther than motion that obeys them, with constants `x`.
+    /// The constraints from which smoothed states `(q, v)` are farther than their errors allow, with constants `x`.
     fn distances(&self, x: &[f64], (q, v): (&[f64], &[f64])) -> Vec<Distance> {
         let (n, values) = (self.course.equations.n, self.parameters(x));
         let Some((rows, manifold)) = self.course.manifold(&values) else { return Vec::new() };
@@ -270,34 +270,36 @@ impl Problem<'_> {
             count += 1.0;
         }
         let of = |(row, (sums, open)): (usize, ([f64; 3], bool))| {
-            let [missed, noise, size] = sums.map(|sum| (sum / f64::max(count, 1.0)).sqrt());
-            Distance { name: rows.names[row].clone(), missed, noise, size, open }
+            let [distance, noise, size] = sums.map(|sum| (sum / f64::max(count, 1.0)).sqrt());
+            Distance { name: rows.names[row].clone(), distance, noise, size, open }
         };
         let all = squares.into_iter().zip(open).enumerate().map(of);
-        all.filter(|of| of.missed > f64::max(OBEDIENCE.0 * of.noise, OBEDIENCE.1 * of.size)).collect()
+        all.filter(|of| of.distance > f64::max(OBEDIENCE.0 * of.noise, OBEDIENCE.1 * of.size)).collect()
     }
 
-    /// Refuses smoothed positions that are off a constraint whatever the unknown constants are.
+    /// Refuses smoothed positions that are off a constraint, unless the constraint depends on an unknown constant.
     ///
     /// # Errors
     /// [`IdentifyError::OffConstraint`].
     pub(super) fn require_constraints(&self, x: &[f64], states: (&[f64], &[f64])) -> Result<(), IdentifyError> {
         let off = self.distances(x, states).into_iter().find(|distance| !distance.open);
-        off.map_or(Ok(()), |Distance { name: constraint, missed: distance, noise, .. }| {
+        off.map_or(Ok(()), |Distance { name: constraint, distance, noise, .. }| {
             Err(IdentifyError::OffConstraint { constraint, distance, noise })
         })
     }
 
-    /// Messages about constraints from which smoothed positions are off with the constants that were found.
+    /// Messages about constraints from which smoothed positions are off, with the identified constants.
     pub(super) fn off_constraints(&self, x: &[f64], states: (&[f64], &[f64])) -> Vec<String> {
-        let say = |Distance { name, missed, noise, .. }: Distance| {
-            let [missed, noise] = [missed, noise].map(|x| rounded(x, 3));
-            format!("the positions miss the constraint `{name}` by {missed}, root mean square, at a noise of {noise}")
+        let message = |Distance { name, distance, noise, .. }: Distance| {
+            let [distance, noise] = [distance, noise].map(|x| rounded(x, 3));
+            format!(
+                "the positions are {distance} (root mean square) off the constraint `{name}`; their noise is {noise}"
+            )
         };
-        self.distances(x, states).into_iter().map(say).collect()
+        self.distances(x, states).into_iter().map(message).collect()
     }
 
-    /// The unknown constants that move constraints, at some of the recorded states `(q, v)`.
+    /// The unknown constants on which constraints depend, tested at recorded states `(q, v)`.
     pub(super) fn moves_constraints(&self, x: &[f64], (q, v): (&[f64], &[f64])) -> Vec<usize> {
         let (n, values) = (self.course.equations.n, self.parameters(x));
         let Some(rows) = &self.course.equations.rows else { return Vec::new() };
@@ -312,7 +314,7 @@ impl Problem<'_> {
     }
 }
 
-/// Moves a start by a step: the whole of it without constraints, within them otherwise.
+/// Moves an initial state by a step, within the constraints if there are some.
 pub(super) fn advance(mover: Option<&Mover<'_>>, start: &mut [f64], step: &[f64]) {
     match mover {
         Some(mover) => mover.advance(start, step),

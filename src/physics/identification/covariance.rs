@@ -1,8 +1,8 @@
-//! Covariance of the unknowns where residuals are correlated or weighted by their size.
+//! Covariance of the unknowns if residuals are correlated or weighted by their size.
 //!
-//! With scores `u_t`, the gradient of the sum of squares at a sample once starts are eliminated, the covariance is `S^-1 B S^-1`, `S` the normal
-//! matrix and `B` the long-run covariance of the scores: from the mean of the outer products of their sums over all windows of one length, which is
-//! Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
+//! Let the score `u_t` be the contribution of a sample to the gradient of the sum of squares, with initial states eliminated. The covariance is
+//! `S^-1 B S^-1` with the normal matrix `S` and the long-run covariance `B` of the scores. `B` is the mean of the outer products of their sums over all
+//! windows of one length, which is Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
 use super::follow::Segment;
 use super::linear::times;
@@ -14,19 +14,19 @@ use super::thresholds::{
 };
 use crate::linalg::{Workspace, dot, eigh};
 
-/// Effect of weighting residuals by size: all numbers are means over residuals in units of the noise.
+/// Effect of weighting residuals by size. All numbers are means over residuals in units of the noise.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Weighing {
-    /// Variance of the scores over the normal matrix: the mean square residual if none is cut.
+pub(super) struct Weighting {
+    /// Variance of the scores over the normal matrix; the mean square residual if no residual is cut off.
     pub square: f64,
-    /// Weight over slope of the scores, 1 if no residual is cut.
-    pub bread: f64,
+    /// Mean weight over mean slope of the scores; 1 if no residual is cut off.
+    pub weight_over_slope: f64,
 }
 
-impl Weighing {
-    /// `E psi^2`, `E psi'` and the mean weight if residuals beyond three standard deviations count linearly (Huber, Robust Statistics, 1981,
-    /// section 7.6); `taken` is the share of degrees of freedom that are not used by initial states and constants.
-    pub fn of(residuals: &[Vec<f64>], robust: bool, taken: f64) -> Self {
+impl Weighting {
+    /// From `E psi^2`, `E psi'` and the mean weight, if residuals beyond three standard deviations count linearly (Huber, Robust Statistics, 1981,
+    /// section 7.6); `freedom` is the share of degrees of freedom that initial states and constants leave.
+    pub fn of(residuals: &[Vec<f64>], robust: bool, freedom: f64) -> Self {
         let all = || residuals.iter().flatten().copied().filter(|r| r.is_finite());
         let cut = |r: f64| if robust && r.abs() > HUBER { HUBER } else { r.abs() };
         let (mut square, mut slope, mut weight) = (0.0, 0.0, 0.0);
@@ -35,7 +35,7 @@ impl Weighing {
             slope += f64::from(u8::from(cut(r) == r.abs()));
             weight += if r == 0.0 { 1.0 } else { cut(r) / r.abs() };
         }
-        Self { square: square / (weight * taken).max(f64::MIN_POSITIVE), bread: weight / slope.max(1.0) }
+        Self { square: square / (weight * freedom).max(f64::MIN_POSITIVE), weight_over_slope: weight / slope.max(1.0) }
     }
 }
 
@@ -44,31 +44,31 @@ pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> 
     let (starts, m) = (problem.course.starts(), problem.unknowns());
     let width = starts + m;
     // Response of the initial states to the unknowns, `(m, starts)`.
-    let follow = problem.all(x, segments).into_iter().map(|linear| {
+    let responses = problem.all(x, segments).into_iter().map(|linear| {
         let linear = linear?;
         let inverse = problem.start_inverse(&linear, 0.0);
         let column = |k: usize| (0..starts).map(|i| linear.matrix[i * width + starts + k]).collect::<Vec<f64>>();
         Some((0..m).map(|k| times(starts, &inverse, &column(k))).collect::<Vec<_>>())
     });
-    let follow: Vec<Option<Vec<Vec<f64>>>> = follow.collect();
+    let responses: Vec<Option<Vec<Vec<f64>>>> = responses.collect();
     let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * m]).collect();
     let mut order: Vec<usize> = (0..segments.len()).collect();
     order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
     for batch in order.chunks(LANES) {
         let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
         problem.residuals(x, &lanes, true, |lane, sample, _, residual, row| {
-            let Some(follow) = &follow[batch[lane]] else { return };
+            let Some(responses) = &responses[batch[lane]] else { return };
             let cut = if problem.robust { residual.clamp(-HUBER, HUBER) } else { residual };
             let own = &mut found[batch[lane]][sample * m..(sample + 1) * m];
-            for ((score, follow), slope) in own.iter_mut().zip(follow).zip(&row[starts..]) {
-                *score += cut * (slope - dot(follow, &row[..starts]));
+            for ((score, response), slope) in own.iter_mut().zip(responses).zip(&row[starts..]) {
+                *score += cut * (slope - dot(response, &row[..starts]));
             }
         });
     }
     found
 }
 
-/// Long-run covariance of scores, `(m, m)`, correlated over `lags` samples; consecutive segments of a trajectory are concatenated.
+/// Long-run covariance of scores that are correlated over `lags` samples, `(m, m)`; adjacent segments of a trajectory are concatenated.
 pub(super) fn long_run(scores: &[Vec<f64>], segments: &[Segment], m: usize, lags: usize) -> Vec<f64> {
     let mut order: Vec<usize> = (0..segments.len()).collect();
     order.sort_by_key(|&k| (segments[k].track, segments[k].first));
@@ -90,9 +90,9 @@ pub(super) fn long_run(scores: &[Vec<f64>], segments: &[Segment], m: usize, lags
             }
         }
     }
-    // All scores sum to 0: windows that are a large part of them vary less than those of independent numbers.
-    let part = window as f64 / samples as f64;
-    let factor = window as f64 * (1.0 - part + part * part / 3.0);
+    // All scores sum to 0, so that sums over large windows vary less than those of independent numbers.
+    let share = window as f64 / samples as f64;
+    let factor = window as f64 * (1.0 - share + share * share / 3.0);
     covariance.iter_mut().for_each(|c| *c /= factor);
     covariance
 }
@@ -112,78 +112,76 @@ impl Root {
         let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
         // Finite by construction.
         let _ = eigh(m, &scaled, &mut values, &mut vectors, &mut Workspace::new());
-        let told =
+        let determined =
             || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > ELIMINATED_ROUNDING);
         let each = |vector: &[f64], of: &dyn Fn(usize, f64) -> f64| {
             vector.iter().enumerate().map(|(k, x)| of(k, *x)).collect::<Vec<f64>>()
         };
         Self {
-            forward: told().map(|(value, vector)| each(vector, &|k, x| x * value.sqrt() * scale[k])).collect(),
-            back: told().map(|(value, vector)| each(vector, &|k, x| over(x / value.sqrt(), scale[k]))).collect(),
+            forward: determined().map(|(value, vector)| each(vector, &|k, x| x * value.sqrt() * scale[k])).collect(),
+            back: determined().map(|(value, vector)| each(vector, &|k, x| over(x / value.sqrt(), scale[k]))).collect(),
         }
     }
 
-    /// Normal equations of independent residuals of unit size that give the same covariance of the unknowns as scores with this covariance.
-    ///
-    /// `W` is a covariance of the unknowns in the directions of the root; eigenvalues below `least` are raised to it.
-    pub fn informed(&self, normal: &Normal, covariance: &[f64], least: f64) -> Normal {
+    /// Normal equations of independent residuals of unit size that give the unknowns the given covariance, which is in the directions of the root.
+    /// Eigenvalues below `least` are raised to it.
+    pub fn with_covariance(&self, normal: &Normal, covariance: &[f64], least: f64) -> Normal {
         let (m, count) = (normal.right.len(), self.forward.len());
         let (mut values, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
         let _ = eigh(count, covariance, &mut values, &mut vectors, &mut Workspace::new());
-        let mut informed = Normal { matrix: vec![0.0; m * m], ..normal.clone() };
+        let mut scaled = Normal { matrix: vec![0.0; m * m], ..normal.clone() };
         for (value, vector) in values.iter().zip(vectors.chunks_exact(count.max(1))) {
             let row: Vec<f64> =
                 (0..m).map(|k| vector.iter().zip(&self.forward).map(|(x, row)| x * row[k]).sum()).collect();
             let weight = value.max(least).recip();
-            for (line, a) in informed.matrix.chunks_exact_mut(m).zip(&row) {
+            for (line, a) in scaled.matrix.chunks_exact_mut(m).zip(&row) {
                 line.iter_mut().zip(&row).for_each(|(sum, b)| *sum += weight * a * b);
             }
         }
         for k in 0..m {
-            let ratio = informed.matrix[k * m + k] / normal.matrix[k * m + k];
-            informed.diagonal[k] *= if ratio.is_finite() { ratio } else { 1.0 };
+            let ratio = scaled.matrix[k * m + k] / normal.matrix[k * m + k];
+            scaled.diagonal[k] *= if ratio.is_finite() { ratio } else { 1.0 };
         }
-        informed
+        scaled
     }
 
-    /// `B` in the directions of the root.
-    pub fn seen(&self, m: usize, covariance: &[f64]) -> Vec<f64> {
+    /// A long-run covariance `B` of scores in the directions of the root.
+    pub fn projected(&self, m: usize, covariance: &[f64]) -> Vec<f64> {
         let images: Vec<Vec<f64>> = self.back.iter().map(|row| times(m, covariance, row)).collect();
         self.back.iter().flat_map(|row| images.iter().map(|image| dot(row, image))).collect()
     }
 }
 
-/// Probability that noise causes the discontinuities between segments: the sum of squares that independent initial states of every second
-/// segment gain, over that of the residuals, has the F distribution for a correct model.
+/// p-value of the test that segments continue each other. For a right model, the sum of squares that separate initial states of every second
+/// segment gain, over that of the residuals, has the F distribution.
 ///
-/// Initial states absorb much of the effect of a missing term, over a short segment nearly all of it; but then segments do not continue each
-/// other.
-pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighing: Weighing) -> f64 {
+/// Initial states absorb much of the effect of a missing term, over a short segment almost all of it. The segments then do not continue each other.
+pub(super) fn continuation(problem: &Problem<'_>, fitted: &Fitted, weighting: Weighting) -> f64 {
     let longer = joined(&fitted.segments);
     if longer.len() == fitted.segments.len() {
         return 1.0;
     }
     let mut problem = problem.clone();
     choose_steps(&mut problem, &fitted.x, &longer);
-    let [apart, together] = [&fitted.segments, &longer].map(|segments| problem.normal_at(&fitted.x, segments));
-    let freedom = together.count - apart.count;
-    // Where the motion is too chaotic for the initial states to converge, the test has no power.
-    if together.failed + apart.failed > 0 || together.of_starts > MOST_START_DECREMENT || freedom < 1.0 {
+    let [separate, joint] = [&fitted.segments, &longer].map(|segments| problem.normal_at(&fitted.x, segments));
+    let freedom = joint.count - separate.count;
+    // The test has no power if the motion is too chaotic for the initial states to converge.
+    if joint.failed + separate.failed > 0 || joint.start_decrement > MOST_START_DECREMENT || freedom < 1.0 {
         return 1.0;
     }
-    // The gain that remains at the best constants, to first order.
+    // The sum of squares at the best constants, to second order.
     let least = |normal: &Normal| {
         let root = Root::of(fitted.x.len(), &normal.matrix);
-        let gained: f64 = root.back.iter().map(|row| dot(row, &normal.right).powi(2)).sum();
-        normal.square - gained
+        let decrease: f64 = root.back.iter().map(|row| dot(row, &normal.right).powi(2)).sum();
+        normal.square - decrease
     };
-    let ratio = (least(&together) - least(&apart)) / freedom / weighing.square;
-    tail(ratio, freedom, (apart.count - fitted.x.len() as f64).max(1.0))
+    let ratio = (least(&joint) - least(&separate)) / freedom / weighting.square;
+    tail(ratio, freedom, (separate.count - fitted.x.len() as f64).max(1.0))
 }
 
-/// Probability that noise makes the constants of segments differ as much as they do: the score test of separate constants for each segment,
-/// whose sum of squares over that of the residuals has the F distribution.
-pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], weighing: Weighing) -> f64 {
+/// p-value of the test that segments share their constants: the score test of separate constants for each segment, whose sum of squares over that
+/// of the residuals has the F distribution for a right model.
+pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], weighting: Weighting) -> f64 {
     let m = x.len();
     let (mut sum, mut freedom, mut rest) = (0.0, 0.0, 0.0);
     for (linear, segment) in problem.all(x, segments).iter().zip(segments) {
@@ -205,5 +203,5 @@ pub(super) fn agreement(problem: &Problem<'_>, x: &[f64], segments: &[Segment], 
         }
     }
     let freedom = freedom - m as f64;
-    if freedom < 1.0 { 1.0 } else { tail(sum / freedom / weighing.square, freedom, (rest - m as f64).max(1.0)) }
+    if freedom < 1.0 { 1.0 } else { tail(sum / freedom / weighting.square, freedom, (rest - m as f64).max(1.0)) }
 }

@@ -1,10 +1,10 @@
-//! Finds motion that would determine what is open: it evaluates the equations at other states, with larger positions, higher velocities and
-//! forces.
+//! Recommends motion that would determine the open directions. The equations are evaluated at other states: with larger positions, higher velocities,
+//! or forces.
 //!
-//! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is
-//! specific only if it is the same at every point along the open directions where the search may have ended.
+//! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is specific only
+//! if it is the same at every point along the open directions where the search may have ended.
 
-use super::determined::{Column, echelon};
+use super::determined::{OpenDirection, echelon};
 use super::follow::{Follower, Segment};
 use super::moves::Group;
 use super::solve::Problem;
@@ -12,15 +12,15 @@ use super::thresholds::{LANES, LEAST_EFFECT, MOST_PROBED_STATES, RECOMMENDED_GAI
 use crate::lagrangian::system::Bounds;
 use crate::linalg::{dot, singular};
 
-/// Kinds of numbers that are sampled.
+/// Kinds of numbers that are spread over a range.
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 1;
 const DRIVE: usize = 2;
 
-const MORE: &str = "record more motion of this kind, or reduce the noise";
-const READ: &str = "measure another quantity, record motion that goes farther, or fix one of the constants";
+const MORE_MOTION: &str = "record more motion of this kind, or reduce the noise";
+const OTHER_READINGS: &str = "measure another quantity, record larger motion, or fix one of the constants";
 
-/// Searches for motion that would determine open directions.
+/// Examines which motion would determine open directions.
 pub(super) struct Examiner<'a> {
     pub problem: &'a Problem<'a>,
     pub segments: &'a [Segment],
@@ -28,7 +28,7 @@ pub(super) struct Examiner<'a> {
     pub bounds: Bounds,
 }
 
-/// States, `(states, n)`, and forces, empty for none.
+/// States, `(states, n)`, and forces, empty for free motion.
 #[derive(Clone)]
 struct Probe {
     q: Vec<f64>,
@@ -36,24 +36,24 @@ struct Probe {
     force: Vec<f64>,
 }
 
-/// Unknowns and changes of them.
-struct Place<'a> {
+/// A point in the space of unknowns, with open directions there.
+struct Point<'a> {
     x: &'a [f64],
     changes: Vec<Vec<f64>>,
 }
 
-/// Directions of constants, classified by what would determine them.
-pub(super) struct ByForces {
+/// Open directions of equations that are linear in the constants, by their cause.
+pub(super) struct LinearDirections {
     /// Single constants on which no force depends.
-    pub silent: Vec<Vec<f64>>,
-    /// Combinations that the equations never separate.
-    pub always: Vec<Vec<f64>>,
-    /// Directions that this motion does not determine.
-    pub here: Vec<Vec<f64>>,
+    pub without_effect: Vec<Vec<f64>>,
+    /// Combinations that no motion determines.
+    pub inseparable: Vec<Vec<f64>>,
+    /// Combinations that this motion does not determine.
+    pub undetermined: Vec<Vec<f64>>,
 }
 
-/// Spreads coordinate `i` of states evenly over a range. Positions, velocities and drives, the `kind`s of numbers, are independent: they are
-/// multiples of different irrational numbers.
+/// Spreads coordinate `i` of states evenly over a range. Positions, velocities and drives, the `kind`s of numbers, are independent of each other,
+/// because they are multiples of different irrational numbers.
 pub(super) fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize), [low, high]: [f64; 2]) {
     let turn = ((kind * n + i + 2) as f64).powf(0.7);
     for (k, x) in values.iter_mut().skip(i).step_by(n).enumerate() {
@@ -61,15 +61,15 @@ pub(super) fn spread((values, n): (&mut [f64], usize), (i, kind): (usize, usize)
     }
 }
 
-/// Right singular vectors of columns by size: those above rounding, and the others.
+/// Right singular vectors of columns: those with singular values above rounding, and the others.
 fn split(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let Some(found) = singular(columns) else { return (Vec::new(), Vec::new()) };
     let vectors = found.values.into_iter().zip(found.vectors);
-    let (seen, unseen): (Vec<_>, Vec<_>) = vectors.partition(|(value, _)| *value > SINGULAR_ROUNDING);
-    [seen, unseen].map(|side| side.into_iter().map(|(_, vector)| vector).collect()).into()
+    let (visible, invisible): (Vec<_>, Vec<_>) = vectors.partition(|(value, _)| *value > SINGULAR_ROUNDING);
+    [visible, invisible].map(|side| side.into_iter().map(|(_, vector)| vector).collect()).into()
 }
 
-/// Columns combined by the rows of a matrix.
+/// Linear combinations of columns, with factors from the rows of a matrix.
 fn combined(columns: &[Vec<f64>], rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let sum = |row: &Vec<f64>| {
         let mut sum = vec![0.0; columns[0].len()];
@@ -112,22 +112,22 @@ impl Examiner<'_> {
         probe
     }
 
-    /// Changes of accelerations along directions over `sizes`, a column each, and the summed separate effects of their unknowns.
-    fn effects(&self, place: &Place<'_>, probe: &Probe, sizes: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    /// Changes of the accelerations along directions, in units of `sizes`, a column each, and the sum of the separate effects of their unknowns.
+    fn effects(&self, point: &Point<'_>, probe: &Probe, sizes: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
         let (n, m) = (self.n(), self.problem.chosen.len());
-        let probe = &self.allowed(place.x, probe.clone());
-        let values = self.problem.parameters(place.x);
+        let probe = &self.on_constraints(point.x, probe.clone());
+        let values = self.problem.parameters(point.x);
         let mut follower = Follower::new(&self.problem.course);
         let mut a = vec![0.0; probe.q.len()];
         follower.accelerate(&values, (&probe.q, &probe.v), &probe.force, &mut a);
         let slopes = follower.slopes(&values, (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
-        effects((&rows, 1.0), &place.changes, |at| sizes[at % n])
+        effects((&rows, 1.0), &point.changes, |at| sizes[at % n])
     }
 
-    /// States on the constraints.
-    fn allowed(&self, x: &[f64], mut probe: Probe) -> Probe {
-        self.problem.bring_states(x, (&mut probe.q, &mut probe.v));
+    /// The states, projected onto the constraints.
+    fn on_constraints(&self, x: &[f64], mut probe: Probe) -> Probe {
+        self.problem.project_states(x, (&mut probe.q, &mut probe.v));
         probe
     }
 
@@ -145,7 +145,7 @@ impl Examiner<'_> {
         (0..n).map(of).collect()
     }
 
-    /// Lowest and highest of a column, and three times as wide or to the bounds of the system.
+    /// Range of a column, and a wider range: three times as wide, and at least the bounds of the system.
     fn wider(values: &[f64], (n, i): (usize, usize), bounds: (f64, f64)) -> ([f64; 2], [f64; 2]) {
         let own = values.iter().skip(i).step_by(n).copied();
         let (low, high) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
@@ -153,7 +153,7 @@ impl Examiner<'_> {
         ([low, high], [(middle - half).min(bounds.0), (middle + half).max(bounds.1)])
     }
 
-    /// Lowest and highest of every position and velocity, as recorded and wider.
+    /// Ranges of every position and velocity, as recorded and wider.
     fn ranges(&self, recorded: &Probe) -> [Vec<([f64; 2], [f64; 2])>; 2] {
         let n = self.n();
         let wider = |values: &[f64], bounds: &[(f64, f64)]| {
@@ -162,20 +162,20 @@ impl Examiner<'_> {
         [wider(&recorded.q, &self.bounds.positions), wider(&recorded.v, &self.bounds.velocities)]
     }
 
-    /// States spread evenly over the wider ranges, independent of the recorded ones.
-    fn wild(&self, recorded: &Probe) -> Probe {
+    /// States spread evenly over the wider ranges.
+    fn wide_probe(&self, recorded: &Probe) -> Probe {
         let n = self.n();
-        let mut wild = recorded.clone();
-        let [wide_q, wide_v] = self.ranges(&wild);
+        let mut wide = recorded.clone();
+        let [wide_q, wide_v] = self.ranges(&wide);
         for i in 0..n {
-            spread((&mut wild.q, n), (i, POSITION), wide_q[i].1);
-            spread((&mut wild.v, n), (i, VELOCITY), wide_v[i].1);
+            spread((&mut wide.q, n), (i, POSITION), wide_q[i].1);
+            spread((&mut wide.v, n), (i, VELOCITY), wide_v[i].1);
         }
-        wild
+        wide
     }
 
     /// Recorded states under forces as large as the inertial forces.
-    fn driven(&self, x: &[f64], (recorded, sizes): (&Probe, &[f64])) -> Probe {
+    fn forced_probe(&self, x: &[f64], (recorded, sizes): (&Probe, &[f64])) -> Probe {
         let n = self.n();
         let mut driven = recorded.clone();
         let mut follower = Follower::new(&self.problem.course);
@@ -189,28 +189,29 @@ impl Examiner<'_> {
         driven
     }
 
-    /// What would determine a group of open directions.
+    /// Advice on how to determine a group of open directions.
     pub fn cure(&self, x: &[f64], group: &Group<'_>) -> String {
         if self.problem.measured.is_some() {
-            return READ.into();
+            return OTHER_READINGS.into();
         }
         if group.inside.iter().any(|k| *k >= self.problem.chosen.len()) {
-            return "calibrate the sensor: its constants and those of the system have the same effect on this motion"
+            return "calibrate the sensor, because its constants and those of the system have the same effect on this motion"
                 .into();
         }
-        let own = Place { x, changes: group.columns.iter().map(|column| column.change.clone()).collect() };
-        let told = self.cure_at(&own);
-        let elsewhere = |moved: &Vec<f64>| self.cure_at(&Place { x: moved, changes: group.changes_at(x, moved) });
-        if group.moved.iter().all(|moved| elsewhere(moved) == told) { told } else { MORE.into() }
+        let own = Point { x, changes: group.columns.iter().map(|column| column.change.clone()).collect() };
+        let advice = self.cure_at(&own);
+        let elsewhere = |moved: &Vec<f64>| self.cure_at(&Point { x: moved, changes: group.changes_at(x, moved) });
+        if group.points.iter().all(|moved| elsewhere(moved) == advice) { advice } else { MORE_MOTION.into() }
     }
 
-    fn cure_at(&self, place: &Place<'_>) -> String {
-        let (count, recorded) = (place.changes.len(), self.recorded(place.x));
-        let sizes = self.sizes(place.x, &recorded);
-        let (free, apart) = self.effects(place, &self.wild(&recorded), &sizes);
+    /// The advice at one point along the open directions.
+    fn cure_at(&self, point: &Point<'_>) -> String {
+        let (count, recorded) = (point.changes.len(), self.recorded(point.x));
+        let sizes = self.sizes(point.x, &recorded);
+        let (free, apart) = self.effects(point, &self.wide_probe(&recorded), &sizes);
         let unit = |columns: Vec<Vec<f64>>| scaled(columns, &apart);
         let free = unit(free);
-        let (under, under_apart) = self.effects(place, &self.driven(place.x, (&recorded, &sizes)), &sizes);
+        let (under, under_apart) = self.effects(point, &self.forced_probe(point.x, (&recorded, &sizes)), &sizes);
         let both: Vec<Vec<f64>> =
             free.iter().zip(scaled(under, &under_apart)).map(|(a, b)| [&a[..], &b[..]].concat()).collect();
         let (by_motion, _) = split(&free);
@@ -221,67 +222,65 @@ impl Examiner<'_> {
         let mut cures = Vec::new();
         if by_force > 0 {
             cures.push(match forced {
-                true => MORE.to_string(),
+                true => MORE_MOTION.to_string(),
                 false => "record motion under a known force (--force), or fix one of the constants".to_string(),
             });
         }
         if !by_motion.is_empty() {
-            let seen = |probe: &Probe| combined(&unit(self.effects(place, probe, &sizes).0), &by_motion);
-            cures.push(self.farther(&recorded, seen).unwrap_or_else(|| MORE.to_string()));
+            let effects = |probe: &Probe| combined(&unit(self.effects(point, probe, &sizes).0), &by_motion);
+            cures.push(self.best_extension(&recorded, effects).unwrap_or_else(|| MORE_MOTION.to_string()));
         }
         match (never, cures.is_empty()) {
             (0, _) => {}
             (_, true) => {
-                return "fix one of the constants: no motion separates them, the equations contain only their combinations".into();
+                return "fix one of the constants: no motion can separate them, because only combinations of them occur in the equations".into();
             }
-            (1, _) => cures.push("in addition, fix one of the constants: no motion determines all of them".to_string()),
-            (never, _) => {
-                cures.push(format!("in addition, fix {never} of the constants: no motion determines all of them"))
-            }
+            (1, _) => cures
+                .push("in addition, fix one of the constants, because no motion determines all of them".to_string()),
+            (never, _) => cures
+                .push(format!("in addition, fix {never} of the constants, because no motion determines all of them")),
         }
         cures.dedup();
         cures.join("; ")
     }
 
-    /// The coordinate whose larger range or speed determines the directions best.
-    fn farther(&self, recorded: &Probe, effects: impl Fn(&Probe) -> Vec<Vec<f64>>) -> Option<String> {
+    /// Advice on the coordinate whose larger range or speed determines the directions best; `None` if no larger motion is much more informative.
+    fn best_extension(&self, recorded: &Probe, effects: impl Fn(&Probe) -> Vec<Vec<f64>>) -> Option<String> {
         let n = self.n();
         let [wide_q, wide_v] = self.ranges(recorded);
-        // The mean of the logarithms of singular values differs by the same number in every basis of the directions.
-        let tells = |probe: &Probe| {
+        // A change of basis of the directions adds a constant to the mean logarithm of the singular values.
+        let information = |probe: &Probe| {
             let columns = effects(probe);
             let values = singular(&columns).map(|found| found.values).unwrap_or_default();
             let sum: f64 = values.iter().map(|value| value.max(LEAST_EFFECT).ln()).sum();
             sum / columns.len() as f64
         };
-        let mut best = (RECOMMENDED_GAIN.ln() + tells(recorded), None);
+        let mut best = (RECOMMENDED_GAIN.ln() + information(recorded), None);
         let range = |[low, high]: [f64; 2]| format!("{low:.3} .. {high:.3}");
         for (i, name) in self.coordinates.iter().enumerate() {
             let mut far = recorded.clone();
             spread((&mut far.q, n), (i, POSITION), wide_q[i].1);
             let (now, then) = (range(wide_q[i].0), range(wide_q[i].1));
-            let farther = (far, format!("record motion in which {name} goes farther, over {then} instead of {now}"));
+            let farther = (far, format!("record motion with a larger range of {name}: {then} instead of {now}"));
             let mut fast = recorded.clone();
             spread((&mut fast.v, n), (i, VELOCITY), wide_v[i].1);
             let (now, then) = (range(wide_v[i].0), range(wide_v[i].1));
-            let faster = (
-                fast,
-                format!("record motion in which {name} is faster, with {name}_dot over {then} instead of {now}"),
-            );
+            let faster =
+                (fast, format!("record faster motion of {name}, with {name}_dot over {then} instead of {now}"));
             for (probe, text) in [farther, faster] {
-                let effect = tells(&probe);
-                if effect > best.0 {
-                    best = (effect, Some(text));
+                let information = information(&probe);
+                if information > best.0 {
+                    best = (information, Some(text));
                 }
             }
         }
         best.1
     }
 
-    /// Open directions of equations that are linear in the constants, by what would determine them.
-    pub fn by_forces(&self, x: &[f64], (changes, size): (&[Vec<f64>], &[f64])) -> ByForces {
+    /// Classifies open directions of equations that are linear in the constants by their cause.
+    pub fn linear_directions(&self, x: &[f64], (changes, size): (&[Vec<f64>], &[f64])) -> LinearDirections {
         let (n, m) = (self.n(), self.problem.chosen.len());
-        let probe = self.allowed(x, self.wild(&self.recorded(x)));
+        let probe = self.on_constraints(x, self.wide_probe(&self.recorded(x)));
         let largest = probe.v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut a = vec![0.0; probe.v.len()];
         (0..n).for_each(|i| spread((&mut a, n), (i, DRIVE), [-largest, largest]));
@@ -289,16 +288,16 @@ impl Examiner<'_> {
         let slopes = follower.force_slopes(&self.problem.parameters(x), (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
         let (columns, apart) = effects((&rows, 0.0), changes, |_| 1.0);
-        let (seen, unseen) = split(&scaled(columns, &apart));
+        let (visible, invisible) = split(&scaled(columns, &apart));
         let basis = |rows: &[Vec<f64>]| {
             let own = if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &apart), rows) };
             let exact = |(x, size): (f64, &f64)| if (x / size).abs() > SINGULAR_ROUNDING { x } else { 0.0 };
-            let of = |column: Column| column.change.into_iter().zip(size).map(exact).collect::<Vec<f64>>();
+            let of = |column: OpenDirection| column.change.into_iter().zip(size).map(exact).collect::<Vec<f64>>();
             echelon(own, size).into_iter().map(of).collect::<Vec<_>>()
         };
         let single = |change: &Vec<f64>| change.iter().filter(|x| **x != 0.0).count() == 1;
-        let (silent, always) = basis(&unseen).into_iter().partition(single);
-        ByForces { silent, always, here: basis(&seen) }
+        let (without_effect, inseparable) = basis(&invisible).into_iter().partition(single);
+        LinearDirections { without_effect, inseparable, undetermined: basis(&visible) }
     }
 
     /// Coordinates that do not move.
@@ -315,8 +314,8 @@ impl Examiner<'_> {
     }
 }
 
-/// Effects of changes by the derivatives of equations, a column each, and the separate effects of their unknowns: the root of the sum of
-/// squares, to which every row contributes at least `least`.
+/// Effects of changes on the equations, a column each, and the root of the sum of squares of the separate effects of their unknowns, to which every row
+/// contributes at least `least`.
 fn effects(
     (rows, least): (&[&[f64]], f64),
     changes: &[Vec<f64>],
@@ -336,7 +335,7 @@ fn effects(
     changes.iter().map(of).unzip()
 }
 
-/// Columns divided by their sizes where these are not 0.
+/// Columns divided by their sizes, unless these are 0.
 fn scaled(columns: Vec<Vec<f64>>, sizes: &[f64]) -> Vec<Vec<f64>> {
     let over =
         |(column, size): (Vec<f64>, &f64)| column.into_iter().map(|x| if *size > 0.0 { x / size } else { x }).collect();

@@ -1,8 +1,8 @@
-//! What the motion determines: the changes of the unknowns that have no visible effect, and the standard errors of everything else.
+//! What the motion determines: the directions of the unknowns without a visible effect, and the standard errors of everything else.
 //!
-//! Let `S` be the normal matrix of the unknowns in units of the noise, starts eliminated, and `D` the size of each unknown. The singular
+//! Let `S` be the normal matrix of the unknowns in units of the noise, with initial states eliminated, and `D` the size of each unknown. The singular
 //! values of the Jacobian times `D` are the roots of the eigenvalues of `D S D`. A direction is *open* if its singular value is below 1, that
-//! is if the relative error along it is above 1, or if what shows of it is rounding.
+//! is if the relative error along it is above 1, or if its effect is rounding.
 
 use super::solve::{Normal, Problem};
 use super::thresholds::{
@@ -10,27 +10,27 @@ use super::thresholds::{
 };
 use crate::linalg::{Workspace, components, dot, eigh};
 
-/// What normal equations determine.
+/// What the normal equations determine.
 pub(super) struct Determined {
     /// Size of each unknown, in its own units.
     pub size: Vec<f64>,
     /// Effect of a unit change of each unknown with the others held fixed, in standard deviations.
     pub effect: Vec<f64>,
-    /// `(m, m)`, with every open direction held.
+    /// Covariance, `(m, m)`, with every open direction held fixed.
     pub covariance: Vec<f64>,
-    /// Unknowns without a visible effect of their own.
-    pub silent: Vec<usize>,
+    /// Unknowns that have no visible effect.
+    pub without_effect: Vec<usize>,
     /// Open directions of the other unknowns: changes in their own units, each of as few unknowns as possible.
-    pub open: Vec<Column>,
+    pub open: Vec<OpenDirection>,
     /// The normal matrix in units of the noise, `(m, m)`.
     pub information: Vec<f64>,
     /// Squared effects that are rounding, by unknown.
     rounding: Vec<f64>,
 }
 
-/// An open direction in a basis where each direction has a pivot that the others leave unchanged.
+/// An open direction, in a basis where each direction has a pivot that the others leave unchanged.
 #[derive(Clone, Debug)]
-pub(super) struct Column {
+pub(super) struct OpenDirection {
     /// The unknown that only this direction changes.
     pub pivot: usize,
     /// Change of each unknown; the largest is as large as the unknown itself.
@@ -38,8 +38,9 @@ pub(super) struct Column {
 }
 
 impl Determined {
-    /// From undamped normal equations at `x`, found from `start`; `variance` is that of the residuals. A direction is open if its relative error
-    /// exceeds `open`: 1, or [`NO_DEPENDENCE`] for equations that are linear in the unknowns, where a sum with a large error still counts as known.
+    /// Analyses undamped normal equations at `x`, for a search that began at `start`; `variance` is that of the residuals. A direction is open if its
+    /// relative error exceeds `open`: 1, or [`NO_DEPENDENCE`] for equations that are linear in the unknowns, where a sum with a large error still counts
+    /// as determined.
     pub fn new(
         problem: &Problem<'_>,
         (x, start): (&[f64], &[f64]),
@@ -48,11 +49,12 @@ impl Determined {
     ) -> Self {
         let m = x.len();
         let variance = variance.max(f64::MIN_POSITIVE);
-        let muted = problem.without_effect(x, normal);
-        let known = |(at, x): (usize, &f64)| if muted[at / m] || muted[at % m] { 0.0 } else { x / variance };
+        let ineffective = problem.without_effect(x, normal);
+        let known =
+            |(at, x): (usize, &f64)| if ineffective[at / m] || ineffective[at % m] { 0.0 } else { x / variance };
         let information: Vec<f64> = normal.matrix.iter().enumerate().map(known).collect();
         let effect: Vec<f64> =
-            (0..m).map(|k| if muted[k] { 0.0 } else { information[k * m + k].max(0.0).sqrt() }).collect();
+            (0..m).map(|k| if ineffective[k] { 0.0 } else { information[k * m + k].max(0.0).sqrt() }).collect();
         let size = |k: usize| {
             let [now, before] = [x[k], start[k]].map(|x| problem.scale(k, x));
             let least = match (before > 0.0, effect[k] > 0.0) {
@@ -66,7 +68,7 @@ impl Determined {
         let rounding: Vec<f64> = normal.diagonal.iter().map(|x| ELIMINATED_ROUNDING * x.max(0.0) / variance).collect();
         let resolved = |k: usize| size[k] * open / (1.0 + rounding[k] * (size[k] * open).powi(2)).sqrt();
         let resolved: Vec<f64> = (0..m).map(resolved).collect();
-        let (live, silent): (Vec<usize>, Vec<usize>) = (0..m).partition(|&k| effect[k] * resolved[k] >= 1.0);
+        let (live, without_effect): (Vec<usize>, Vec<usize>) = (0..m).partition(|&k| effect[k] * resolved[k] >= 1.0);
         let count = live.len();
         let scaled: Vec<f64> = (0..count * count)
             .map(|at| (live[at / count], live[at % count]))
@@ -90,30 +92,30 @@ impl Determined {
             }
         }
         let columns = echelon(directions, &size);
-        let mut found = Self { size, effect, covariance, silent, open: columns, information, rounding };
-        found.drop_unseen(open.recip());
+        let mut found = Self { size, effect, covariance, without_effect, open: columns, information, rounding };
+        found.drop_invisible(open.recip());
         found
     }
 
-    /// An unknown takes part in an open direction if its own change along it, with the others held fixed, has a visible effect that is not
-    /// rounding.
-    fn drop_unseen(&mut self, seen_from: f64) {
+    /// Sets the changes to 0 along open directions whose own effect, with the other unknowns held fixed, is not visible or is rounding.
+    fn drop_invisible(&mut self, least_effect: f64) {
         for column in &mut self.open {
-            let seen: Vec<f64> = column.change.iter().zip(&self.effect).map(|(x, effect)| (x * effect).abs()).collect();
-            let largest = seen.iter().copied().fold(0.0, f64::max);
-            let least = f64::max(seen_from, EIGENVECTOR_ROUNDING * largest);
+            let effects: Vec<f64> =
+                column.change.iter().zip(&self.effect).map(|(x, effect)| (x * effect).abs()).collect();
+            let largest = effects.iter().copied().fold(0.0, f64::max);
+            let least = f64::max(least_effect, EIGENVECTOR_ROUNDING * largest);
             for (k, x) in column.change.iter_mut().enumerate().filter(|(k, _)| *k != column.pivot) {
-                *x = if seen[k] >= least { *x } else { 0.0 };
+                *x = if effects[k] >= least { *x } else { 0.0 };
             }
         }
     }
 
-    /// `true` if an unknown takes part in an open direction.
+    /// `true` if an open direction changes the unknown.
     pub fn is_open(&self, k: usize) -> bool {
-        self.silent.contains(&k) || self.open.iter().any(|column| column.change[k] != 0.0)
+        self.without_effect.contains(&k) || self.open.iter().any(|column| column.change[k] != 0.0)
     }
 
-    /// Standard errors of unknowns that are determined individually.
+    /// Standard errors of the unknowns; `None` for those that are not determined individually.
     pub fn errors(&self) -> Vec<Option<f64>> {
         let m = self.size.len();
         (0..m).map(|k| (!self.is_open(k)).then(|| self.covariance[k * m + k].max(0.0).sqrt())).collect()
@@ -124,24 +126,26 @@ impl Determined {
         quadratic(&self.covariance, gradient).max(0.0).sqrt()
     }
 
-    /// Relative error along a change; `None` if the motion does not depend on it at all.
+    /// Relative error along a change; `None` if the motion does not depend on it.
     pub fn relative_error(&self, change: &[f64]) -> Option<f64> {
         let rounding: f64 = change.iter().zip(&self.rounding).map(|(x, rounding)| x * x * rounding).sum();
         let size: f64 = change.iter().zip(&self.size).map(|(x, size)| (x / size).powi(2)).sum();
-        let seen = quadratic(&self.information, change);
-        (seen > OVER_ROUNDING * rounding && seen > size / (NO_DEPENDENCE * NO_DEPENDENCE)).then(|| (size / seen).sqrt())
+        let effect = quadratic(&self.information, change);
+        (effect > OVER_ROUNDING * rounding && effect > size / (NO_DEPENDENCE * NO_DEPENDENCE))
+            .then(|| (size / effect).sqrt())
     }
 
-    /// Changes of all unknowns without a visible effect.
+    /// All changes of the unknowns without a visible effect.
     pub fn changes(&self) -> Vec<Vec<f64>> {
         let m = self.size.len();
         let alone = |&k: &usize| (0..m).map(|j| if j == k { self.size[k] } else { 0.0 }).collect();
-        self.silent.iter().map(alone).chain(self.open.iter().map(|column| column.change.clone())).collect()
+        self.without_effect.iter().map(alone).chain(self.open.iter().map(|column| column.change.clone())).collect()
     }
 
     /// Open directions in groups that share unknowns.
     pub fn groups(&self) -> Vec<Vec<usize>> {
-        let shares = |a: &Column, b: &Column| a.change.iter().zip(&b.change).any(|(a, b)| *a != 0.0 && *b != 0.0);
+        let shares =
+            |a: &OpenDirection, b: &OpenDirection| a.change.iter().zip(&b.change).any(|(a, b)| *a != 0.0 && *b != 0.0);
         let count = self.open.len();
         let pairs = (0..count).flat_map(|i| (0..i).map(move |j| (j, i)));
         components(count, pairs.filter(|&(i, j)| shares(&self.open[i], &self.open[j])))
@@ -153,9 +157,8 @@ pub(super) fn quadratic(matrix: &[f64], x: &[f64]) -> f64 {
     matrix.chunks_exact(x.len().max(1)).zip(x).map(|(row, own)| own * dot(row, x)).sum()
 }
 
-/// The same space in reduced echelon form: each direction has a pivot, an unknown with the largest relative change, which no other direction
-/// changes.
-pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<Column> {
+/// Reduced echelon form of directions: each has a pivot, the unknown with the largest relative change, which no other direction changes.
+pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<OpenDirection> {
     let mut pivots: Vec<usize> = Vec::new();
     for at in 0..rows.len() {
         let relative = |&(row, k): &(usize, usize)| {
@@ -165,7 +168,7 @@ pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<Column> {
         let free = (0..size.len()).filter(|k| !pivots.contains(k));
         let places: Vec<(usize, usize)> = free.flat_map(|k| (at..rows.len()).map(move |row| (row, k))).collect();
         let largest = places.iter().map(relative).fold(0.0, f64::max);
-        // The first of equal ones, independent of rounding.
+        // The first of equally large ones, so that rounding does not decide.
         let Some(&(row, pivot)) = places.iter().find(|place| relative(place) >= EQUAL_CHANGE * largest) else { break };
         rows.swap(at, row);
         let value = rows[at][pivot];
@@ -180,7 +183,7 @@ pub(super) fn echelon(mut rows: Vec<Vec<f64>>, size: &[f64]) -> Vec<Column> {
     }
     let scaled = |(change, pivot): (Vec<f64>, usize)| {
         let largest = change.iter().zip(size).map(|(x, size)| (x / size).abs()).fold(0.0, f64::max);
-        Column { pivot, change: change.into_iter().map(|x| x / largest).collect() }
+        OpenDirection { pivot, change: change.into_iter().map(|x| x / largest).collect() }
     };
     rows.into_iter().zip(pivots).map(scaled).collect()
 }
@@ -190,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_space_is_told_by_few_unknowns_each() {
+    fn directions_change_few_unknowns_each() {
         let rows = vec![vec![1.0, 1.0, 1.0, 1.0], vec![1.0, 1.0, -1.0, -1.0]];
         let found = echelon(rows, &[1.0; 4]);
         let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);

@@ -10,7 +10,7 @@ use crate::tape::TapeError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// The search was ended from outside.
+    /// The search was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// Arrays that do not form a trajectory.
@@ -19,18 +19,18 @@ pub enum IdentifyError {
     /// Motion that cannot be smoothed.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
-    /// A Lagrangian that cannot be recorded.
+    /// A Lagrangian that cannot be recorded as a program.
     #[error(transparent)]
     Lagrangian(#[from] TapeError),
-    /// A system whose Lagrangian is not known.
+    /// A system without a formula for its Lagrangian.
     #[error("{system}: expected a system of the catalogue or of a file")]
     Unknown {
         /// The system.
         system: String,
     },
-    /// Recorded positions that a constraint does not allow.
+    /// Recorded positions off a constraint.
     #[error(
-        "the positions miss the constraint `{constraint}` by {}, root mean square, at a noise of {}: expected positions on it; check its constants, or let them be identified",
+        "the positions are {} (root mean square) off the constraint `{constraint}`, more than their noise of {} explains: check its constants, or identify them",
         rounded(*distance, 3),
         rounded(*noise, 3)
     )]
@@ -42,9 +42,9 @@ pub enum IdentifyError {
         /// Noise of the positions across the constraint.
         noise: f64,
     },
-    /// Constants that move constraints, of which forces tell nothing.
+    /// Unknown constants in constraints, which forces do not determine.
     #[error(
-        "constants: the constraints depend on {}, of which forces tell nothing: expected other constants, or --targets motion",
+        "constants: the constraints depend on {}, which forces do not determine: choose other constants, or --targets motion",
         symbols.join(", ")
     )]
     MovesConstraints {
@@ -59,7 +59,7 @@ pub enum IdentifyError {
         /// Those of the recording.
         found: usize,
     },
-    /// The readings of a recording are not those of the system's file.
+    /// The columns of a recording are not the measured quantities of the system file.
     #[error("expected the readings of [measured]: {}; found {}", expected.join(", "), found.join(", "))]
     Readings {
         /// Names in the file, in their order.
@@ -67,16 +67,18 @@ pub enum IdentifyError {
         /// Those of the recording.
         found: Vec<String>,
     },
-    /// Known forces beside readings.
-    #[error("known forces beside [measured]: write them as formulas of [inputs] in [forces]")]
-    ForcesBesideReadings,
-    /// Constraints beside readings.
+    /// Known forces for a system with measured quantities.
     #[error(
-        "constraints beside [measured]: measure the coordinates, or describe the system by as many coordinates as move freely"
+        "a system with [measured] takes no columns of known forces: declare them as [inputs] and use these in [forces]"
+    )]
+    ForcesBesideReadings,
+    /// Constraints in a system with measured quantities.
+    #[error(
+        "a system with [measured] cannot have constraints: measure its coordinates, or describe it by independent coordinates"
     )]
     ConstrainedReadings,
-    /// Constants of sensors beside readings.
-    #[error("{what}: a system with [measured] has the constants of its sensors in the formulas there")]
+    /// Sensor constants for a system with measured quantities.
+    #[error("{what}: a system with [measured] declares the constants of its sensors in these formulas")]
     SensorsBesideReadings {
         /// Which constants.
         what: &'static str,
@@ -86,7 +88,7 @@ pub enum IdentifyError {
     Constant {
         /// The symbol.
         symbol: String,
-        /// Symbols there are.
+        /// The symbols of the system.
         known: Vec<String>,
     },
     /// A symbol or coordinate that is given twice.
@@ -104,7 +106,7 @@ pub enum IdentifyError {
         what: &'static str,
         /// The name.
         name: String,
-        /// Coordinates there are.
+        /// The coordinates of the recording.
         known: Vec<String>,
     },
     /// The system has no constants.
@@ -123,18 +125,18 @@ pub enum IdentifyError {
         /// What was given.
         found: String,
     },
-    /// A constant with a value for each trajectory that does not fit the recording.
+    /// A parameter with a value for each trajectory that does not match the recording.
     #[error(transparent)]
     Description(#[from] crate::lagrangian::DescriptionError),
-    /// A value of such a constant that its range does not allow.
+    /// A value of such a parameter outside its range.
     #[error(transparent)]
     System(#[from] crate::lagrangian::SystemError),
-    /// Marks of missing readings that are not one for each position.
+    /// The wrong number of marks of missing readings.
     #[error("missing readings of {track}: expected {expected} marks, one for each position, found {found}")]
     Missing {
         /// The trajectory.
         track: String,
-        /// Its positions.
+        /// Number of its positions.
         expected: usize,
         /// Marks found.
         found: usize,
@@ -144,7 +146,7 @@ pub enum IdentifyError {
     Inputs {
         /// The trajectory.
         track: String,
-        /// Its inputs, those of a sample one behind the other.
+        /// Number of its inputs at all samples.
         expected: usize,
         /// What was found.
         found: String,
@@ -154,13 +156,13 @@ pub enum IdentifyError {
     Errors {
         /// The trajectory.
         track: String,
-        /// Its positions.
+        /// Number of its positions.
         expected: usize,
         /// What was found.
         found: String,
     },
     /// Too few samples.
-    #[error("expected at least {needed} samples in trajectories of three or more, found {found}")]
+    #[error("expected at least {needed} samples in trajectories of at least three, found {found}")]
     Short {
         /// Samples of the trajectories that have three or more.
         found: usize,
@@ -172,9 +174,9 @@ pub enum IdentifyError {
         "the equations of motion cannot be solved at any recorded state with the given constants: the mass matrix is singular, or a term is not finite"
     )]
     Singular,
-    /// The model cannot follow the motion.
+    /// The model cannot be integrated along the motion.
     #[error(
-        "the model follows no part of the recorded motion with the constants found so far: check that the columns are those of the coordinates"
+        "no part of the recorded motion can be integrated with the constants found so far: check that the columns are those of the coordinates"
     )]
     Lost,
 }

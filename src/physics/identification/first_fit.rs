@@ -1,17 +1,17 @@
-//! The fit of the first segments: from smoothed accelerations, or by a search of initial states if coordinates were not measured themselves.
+//! The fit of the first segments. It starts from a fit to smoothed accelerations, or from a search of initial states if a coordinate was not measured.
 
 use super::initial_states::Search;
 use super::pieces::Pieces;
 use super::smoothed::States;
 use super::solve::Problem;
-use super::stages::{Fitted, first, first_samples};
+use super::stages::{Fitted, first_samples, fit_first_segments};
 use super::{IdentifyError, IdentifyOptions};
 use crate::lagrangian::SystemInstance;
 
-/// A fit of the first segments, and constants by their places that were searched in a part of their range.
+/// A fit of the first segments, and the constants, by index, whose range was searched only in part.
 type FirstFit = (Fitted, Vec<(usize, [f64; 2])>);
 
-/// The fit of the first segments from given constants; `on_pieces` is the problem of the pieces alone.
+/// Fits the first segments, starting at the given constants; `on_pieces` is the problem of the long pieces alone.
 pub(super) fn first_fit<'b>(
     problem: &mut Problem<'b>,
     (on_pieces, pieces): (&Problem<'_>, &Pieces<'b>),
@@ -34,7 +34,7 @@ pub(super) fn first_fit<'b>(
     Ok((Search { problem, pieces, bounds, layout }.first(given)?, Vec::new()))
 }
 
-/// The fit of the first segments from constants that are fitted to smoothed accelerations.
+/// Fits the first segments, starting at constants that are fitted to smoothed accelerations.
 fn from_smoothed(
     problem: &mut Problem<'_>,
     (on_pieces, states, pieces): (&Problem<'_>, &States, &Pieces<'_>),
@@ -55,5 +55,5 @@ fn from_smoothed(
     if let Some(measured) = problem.measured {
         segments.iter_mut().for_each(|segment| segment.start = measured.state(&segment.start, &[]));
     }
-    Ok((first(problem, [x, given.to_vec()], segments)?, cut))
+    Ok((fit_first_segments(problem, [x, given.to_vec()], segments)?, cut))
 }

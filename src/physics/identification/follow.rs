@@ -1,4 +1,4 @@
-//! Integrates many segments side by side, with derivatives by initial states and constants.
+//! Integrates many segments side by side, with derivatives by initial states and constants. Each segment is a lane of a batch.
 
 use super::Between;
 use super::closed::Closed;
@@ -8,7 +8,7 @@ use crate::recording::{RecordedTrajectory, Recording};
 use crate::tape::Replay;
 use std::sync::Arc;
 
-/// Samples that are followed from one initial state.
+/// Successive samples of a trajectory that are fitted by one motion, with its own initial state.
 #[derive(Clone, Debug)]
 pub(crate) struct Segment {
     pub track: usize,
@@ -19,22 +19,22 @@ pub(crate) struct Segment {
     pub start: Vec<f64>,
 }
 
-/// What is integrated: the recorded times and forces, and the equations.
+/// Everything that the integration needs: the recorded times and forces, and the equations.
 #[derive(Clone, Debug)]
 pub(crate) struct Course<'a> {
     pub recording: &'a Recording,
     pub equations: &'a Equations,
-    /// Constants by which derivatives are taken.
+    /// Number of constants by which derivatives are taken.
     pub chosen: usize,
     pub between: Between,
-    /// Inputs of every track; none if there are none.
+    /// Inputs of every trajectory; empty for a system without inputs.
     pub inputs: Vec<Inputs<'a>>,
-    /// Usual step between samples in s, and integration steps in it.
+    /// Typical step between samples in s, and number of integration steps in it.
     pub step: f64,
     pub substeps: usize,
 }
 
-/// Measured functions of the time on which the forces of a track depend.
+/// Measured functions of the time on which the forces depend.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inputs<'a> {
     /// Times of the samples.
@@ -44,7 +44,7 @@ pub(crate) struct Inputs<'a> {
 }
 
 impl Course<'_> {
-    /// Writes what is known at a time of a track: the time, then inputs.
+    /// Writes the known functions at a time of a trajectory: the time itself, then the inputs.
     pub(super) fn known(&self, track: usize, t: f64, into: &mut [f64]) {
         into[0] = t;
         let Some(Inputs { times, values }) = self.inputs.get(track) else { return };
@@ -60,7 +60,7 @@ impl Course<'_> {
     }
 }
 
-/// States of all lanes with derivatives: `(lanes, n)` and `(lanes, n, columns)`.
+/// States of all lanes, `(lanes, n)`, with derivatives, `(lanes, n, columns)`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
     pub q: Vec<f64>,
@@ -75,7 +75,7 @@ impl State {
         Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
     }
 
-    /// Derivatives of positions and velocities by the initial states, `(lanes, 2n, starts)`, taken from derivatives with `columns` numbers.
+    /// Derivatives of positions and velocities by the initial states, `(lanes, 2n, starts)`: the first of `columns` derivatives.
     pub fn by_starts(&self, n: usize, (starts, columns): (usize, usize)) -> Vec<f64> {
         let lane = |(q, v): (&[f64], &[f64])| {
             let rows = q.chunks_exact(columns).chain(v.chunks_exact(columns));
@@ -85,7 +85,7 @@ impl State {
         lanes.flat_map(lane).collect()
     }
 
-    /// Derivatives at the beginning of segments under constraints, by their tangents.
+    /// Sets the derivatives at the beginning of segments under constraints: the tangents of the constraints.
     fn begin_within(&mut self, n: usize, columns: usize, tangents: &[Tangent]) {
         for (lane, Tangent { free, following }) in tangents.iter().enumerate() {
             let directions = free.chunks_exact(2 * n).chain(following.chunks_exact(2 * n));
@@ -98,8 +98,8 @@ impl State {
         }
     }
 
-    /// `from` advanced by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
-    fn moved(&mut self, from: &Self, (h, widths): (&[f64], [usize; 2]), along: &Self) {
+    /// Sets the state to `from + h along`, with `h` of each lane; `widths` are the numbers of a lane in states and derivatives.
+    fn set_step(&mut self, from: &Self, (h, widths): (&[f64], [usize; 2]), along: &Self) {
         let [n, columns] = widths;
         add(&mut self.q, &from.q, (h, n), &along.q);
         add(&mut self.v, &from.v, (h, n), &along.v);
@@ -118,7 +118,7 @@ fn add(to: &mut [f64], from: &[f64], (h, width): (&[f64], usize), slope: &[f64])
     }
 }
 
-/// Buffers of one thread.
+/// Evaluates and integrates the equations of motion of many states side by side, with reused buffers.
 pub(super) struct Follower<'a> {
     course: &'a Course<'a>,
     motion: Replay<f64>,
@@ -129,10 +129,10 @@ pub(super) struct Follower<'a> {
     rest: Vec<f64>,
     by_state: Vec<f64>,
     force: Vec<f64>,
-    /// The time and inputs of the states, `(lanes, known)`, as far as the equations depend on them.
+    /// Known functions of the time at the states, `(lanes, known)`; empty if the equations do not depend on them.
     known: Vec<f64>,
     row: Vec<f64>,
-    /// Of systems under constraints.
+    /// Constraints, for systems that have some.
     closed: Option<Closed>,
 }
 
@@ -155,7 +155,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Sets tracks and times of the states that are evaluated next; without them states are spread over the recording.
+    /// Sets trajectories and times of the states that are evaluated next. If they are not set, the states are spread over the recording.
     pub fn at(&mut self, places: impl Iterator<Item = (usize, f64)>) {
         let (course, count) = (self.course, self.course.equations.known);
         if count > 0 {
@@ -167,7 +167,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Spreads states over the recording if their times are not known.
+    /// Spreads the states over the recording if their times are not set.
     fn spread_times(&mut self, lanes: usize) {
         let (course, count) = (self.course, self.course.equations.known);
         if self.known.len() != lanes * count {
@@ -193,8 +193,8 @@ impl<'a> Follower<'a> {
         self.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len())
     }
 
-    /// What a unit of force on each coordinate accelerates at the states evaluated last, `(lanes, n, n)`: the inverse of the mass matrix without
-    /// constraints. `NaN` where there is none.
+    /// Accelerations by a unit force on each coordinate at the states evaluated last, `(lanes, n, n)`; without constraints, the inverse of the mass matrix.
+    /// `NaN` if it is singular.
     pub fn mobility(&self) -> Vec<f64> {
         if let Some(closed) = &self.closed {
             return closed.mobility();
@@ -204,7 +204,7 @@ impl<'a> Follower<'a> {
         inverse
     }
 
-    /// Accelerations of states under forces, `(lanes, n)` each, forces empty for none; `NaN` where they have no solution.
+    /// Accelerations of states under forces, `(lanes, n)` each; `force` may be empty. `NaN` if the equations have no solution.
     pub fn accelerate(&mut self, values: &[f64], (q, v): (&[f64], &[f64]), force: &[f64], a: &mut [f64]) {
         let n = self.course.equations.n;
         let lanes = q.len() / n;
@@ -228,8 +228,8 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// The known forces minus those that the accelerations need, `Q + h - M a`, at the states evaluated last: `(lanes, n)`.
-    pub fn lacking_forces(&self, a: &[f64], into: &mut [f64]) {
+    /// The force residuals `Q + h - M a` at the states evaluated last, `(lanes, n)`: forces minus mass times acceleration.
+    pub fn unbalanced_forces(&self, a: &[f64], into: &mut [f64]) {
         let n = self.course.equations.n;
         let rows = self.mass.chunks_exact(n).zip(&self.rest).zip(into).enumerate();
         rows.for_each(|(at, ((row, rest), into))| *into = rest - linalg::dot(row, &a[at / n * n..][..n]));
@@ -246,14 +246,14 @@ impl<'a> Follower<'a> {
         &self.by_state
     }
 
-    /// Slopes of the accelerations found last by positions, velocities and constants: `(lanes, n, 2n + chosen)`.
+    /// Derivatives of the accelerations found last by positions, velocities and constants: `(lanes, n, 2n + chosen)`.
     pub fn slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
         let n = self.course.equations.n;
         let (lanes, width) = (q.len() / n, 2 * n + self.course.chosen);
         self.force_slopes(values, (q, v, a));
         let closed = self.closed.as_mut().map(|closed| closed.slopes(values, [q, v, a], &self.by_state));
         let matrices = closed.map_or(&self.mass[..], |(_, matrices)| matrices);
-        // Coordinates and constraints.
+        // Number of coordinates and constraints.
         let k = (matrices.len() / lanes.max(1)).isqrt();
         self.inverse.resize(matrices.len(), 0.0);
         if k == 1 {
@@ -276,7 +276,7 @@ impl<'a> Follower<'a> {
         &self.by_state
     }
 
-    /// The rate of change of a state: velocities and accelerations, with those of the derivatives.
+    /// The rate of change of a state and of its derivatives.
     fn rate(&mut self, values: &[f64], at: &State, columns: usize, rate: &mut State) {
         let n = self.course.equations.n;
         let force = std::mem::take(&mut self.force);
@@ -306,8 +306,9 @@ impl<'a> Follower<'a> {
         rate.v = a;
     }
 
-    /// Integrates segments, longest first, and calls `visit` with every sample, counted from the first of each segment, and the states of all
-    /// lanes; ignore those of segments that have ended. With `derivatives` by initial states and constants, `starts + chosen` columns.
+    /// Integrates segments, longest first, and calls `visit` with every sample, counted from the first of each segment, and the states of all lanes.
+    /// States of segments that have ended must be ignored. With `derivatives`, the states have `starts + chosen` of them, by initial states and
+    /// constants.
     pub fn follow(
         &mut self,
         values: &[f64],
@@ -370,7 +371,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// A step of Runge and Kutta's method by `h` of each lane; `push` fills in the known forces, the times and inputs at a share of the step.
+    /// A step of the classical Runge-Kutta method by `h` of each lane; `push` fills in the known forces, times and inputs at a share of the step.
     fn advance(
         &mut self,
         (values, columns): (&[f64], usize),
@@ -390,19 +391,19 @@ impl<'a> Follower<'a> {
             match k {
                 0 => self.rate(values, now, columns, &mut rest[0]),
                 _ => {
-                    stage.moved(now, (if k == 3 { h } else { &half }, widths), &before[k - 1]);
+                    stage.set_step(now, (if k == 3 { h } else { &half }, widths), &before[k - 1]);
                     self.rate(values, stage, columns, &mut rest[0]);
                 }
             }
         }
         for (rate, weight) in rates.iter().zip([1.0, 2.0, 2.0, 1.0]) {
             std::mem::swap(stage, now);
-            now.moved(stage, (&part(weight / 6.0), widths), rate);
+            now.set_step(stage, (&part(weight / 6.0), widths), rate);
         }
     }
 
-    /// Integrates the states of segments from a sample over a time that may be negative, with their derivatives, from sample to sample, so that
-    /// the known forces of each interval apply.
+    /// Integrates the states of segments, with their derivatives, from a sample over a time that may be negative. The integration goes from sample to
+    /// sample, so that the known forces of each interval apply.
     pub fn shifted(
         &mut self,
         values: &[f64],
@@ -423,8 +424,8 @@ impl<'a> Follower<'a> {
         };
         let mut places: Vec<(f64, f64)> = segments.iter().zip(&tracks).map(of).collect();
         while places.iter().any(|(_, left)| left.abs() > 0.0) {
-            // The interval of each lane and the direction in it.
-            let way = |((now, left), track): (&(f64, f64), &&RecordedTrajectory)| {
+            // For each lane the end of its interval, the time to integrate, and the time that is reached.
+            let interval = |((now, left), track): (&(f64, f64), &&RecordedTrajectory)| {
                 let (times, last) = (&track.times, track.len() - 1);
                 let end = times.partition_point(|t| if *left < 0.0 { t < now } else { t <= now }).clamp(1, last.max(1));
                 let border = times[if *left < 0.0 { end - 1 } else { end.min(last) }];
@@ -432,10 +433,10 @@ impl<'a> Follower<'a> {
                 let whole = outside || left.abs() <= (border - now).abs();
                 (end, if whole { *left } else { border - now }, if whole { now + left } else { border })
             };
-            let ways: Vec<(usize, f64, f64)> = places.iter().zip(&tracks).map(way).collect();
-            let most = ways.iter().fold(0.0, |most: f64, way| most.max(way.1.abs()));
+            let intervals: Vec<(usize, f64, f64)> = places.iter().zip(&tracks).map(interval).collect();
+            let most = intervals.iter().fold(0.0, |most: f64, interval| most.max(interval.1.abs()));
             let steps = (course.substeps as f64 * most / course.step).ceil().max(1.0);
-            let h: Vec<f64> = ways.iter().map(|way| way.1 / steps).collect();
+            let h: Vec<f64> = intervals.iter().map(|interval| interval.1 / steps).collect();
             for step in 0..steps as usize {
                 self.advance((values, columns), (&h, late), &mut scratch, |share, force, known| {
                     for (lane, known) in known.chunks_exact_mut(course.equations.known.max(1)).enumerate() {
@@ -443,7 +444,7 @@ impl<'a> Follower<'a> {
                         course.known(segments[lane].track, now, known);
                     }
                     for (lane, into) in force.chunks_exact_mut(n).enumerate() {
-                        let (track, end) = (tracks[lane], ways[lane].0.min(tracks[lane].len() - 1));
+                        let (track, end) = (tracks[lane], intervals[lane].0.min(tracks[lane].len() - 1));
                         let before = track.times[end.saturating_sub(1)];
                         let now = places[lane].0 + (step as f64 + share) * h[lane];
                         let length = track.times[end] - before;
@@ -452,14 +453,14 @@ impl<'a> Follower<'a> {
                     }
                 });
             }
-            for (place, (_, gone, now)) in places.iter_mut().zip(ways) {
+            for (place, (_, gone, now)) in places.iter_mut().zip(intervals) {
                 *place = (now, if gone == place.1 { 0.0 } else { place.1 - gone });
             }
         }
     }
 }
 
-/// Intermediate states of steps.
+/// Intermediate states of a Runge-Kutta step.
 struct Scratch {
     stage: State,
     rates: [State; 4],
@@ -471,7 +472,7 @@ impl Scratch {
     }
 }
 
-/// Known forces `(n)` at the share `x` of the interval that ends at a sample; zeros for a trajectory without.
+/// Known forces `(n)` at the share `x` of the interval that ends at a sample; 0 for a trajectory without known forces.
 pub(super) fn forces(track: &RecordedTrajectory, between: Between, (sample, x): (usize, f64), into: &mut [f64]) {
     let n = into.len();
     into.fill(0.0);

@@ -1,4 +1,4 @@
-//! What was identified.
+//! The result of an identification.
 
 use super::by_trajectory::ByTrajectory;
 use super::follow::Segment;
@@ -14,14 +14,14 @@ pub struct Constant {
     pub symbol: String,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the motion does not determine it, and its value is then the starting value, and none where the search
-    /// stopped farther from the best constants than their errors.
+    /// Its standard error. `None` if the motion does not determine it, and its value is then the starting value; also if the search stopped farther
+    /// from the best constants than their errors.
     pub standard_error: Option<f64>,
     /// Its unit.
     pub unit: String,
     /// The value it started with.
     pub start: f64,
-    /// `true` if it lies at a bound of its range and the data would be fitted better beyond it: its error is then not symmetric.
+    /// `true` if it lies at a bound of its range and the fit would be better beyond it. Its error is then not symmetric.
     pub at_bound: bool,
 }
 
@@ -34,37 +34,37 @@ pub struct SensorConstant {
     pub coordinate: String,
     /// Its value.
     pub value: f64,
-    /// Its standard error; none where the motion does not determine it.
+    /// Its standard error; `None` if the motion does not determine it.
     pub standard_error: Option<f64>,
 }
 
 impl SensorConstant {
-    /// Its kind and coordinate: `"offset of q1"`.
+    /// Its kind and coordinate, such as `"offset of q1"`.
     pub fn name(&self) -> String {
         format!("{} of {}", self.kind, self.coordinate)
     }
 }
 
-/// Constants that the motion does not determine, alone or together.
+/// Constants that the motion does not determine individually.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Undetermined {
     /// The constants.
     pub constants: Vec<String>,
-    /// Relative change of each constant along each open direction, the largest 1: `(directions, constants)`. A constant is compared with its
-    /// value or its start, whichever is larger.
+    /// Relative change of each constant along each direction that the motion leaves open, `(directions, constants)`; the largest is 1. Changes are relative
+    /// to the value or the start of a constant, whichever is larger.
     pub directions: Vec<Vec<f64>>,
-    /// Combinations that are nevertheless determined, each confirmed by moving the constants by a factor of two along every direction and
-    /// fitting the others again.
+    /// Combinations that are determined nevertheless. Each is confirmed by moving the constants by a factor of two along every direction and fitting the
+    /// others again.
     pub known: Vec<Combination>,
-    /// Largest standard error along a direction, relative to the values; none where the motion does not depend on a direction at all.
+    /// Largest standard error along a direction, relative to the values; `None` if the motion does not depend on a direction at all.
     pub relative_error: Option<f64>,
-    /// What is not determined, in words.
+    /// Describes what is not determined.
     pub text: String,
-    /// What would determine it, in words.
+    /// Advice on how to determine it.
     pub cure: String,
 }
 
-/// A sum or a product of powers of constants that is determined although they are not, such as a base parameter of a robot.
+/// A sum, or a product of powers, that is determined although its constants are not, such as a base parameter of a robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Combination {
     /// Its formula, such as `c1/(g^2*m1)` or `m1 + 0.5*m2`.
@@ -78,7 +78,7 @@ pub struct Combination {
     pub value: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// Its unit; empty where it has none.
+    /// Its unit; empty if it has none.
     pub unit: String,
 }
 
@@ -100,20 +100,20 @@ fn as_object<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S:
     serializer.collect_map(pairs.iter().map(|(name, x)| (name, x)))
 }
 
-/// How the inertias of a chain of links became those of bodies: positive masses and positive definite pseudo-inertias
+/// How the inertias of a chain of links were made physical, with positive masses and positive definite pseudo-inertias
 /// `[[tr(I)/2 E - I, h], [h', m]]` (Wensing, Kim and Slotine, "Linear matrix inequalities for physically consistent inertial parameter
 /// identification", 2018).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bodies {
-    /// Links whose constants had to be moved, from 1.
+    /// Links whose constants had to be changed, counted from 1.
     pub moved: Vec<usize>,
-    /// Largest change of a determined sum that this causes, in standard errors of the sum.
+    /// Largest resulting change of a determined sum, in its standard errors.
     pub largest_change: f64,
-    /// `false` if no physical bodies have the determined sums within their errors, or none have the given constants.
+    /// `false` if no rigid bodies match the determined sums within their errors, or the given constants.
     pub exist: bool,
 }
 
-/// The residual of one coordinate, of its motion or of the force on it. Neighbouring force equations are averaged first.
+/// The residual of one coordinate: of its position, or of the force on it, averaged over neighbouring samples.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residual {
     /// The coordinate.
@@ -124,13 +124,14 @@ pub struct Residual {
     pub noise: f64,
     /// Standard deviation of the fitted quantity: the positions or the forces.
     pub spread: f64,
-    /// Autocorrelation of the residuals beyond what the initial state of a segment causes; that of white noise is 0.
+    /// Autocorrelation of the innovations at lag 1; that of white noise is 0. Innovations are residuals minus their prediction from earlier ones, so that
+    /// fitted initial states do not correlate them.
     pub autocorrelation: f64,
-    /// `true` if the residuals are independent, tested over all lags together at a level of 1 %.
+    /// `true` if a joint test over 20 lags finds no autocorrelation at the level of 1 %.
     pub white: bool,
 }
 
-/// A sample far from the motion.
+/// A sample far from the fitted motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outlier {
     /// Index of the trajectory.
@@ -147,32 +148,32 @@ pub struct Outlier {
     pub time: f64,
     /// The coordinate.
     pub coordinate: String,
-    /// Residual over the typical one.
+    /// Its residual over the typical one.
     pub size: f64,
 }
 
-/// Correlations of the errors of constants, then of sensors; 0 for those without an error.
+/// Correlations of the errors of constants, then of sensor constants; 0 for those without a standard error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Correlations {
     /// Symbols of the constants, and `"offset of q1"` and the like.
     pub names: Vec<String>,
-    /// One row for each.
+    /// The matrix, one row for each name.
     pub matrix: Vec<Vec<f64>>,
 }
 
-/// Measured numbers and their residuals at successive samples of a trajectory: positions, or the known forces where these were fitted.
+/// Measured positions, or known forces if these were fitted, with their residuals at successive samples of a trajectory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResidualPath {
     /// Times in s, `(samples)`.
     pub times: Vec<f64>,
-    /// What was measured, in SI, `(samples, n)`.
+    /// Measured values in SI units, `(samples, n)`.
     pub measured: Vec<f64>,
-    /// Measured minus fitted, in SI, `(samples, n)`; `NaN` where nothing was fitted.
+    /// Measured minus fitted values in SI units, `(samples, n)`; `NaN` at missing readings.
     pub residuals: Vec<f64>,
 }
 
 impl ResidualPath {
-    /// Positions of a segment and their residuals, which are in units of the noise: `noise` by sample of the trajectory and coordinate.
+    /// From the residuals of a segment in units of the noise; `noise` gives this by sample of the trajectory and coordinate.
     pub(crate) fn of(
         recording: &Recording,
         segment: &Segment,
@@ -190,7 +191,7 @@ impl ResidualPath {
     }
 }
 
-/// Constants with their standard errors, and how far these can be trusted.
+/// Identified constants with their standard errors, and the verdict on the model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Identified {
     /// The constants that were unknown, in the order of the system; in JSON an object by symbol.
@@ -198,60 +199,60 @@ pub struct Identified {
     pub constants: Vec<Constant>,
     /// Constants of sensors.
     pub sensors: Vec<SensorConstant>,
-    /// How the errors are correlated.
+    /// Correlations of the errors.
     pub correlations: Correlations,
     /// Constants that the motion does not determine.
     pub undetermined: Vec<Undetermined>,
-    /// Sums of constants that are determined, if forces are fitted and are linear in the constants.
+    /// Determined sums of constants, if forces are fitted that are linear in the constants.
     pub combinations: Vec<Combination>,
-    /// How the inertias were made physical; none for a system that is not a chain of links.
+    /// How the inertias were made physical; `None` for a system that is not a chain of links.
     pub bodies: Option<Bodies>,
     /// Residuals by coordinate.
     pub residuals: Vec<Residual>,
-    /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
+    /// Root mean square over all coordinates of the residual over the noise, as given or as estimated before the fit.
     pub over_noise: f64,
-    /// `true` if residuals beyond three standard deviations counted linearly.
+    /// `true` if the fit was robust: residuals beyond three standard deviations counted linearly.
     pub robust: bool,
-    /// Obstacles to read first: coordinates that stand still, forces that are not known well enough between the samples.
+    /// Messages about the data: coordinates that stand still, repeated or missing readings, forces that the interpolation leaves uncertain.
     pub obstacles: Vec<String>,
-    /// `true` if the search converged; if not, the constants are where it stopped.
+    /// `true` if the search converged; otherwise, the constants are those at which it stopped.
     pub converged: bool,
     /// The Newton decrement: the decrease of the sum of squares that another step would bring, over the variance of the noise.
     pub decrement: f64,
-    /// Whether the model fits the recording, and if not, why; in JSON also in words, as `says`.
+    /// Whether the model fits the recording, and if not, why; JSON also has the text, as `says`.
     #[serde(serialize_with = "in_words")]
     pub verdict: Verdict,
-    /// `true` if it does: [`Verdict::explains`].
+    /// `true` if the model fits: [`Verdict::explains`].
     pub explained: bool,
-    /// Samples far from the motion, the farthest first, 100 at most.
+    /// Samples far from the fitted motion, the farthest first, at most 100.
     pub outliers: Vec<Outlier>,
-    /// Number of all of them.
+    /// Number of all samples far from the fitted motion.
     pub outlier_count: usize,
-    /// Mean factor by which variances of the unknowns are larger than those of independent residuals of the same size.
+    /// Mean factor by which the variances of the unknowns exceed those of independent residuals of the same size.
     pub inflation: f64,
-    /// Standard deviation of the noise of the known force on every coordinate, estimated from the motion; empty if none is visible.
+    /// Standard deviation of the noise of the known force on every coordinate, estimated from the motion; empty if no noise is detected.
     pub force_noise: Vec<f64>,
-    /// Samples whose motion was followed, or whose forces were fitted.
+    /// Number of samples whose motion or forces were fitted.
     pub samples: usize,
-    /// Number of segments; none if forces were fitted.
+    /// Number of segments; 0 if forces were fitted.
     pub segments: usize,
     /// Length of a typical segment in s.
     pub segment_seconds: f64,
-    /// Integration steps from sample to sample.
+    /// Number of integration steps between samples.
     pub substeps: usize,
-    /// Interpolation of known forces between the samples; none without forces.
+    /// Interpolation of known forces and inputs between the samples; `None` without them.
     pub between: Option<Between>,
-    /// The constants by every trajectory alone, if that was asked for.
+    /// The constants of every trajectory alone, if requested.
     pub by_trajectory: Option<ByTrajectory>,
-    /// What was fitted, stretch by stretch, for pictures.
+    /// The fitted quantity with its residuals, by segment, for figures.
     #[serde(skip)]
     pub paths: Vec<ResidualPath>,
 }
 
 impl Identified {
-    /// The same with the names of trajectories; rows are samples, counted from 1. Where the search stopped far from the best constants, it says
-    /// nothing of errors and of what is determined.
-    pub(super) fn named(mut self, recording: &Recording, robust: bool) -> Self {
+    /// Adds the names of trajectories, and rows as samples counted from 1. If the search stopped far from the best constants, removes the standard
+    /// errors and all statements about what is determined.
+    pub(super) fn finished(mut self, recording: &Recording, robust: bool) -> Self {
         self.robust = robust;
         if !self.converged && (self.decrement.is_nan() || self.decrement >= NEAR_DECREMENT) {
             self.constants.iter_mut().for_each(|constant| constant.standard_error = None);
@@ -267,7 +268,7 @@ impl Identified {
         self
     }
 
-    /// The same with the rows of the files that a recording was read from.
+    /// Sets the rows of outliers to those in the files of the recording.
     #[must_use]
     pub fn with_rows_of(mut self, loaded: &LoadedRecording) -> Self {
         for outlier in &mut self.outliers {
@@ -289,7 +290,7 @@ mod tests {
                 Constant { symbol, value: 2.0, standard_error: Some(0.1), unit, start: 1.0, at_bound: false };
             let found = Identified { constants: vec![constant], converged, decrement, ..Identified::default() };
             let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: Vec::new() };
-            found.named(&recording, false).constants[0].standard_error
+            found.finished(&recording, false).constants[0].standard_error
         };
         assert_eq!([stopped(true, 1e-9), stopped(false, 0.01)], [Some(0.1); 2]);
         assert_eq!([stopped(false, 46.0), stopped(false, f64::NAN)], [None; 2]);

@@ -1,6 +1,6 @@
-//! Where the search starts if coordinates were not measured themselves: initial states spread over the bounds of the system are fitted to the
-//! beginning of a trajectory with the constants as given. The best of them are followed, with the constants fitted too, over a part of the
-//! recording that doubles as long as the model follows it; the rest is cut into segments that continue this motion.
+//! Searches initial states if some coordinates were not measured. Initial states are spread over the bounds of the system and fitted to the beginning of
+//! a trajectory, with the constants at their starting values. From the best of them, the constants are fitted too, to a part of the recording that
+//! doubles as long as the model fits. The rest of the recording is divided into segments that continue this motion.
 
 use super::cure::{POSITION, VELOCITY, spread};
 use super::follow::Segment;
@@ -14,21 +14,21 @@ use super::thresholds::{
 use super::{IdentifyError, measured::Measured};
 use crate::lagrangian::system::Bounds;
 
-/// What is said where such a search does not lead to a model that fits.
-pub(super) const SEARCHED: &str = "coordinates that no sensor reads were searched from 64 initial states within their bounds: if the form is right, \
-     narrow bounds and velocity_bounds, or begin nearer to the constants";
+/// The message for a search that does not lead to a model that fits.
+pub(super) const SEARCHED: &str = "some coordinates were not measured, so that 64 initial states within the bounds were tried: if the model is right, \
+     narrow bounds and velocity_bounds, or start closer to the true constants";
 
 /// Searches initial states for the segments of a recording.
 pub(super) struct Search<'a, 'b> {
     pub problem: &'a mut Problem<'b>,
     pub pieces: &'a Pieces<'b>,
     pub bounds: &'a Bounds,
-    /// Segments in order, without initial states.
+    /// The segments in order, without initial states. Their number is the unit of length below.
     pub layout: Vec<Segment>,
 }
 
 impl Measured {
-    /// The initial state that readings give with their rates, `(2, m)`, of the coordinates that they are; what no sensor reads is `otherwise`.
+    /// The initial state with measured coordinates from the readings and their rates, `(2, m)`, and the others from `otherwise`.
     pub fn state(&self, readings: &[f64], otherwise: &[f64]) -> Vec<f64> {
         let (n, m) = (self.sources.len(), self.count());
         let number = |k: usize| match self.sources[k % n] {
@@ -48,42 +48,42 @@ impl Search<'_, '_> {
         if self.layout.is_empty() {
             return Err(IdentifyError::Lost);
         }
-        // The longest trajectory tells most about the constants.
+        // The longest trajectory determines the constants best.
         self.layout.sort_by_key(|segment| (Some(segment.track) != longest, segment.track, segment.first));
         let candidates = self.candidates(given, 0);
         let (mut best, mut farthest): (Option<Fitted>, usize) = (None, 0);
-        let ways = [SEGMENTS_BEFORE_CONSTANTS, 1]
+        let attempts = [SEGMENTS_BEFORE_CONSTANTS, 1]
             .into_iter()
             .flat_map(|units| candidates.iter().map(move |start| (start, units)));
-        for (start, units) in ways {
+        for (start, units) in attempts {
             self.problem.cancellation.check()?;
-            let Some((tried, reach)) = self.beginning(given, start.clone(), units) else { continue };
+            let Some((tried, reach)) = self.fit_beginning(given, start.clone(), units) else { continue };
             let (x, square) = (&tried.x, tried.mean_square());
             tracing::debug!(?x, ?start, units, reach, square, "initial state");
             let better = |best: &Fitted| reach > farthest || reach == farthest && square < best.mean_square();
             if best.as_ref().is_none_or(better) {
                 (best, farthest) = (Some(tried), reach);
             }
-            if farthest >= ENOUGH_SEGMENTS.min(self.run(0)) {
+            if farthest >= ENOUGH_SEGMENTS.min(self.adjacent(0)) {
                 break;
             }
         }
         let best = best.ok_or(IdentifyError::Lost)?;
-        self.along(best, farthest.max(1)).ok_or(IdentifyError::Lost)
+        self.fit_rest(best, farthest.max(1)).ok_or(IdentifyError::Lost)
     }
 
-    /// Number of segments that follow each other without a gap from one on.
-    fn run(&self, at: usize) -> usize {
+    /// Number of segments without a gap between them, from a given one on.
+    fn adjacent(&self, at: usize) -> usize {
         let adjacent = |a: &Segment, b: &Segment| a.track == b.track && a.first + a.samples == b.first;
         self.layout[at..].chunk_by(adjacent).next().map_or(0, <[Segment]>::len)
     }
 
-    /// Samples of so many segments from one on, as far as they follow each other.
+    /// Number of samples in `units` segments from a given one on, up to the next gap.
     fn samples(&self, at: usize, units: usize) -> usize {
-        self.layout[at..at + units.min(self.run(at))].iter().map(|segment| segment.samples).sum()
+        self.layout[at..at + units.min(self.adjacent(at))].iter().map(|segment| segment.samples).sum()
     }
 
-    /// Initial states of a segment that fit it best, the best first.
+    /// The initial states that fit a segment best, the best first.
     fn candidates(&mut self, x: &[f64], at: usize) -> Vec<Segment> {
         let Some(measured) = self.problem.measured else { return Vec::new() };
         let (n, segment) = (self.problem.n(), &self.layout[at]);
@@ -106,7 +106,7 @@ impl Search<'_, '_> {
         tried
     }
 
-    /// Those of the segments with different sums of squares that fit best, the best first.
+    /// Ranks segments by their sums of squares and removes duplicates; the best first, at most `most`.
     fn ranked(&self, x: &[f64], segments: Vec<Segment>, most: usize) -> Vec<Segment> {
         let squares = self.problem.all(x, &segments).into_iter().map(|linear| linear.map(|linear| linear.square));
         let mut ranked: Vec<(f64, Segment)> = squares.zip(segments).filter_map(|(a, b)| Some((a?, b))).collect();
@@ -115,25 +115,25 @@ impl Search<'_, '_> {
         ranked.into_iter().take(most).map(|(_, segment)| segment).collect()
     }
 
-    /// The fit of constants and an initial state to a beginning, at first of so many units, that doubles while the model follows it, and
-    /// the units that it follows.
-    fn beginning(&mut self, given: &[f64], start: Segment, units: usize) -> Option<(Fitted, usize)> {
+    /// Fits constants and an initial state to the first `units` segments, and doubles their number as long as the model fits. Returns the fit, and the
+    /// number of segments that it covers.
+    fn fit_beginning(&mut self, given: &[f64], start: Segment, units: usize) -> Option<(Fitted, usize)> {
         let (mut fitted, mut reach) = (None, 0);
         let (mut x, mut segments, mut units) = (given.to_vec(), vec![start], units);
         loop {
-            units = units.min(self.run(0));
+            units = units.min(self.adjacent(0));
             segments[0].samples = self.samples(0, units);
             self.problem.settle(&x, &mut segments, SEARCH_ROUNDS);
             choose_steps(self.problem, &x, &segments);
             let mut tried = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
             refit(self.problem, &mut tried, ITERATIONS);
-            let follows = tried.normal.failed == 0 && tried.mean_square() < MOST_CONTINUED_SQUARE;
+            let fits = tried.normal.failed == 0 && tried.mean_square() < MOST_CONTINUED_SQUARE;
             let fails = tried.normal.failed > 0 || !tried.mean_square().is_finite();
             (x, segments) = (tried.x.clone(), tried.segments.clone());
-            if follows || fitted.is_none() && !fails {
-                (fitted, reach) = (Some(tried), if follows { units } else { 0 });
+            if fits || fitted.is_none() && !fails {
+                (fitted, reach) = (Some(tried), if fits { units } else { 0 });
             }
-            if !follows || units == self.run(0) || self.problem.cancellation.is_cancelled() {
+            if !fits || units == self.adjacent(0) || self.problem.cancellation.is_cancelled() {
                 break;
             }
             units *= 2;
@@ -141,13 +141,13 @@ impl Search<'_, '_> {
         Some((fitted?, reach))
     }
 
-    /// The fit of all segments, of up to so many units, by a motion that begins as that of the first one.
-    fn along(&mut self, mut fitted: Fitted, reach: usize) -> Option<Fitted> {
+    /// Fits all segments, of up to `reach` units each, starting with the motion of the first one.
+    fn fit_rest(&mut self, mut fitted: Fitted, reach: usize) -> Option<Fitted> {
         let first = fitted.segments.first()?.samples;
         let mut at = (1..=self.layout.len()).find(|units| self.samples(0, *units) >= first).unwrap_or(1);
         let mut due = 2;
         while at < self.layout.len() && !self.problem.cancellation.is_cancelled() {
-            let (next, units) = self.next(&fitted, at, reach)?;
+            let (next, units) = self.next_segment(&fitted, at, reach)?;
             fitted.segments.push(next);
             at += units;
             if fitted.segments.len() >= due && at < self.layout.len() {
@@ -160,27 +160,27 @@ impl Search<'_, '_> {
         Some(fitted)
     }
 
-    /// The segment from a place of the layout on, of as many units as it is followed, at most `reach`: its motion continues the one before
-    /// where it can.
-    fn next(&mut self, fitted: &Fitted, at: usize, reach: usize) -> Option<(Segment, usize)> {
+    /// The segment from a place of the layout on, of as many units as the model fits, at most `reach`. Its motion continues the previous segment if
+    /// possible.
+    fn next_segment(&mut self, fitted: &Fitted, at: usize, reach: usize) -> Option<(Segment, usize)> {
         let (last, own) = (fitted.segments.last()?, &self.layout[at]);
         let mut next = None;
         if last.track == own.track && last.first < own.first {
             let longer = Segment { samples: own.first - last.first + 1, ..last.clone() };
             let start = self.problem.ends(&fitted.x, &[&longer]).pop()?;
-            next = self.settled(&fitted.x, Segment { start, ..own.clone() });
+            next = self.with_fitted_start(&fitted.x, Segment { start, ..own.clone() });
         }
         let (mut segment, mut square) = match next {
             Some(next) => next,
             None => {
                 let best = self.candidates(&fitted.x, at).into_iter().next()?;
-                self.settled(&fitted.x, Segment { start: best.start, ..self.layout[at].clone() })?
+                self.with_fitted_start(&fitted.x, Segment { start: best.start, ..self.layout[at].clone() })?
             }
         };
-        let (mut units, most) = (1, reach.min(self.run(at)));
+        let (mut units, most) = (1, reach.min(self.adjacent(at)));
         while units < most {
             let samples = self.samples(at, (2 * units).min(most));
-            let Some(longer) = self.settled(&fitted.x, Segment { samples, ..segment.clone() }) else { break };
+            let Some(longer) = self.with_fitted_start(&fitted.x, Segment { samples, ..segment.clone() }) else { break };
             if longer.1 > MOST_CONTINUED_SQUARE.max(square) {
                 break;
             }
@@ -189,8 +189,8 @@ impl Search<'_, '_> {
         Some((segment, units))
     }
 
-    /// A segment with its initial state fitted, and the mean square; `None` if it cannot be followed.
-    fn settled(&self, x: &[f64], segment: Segment) -> Option<(Segment, f64)> {
+    /// A segment with its initial state fitted, and its mean square; `None` if it cannot be integrated.
+    fn with_fitted_start(&self, x: &[f64], segment: Segment) -> Option<(Segment, f64)> {
         let mut segments = [segment];
         self.problem.settle(x, &mut segments, SEARCH_ROUNDS);
         let linear = self.problem.all(x, &segments).pop()??;

@@ -1,10 +1,10 @@
-//! Whitens residuals by a Kalman filter along each segment.
+//! A Kalman filter along each segment, which whitens the residuals.
 //!
-//! An error of a known force moves the motion from there on, so that the residuals of positions are correlated however long the segment is.
-//! In terms of the segment's start the filter is simple: with `P = d(q, v)/d(start)` at a sample, an error `e` of the force over an interval
-//! `h` is the change `P^-1 (0, M^-1 e h)` of the start. The deviation of the start is thus a random walk that every measured position sees by its
-//! row of `P`, and the filter passes residuals and all their slopes through the same linear map, which whitens them: least squares on
-//! what comes out are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 7.3).
+//! An error of a known force changes all later motion, so that the residuals of positions are correlated along the whole segment. In terms of the
+//! initial state of the segment the filter is simple: with `P = d(q, v)/d(start)` at a sample, an error `e` of the force over an interval
+//! `h` acts like the change `P^-1 (0, M^-1 e h)` of the initial state. The deviation of the initial state is thus a random walk, which every position
+//! measures through its row of `P`. The filter passes the residuals and all their derivatives through the same linear map, which whitens them, so
+//! that least squares on its output are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 7.3).
 
 use super::covariance::Root;
 use super::follow::Segment;
@@ -16,31 +16,32 @@ use super::thresholds::{
 use crate::linalg::dot;
 use crate::recording::smooth::noise;
 
-/// Disturbances of the motion that the equations do not contain.
+/// Random disturbances of the motion that the equations do not contain.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Disturbances {
-    /// Standard deviation of the noise of every known force; empty for forces that are exact.
+    /// Standard deviation of the noise of every known force; empty if the forces are exact.
     pub force: Vec<f64>,
-    /// Given if the filter does not know the initial states: innovations of a correct model are then independent, and those that depend on the
-    /// initial state are `NaN`. Innovations beyond so many standard deviations are outliers, also `NaN`, and do not update the filter.
+    /// Set if the filter treats the initial states as unknown: innovations of a right model are then independent, and those that mainly depend on the
+    /// initial state are `NaN`. The value is the number of standard deviations from which an innovation is an outlier, which is `NaN`, too, and does
+    /// not update the filter.
     pub unknown_start: Option<f64>,
-    /// Variances of unknown initial states by lane, `(2n, 2n)`; empty for those that positions give them.
-    pub vague: Vec<Vec<f64>>,
+    /// Variances of unknown initial states by lane, `(2n, 2n)`; empty if positions were measured, which determine them.
+    pub start_variances: Vec<Vec<f64>>,
 }
 
 /// The filter of one segment.
 pub(super) struct Filter {
     unknown_start: Option<f64>,
-    /// Variance of the start, `(starts, starts)`.
+    /// Covariance of the initial state, `(starts, starts)`.
     variance: Vec<f64>,
-    /// Expected deviation of the initial state, of residuals and of each of their slopes: `(1 + width, starts)`.
+    /// Expected deviation of the initial state, from the residuals and from each of their derivatives: `(1 + width, starts)`.
     expected: Vec<Vec<f64>>,
     /// Sum of the logarithms of the variances of innovations over those of the noise.
     pub log_variance: f64,
 }
 
 impl Filter {
-    /// Passes a residual and its slopes, the first `starts` of them by the initial state, through the filter; returns the innovation.
+    /// Filters a residual and its derivatives, the first `starts` of them by the initial state; returns the innovation.
     pub fn pass(&mut self, residual: f64, row: &mut [f64]) -> f64 {
         let size = self.expected[0].len();
         let slopes = row[..size].to_vec();
@@ -64,7 +65,7 @@ impl Filter {
         if self.unknown_start.is_some() && variance > MOST_INNOVATION_VARIANCE { f64::NAN } else { innovation }
     }
 
-    /// Adds the effect of force errors to the initial state, each by one row of `(n, starts)`.
+    /// Adds the variance that force errors cause in the initial state, each by one row of `(n, starts)`.
     pub fn disturb(&mut self, impulses: &[f64]) {
         let size = self.expected[0].len();
         for impulse in impulses.chunks_exact(size) {
@@ -76,11 +77,11 @@ impl Filter {
 }
 
 impl Problem<'_> {
-    /// Estimates the noise of the known forces by the likelihood of the innovations, up to the noise of neighbouring samples; `true` if the
-    /// estimate changes.
+    /// Estimates the noise of the known forces by maximum likelihood of the innovations, bounded by the noise that neighbouring samples show; `true` if
+    /// the estimate changes.
     ///
-    /// The noise of the positions is profiled out of the likelihood: its variance is the mean square innovation. Initial states count as
-    /// unknown, because fitted ones absorb much of the effect of the forces (Patterson and Thompson, Biometrika 58 (1971) 545).
+    /// The noise of the positions is a nuisance parameter, profiled out of the likelihood: its variance is the mean square innovation. Initial states
+    /// count as unknown, because fitted ones absorb much of the effect of the forces (Patterson and Thompson, Biometrika 58 (1971) 545).
     pub(super) fn estimate_force_noise(&mut self, x: &[f64], segments: &[Segment]) -> bool {
         let recording = self.course.recording;
         let forced = recording.tracks.iter().filter(|track| !track.force.is_empty());
@@ -131,10 +132,10 @@ impl Problem<'_> {
         before != self.disturbances.force
     }
 
-    /// Filters of so many segments with rows of `width` slopes; none where residuals are independent.
+    /// Filters for the segments of all lanes, with rows of `width` derivatives; none if residuals are independent.
     pub(super) fn filters(&self, lanes: usize, width: usize) -> Vec<Filter> {
         let n = self.course.equations.n;
-        let Disturbances { force, unknown_start, vague } = &self.disturbances;
+        let Disturbances { force, unknown_start, start_variances } = &self.disturbances;
         if force.is_empty() && unknown_start.is_none() {
             return Vec::new();
         }
@@ -143,7 +144,7 @@ impl Problem<'_> {
         let positions = closed.map_or(n, |rows| n - rows.holonomic());
         let most = self.sigma.iter().copied().fold(0.0, f64::max);
         let mut variance = vec![0.0; starts * starts];
-        for k in (0..starts).filter(|_| unknown_start.is_some() && vague.is_empty()) {
+        for k in (0..starts).filter(|_| unknown_start.is_some() && start_variances.is_empty()) {
             let time = if k < positions { 1.0 } else { self.course.step };
             let sigma = if closed.is_some() { most } else { self.sigma[k % n] };
             variance[k * (starts + 1)] = (UNKNOWN_START * sigma / time).powi(2);
@@ -151,16 +152,16 @@ impl Problem<'_> {
         let expected = vec![vec![0.0; starts]; 1 + width];
         let filter = |lane: usize| Filter {
             unknown_start: *unknown_start,
-            variance: vague.get(lane).unwrap_or(&variance).clone(),
+            variance: start_variances.get(lane).unwrap_or(&variance).clone(),
             expected: expected.clone(),
             log_variance: 0.0,
         };
         (0..lanes).map(filter).collect()
     }
 
-    /// Variances of unknown initial states of segments with other readings than positions: what the readings of a segment determine of it, as far
-    /// as they do, made as large as if a single one determined it.
-    pub(super) fn vague(&self, x: &[f64], segments: &[&Segment]) -> Vec<Vec<f64>> {
+    /// Covariances of unknown initial states of segments whose readings are not positions: the covariance that the readings of the segment give, scaled
+    /// up to that of a single reading and by [`UNKNOWN_START`].
+    pub(super) fn start_variances(&self, x: &[f64], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let (size, width) = (2 * self.n(), 2 * self.n() + self.unknowns());
         let of = |(linear, segment): (Option<Linear>, &&Segment)| {
             let mut variance = vec![0.0; size * size];
@@ -177,12 +178,12 @@ impl Problem<'_> {
         self.batch(x, segments).into_iter().zip(segments).map(of).collect()
     }
 
-    /// Changes of the initial states by force errors over one interval, `(lanes, n, starts)`; `slopes` are the derivatives of states by initial
-    /// states, `(lanes, 2n, starts)`, `mobility` what a unit of force accelerates, `(lanes, n, n)`.
+    /// Changes of the initial states that force errors over one interval are equivalent to, `(lanes, n, starts)`. `slopes` are the derivatives of states
+    /// by initial states, `(lanes, 2n, starts)`, `mobility` the accelerations by unit forces, `(lanes, n, n)`.
     pub(super) fn impulses(&self, slopes: &[f64], mobility: &[f64], step: f64) -> Vec<f64> {
         let (n, force, starts) = (self.course.equations.n, &self.disturbances.force, self.course.starts());
-        // Lanes that fail are NaN: their segments fail with them.
-        let back = if starts == 2 * n { inverses(starts, slopes) } else { within(starts, slopes, 2 * n) };
+        // Lanes that fail are NaN, and their segments fail.
+        let back = if starts == 2 * n { inverses(starts, slopes) } else { left_inverses(starts, slopes, 2 * n) };
         let mut impulses = vec![0.0; slopes.len() / 2];
         for ((into, back), mobility) in impulses
             .chunks_exact_mut(n * starts)
@@ -200,8 +201,9 @@ impl Problem<'_> {
     }
 }
 
-/// Left inverses `(S' S)^-1 S'` of matrices `S`, `(batch, rows, columns)`: what changes of states within the constraints were at the start.
-fn within(columns: usize, matrices: &[f64], rows: usize) -> Vec<f64> {
+/// Left inverses `(S' S)^-1 S'` of matrices `S`, `(batch, rows, columns)`, which map changes of states within the constraints to changes of the initial
+/// state.
+fn left_inverses(columns: usize, matrices: &[f64], rows: usize) -> Vec<f64> {
     let size = rows * columns;
     let gram = |matrix: &[f64]| -> Vec<f64> {
         let column = |k: usize| matrix.iter().skip(k).step_by(columns).copied().collect::<Vec<f64>>();
@@ -237,7 +239,7 @@ mod tests {
             expected: vec![vec![0.0; 2]; 3 + STEPS],
             log_variance: 0.0,
         };
-        // What the filter makes of a residual at one sample alone, in columns behind the slopes.
+        // The filtered residual of each single sample, in columns after the slopes.
         let map: Vec<Vec<f64>> = (0..STEPS)
             .map(|t| {
                 let mut row = slopes(t).to_vec();

@@ -1,13 +1,13 @@
-//! Functions of constants that open directions leave unchanged, and their names.
+//! Combinations of constants that open directions leave unchanged: sums, and products of powers.
 //!
-//! A sum `c.x` is determined if `c' N = 0` for all open directions `N`, a product of powers `x_k^e_k` if `e' diag(1/x) N = 0`. Exponents of
-//! short products form the integer kernel of `diag(1/x) N`, whose columns are rounded to small fractions. Both conditions hold at one
-//! point: a name is a guess until a finite move has confirmed it.
+//! A sum `c.x` is determined if `c' N = 0` for all open directions `N`, a product of powers `x_k^e_k` if `e' diag(1/x) N = 0`. The
+//! exponents of short products form the integer kernel of `diag(1/x) N`, whose columns are rounded to small fractions. Both conditions hold only at
+//! one point, so that a finite move must confirm each combination.
 
-use super::determined::Column;
+use super::determined::OpenDirection;
 use super::thresholds::{FACTOR_ROUNDING, FRACTION_ROUNDING, MOST_DENOMINATOR, MOST_POWER};
 
-/// The meaning of a name.
+/// The kind of a combination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Product,
@@ -18,7 +18,7 @@ pub(super) enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Invariant {
     pub kind: Kind,
-    /// Exponents or factors, of all unknowns.
+    /// Exponents or factors of all unknowns.
     pub factors: Vec<f64>,
 }
 
@@ -41,14 +41,14 @@ impl Invariant {
         }
     }
 
-    /// Each name with its factor or exponent.
+    /// The constants that occur, each with its factor or exponent.
     pub fn terms(&self, names: &[&str]) -> Vec<(String, f64)> {
         let both = names.iter().zip(&self.factors).filter(|(_, factor)| **factor != 0.0);
         both.map(|(name, factor)| (name.to_string(), *factor)).collect()
     }
 }
 
-/// `c1/(g^2*m1)` or `a + 0.5*b`.
+/// The formula of a combination, such as `c1/(g^2*m1)` or `a + 0.5*b`.
 pub(super) fn written(kind: Kind, terms: &[(String, f64)]) -> String {
     match kind {
         Kind::Product => {
@@ -105,16 +105,17 @@ pub(super) fn unit_of(factors: &[(&str, f64)]) -> String {
     if powers.is_empty() { String::new() } else { written(Kind::Product, &powers).replace('*', " ") }
 }
 
-/// Products that no direction of a group changes, the shortest first; only of unknowns whose relative changes are small fractions.
-pub(super) fn products(columns: &[&Column], x: &[f64], inside: &[usize]) -> Vec<Invariant> {
+/// Products of powers that no direction of a group changes, the shortest first; only unknowns whose relative changes are small fractions occur.
+pub(super) fn products(columns: &[&OpenDirection], x: &[f64], inside: &[usize]) -> Vec<Invariant> {
     let exponent =
-        |column: &Column, k: usize| column.change[k] / x[k] / (column.change[column.pivot] / x[column.pivot]);
+        |column: &OpenDirection, k: usize| column.change[k] / x[k] / (column.change[column.pivot] / x[column.pivot]);
     if columns.iter().any(|column| x[column.pivot] == 0.0) {
         return Vec::new();
     }
     let row = |&k: &usize| {
-        // Small exponents are not fractions.
-        let part = |column: &&Column| fraction(exponent(column, k)).filter(|(p, _)| *p != 0 || column.change[k] == 0.0);
+        // An exponent near 0 is not rounded to 0.
+        let part =
+            |column: &&OpenDirection| fraction(exponent(column, k)).filter(|(p, _)| *p != 0 || column.change[k] == 0.0);
         let own: Option<Vec<(i64, i64)>> = columns.iter().map(part).collect();
         own.filter(|_| x[k] != 0.0).map(|own| (k, own))
     };
@@ -131,14 +132,14 @@ pub(super) fn products(columns: &[&Column], x: &[f64], inside: &[usize]) -> Vec<
     kernel.into_iter().filter(|powers| powers.iter().all(|e| e.abs() <= MOST_POWER)).map(of).collect()
 }
 
-/// Sums that no direction of a group changes, one for each unknown that is not a pivot.
-pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invariant> {
+/// Sums that no direction of a group changes; one for each unknown that is not a pivot.
+pub(super) fn sums(columns: &[&OpenDirection], inside: &[usize], m: usize) -> Vec<Invariant> {
     let free = inside.iter().filter(|k| columns.iter().all(|column| column.pivot != **k));
     let of = |&k: &usize| {
         let mut factors = vec![0.0; m];
         factors[k] = 1.0;
         for column in columns {
-            factors[column.pivot] = -near(column.change[k] / column.change[column.pivot]);
+            factors[column.pivot] = -without_rounding(column.change[k] / column.change[column.pivot]);
         }
         // The first factor is positive, whichever the pivots are.
         if factors.iter().find(|factor| **factor != 0.0).is_some_and(|first| *first < 0.0) {
@@ -149,13 +150,13 @@ pub(super) fn sums(columns: &[&Column], inside: &[usize], m: usize) -> Vec<Invar
     free.map(of).collect()
 }
 
-/// A factor after removing rounding.
-fn near(x: f64) -> f64 {
+/// A factor, replaced by the fraction that it equals up to rounding.
+fn without_rounding(x: f64) -> f64 {
     let whole = fraction(x).map(|(p, q)| p as f64 / q as f64);
     whole.filter(|whole| (whole - x).abs() <= FACTOR_ROUNDING * x.abs().max(1.0)).unwrap_or(x)
 }
 
-/// The smallest fraction near a number.
+/// The fraction with the smallest denominator near a number.
 fn fraction(x: f64) -> Option<(i64, i64)> {
     let of = |q: i64| {
         let p = (x * q as f64).round();
@@ -164,7 +165,7 @@ fn fraction(x: f64) -> Option<(i64, i64)> {
     (1..=MOST_DENOMINATOR).find_map(of)
 }
 
-/// All integer vectors `e` with `sum_i e_i row_i = 0`, as a basis: Euclid's algorithm on the rows, by reversible steps.
+/// A basis of all integer vectors `e` with `sum_i e_i row_i = 0`, by Euclid's algorithm on the rows, in reversible steps.
 fn integer_kernel(rows: &[Vec<i64>]) -> Vec<Vec<i64>> {
     let count = rows.len();
     let unit = |i: usize| (0..count).map(|j| i64::from(i == j)).collect::<Vec<i64>>();
@@ -189,7 +190,7 @@ fn integer_kernel(rows: &[Vec<i64>]) -> Vec<Vec<i64>> {
     all.into_iter().map(|(_, powers)| powers).collect()
 }
 
-/// The same basis, with two vectors replaced by their sum or difference where that is shorter; the shortest first.
+/// Shortens a basis by replacing vectors by sums or differences with others; the shortest first.
 fn shortened(mut basis: Vec<Vec<i64>>) -> Vec<Vec<i64>> {
     let size = |powers: &[i64]| powers.iter().map(|e| e.abs()).sum::<i64>();
     let shorter = |basis: &[Vec<i64>]| {
@@ -211,12 +212,12 @@ fn shortened(mut basis: Vec<Vec<i64>>) -> Vec<Vec<i64>> {
 mod tests {
     use super::*;
 
-    fn column(pivot: usize, change: &[f64]) -> Column {
-        Column { pivot, change: change.to_vec() }
+    fn column(pivot: usize, change: &[f64]) -> OpenDirection {
+        OpenDirection { pivot, change: change.to_vec() }
     }
 
-    fn names_of(columns: &[Column], x: &[f64], names: &[&str]) -> Vec<String> {
-        let columns: Vec<&Column> = columns.iter().collect();
+    fn names_of(columns: &[OpenDirection], x: &[f64], names: &[&str]) -> Vec<String> {
+        let columns: Vec<&OpenDirection> = columns.iter().collect();
         let inside: Vec<usize> = (0..x.len()).collect();
         products(&columns, x, &inside).iter().map(|found| written(found.kind, &found.terms(names))).collect()
     }

@@ -4,12 +4,12 @@ use super::thresholds::{PRODUCT_ROWS, RIDGE};
 use crate::linalg::{self, Workspace, dot, gemm};
 use crate::scalar::{MatMut, MatRef};
 
-/// Inverse of a symmetric matrix that is positive semi-definite.
+/// Inverse of a symmetric, positive semi-definite matrix, regularized by a small ridge.
 pub(crate) fn inverse(n: usize, matrix: &[f64]) -> Option<Vec<f64>> {
     inverse_with(n, matrix, RIDGE)
 }
 
-/// [`inverse`] with so much added to the diagonal, relative to it.
+/// [`inverse`] with the given ridge, relative to the diagonal.
 pub(crate) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f64>> {
     let diagonal = |i: usize| matrix[i * n + i];
     let scale: Vec<f64> = (0..n).map(|i| if diagonal(i) > 0.0 { diagonal(i).sqrt().recip() } else { 1.0 }).collect();
@@ -22,7 +22,8 @@ pub(crate) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f
     Some(inverse)
 }
 
-/// Inverses of a batch of matrices of any kind, `(batch, n, n)`: `[[0, A], [A', 0]]` is symmetric, and its inverse has that of `A` in a corner.
+/// Inverses of a batch of matrices that need not be symmetric, `(batch, n, n)`: `[[0, A], [A', 0]]` is symmetric, and its inverse contains that of `A`
+/// as a block.
 pub(super) fn inverses(n: usize, matrices: &[f64]) -> Vec<f64> {
     let batch = matrices.len() / (n * n);
     let mut symmetric = vec![0.0; 4 * matrices.len()];
@@ -33,7 +34,7 @@ pub(super) fn inverses(n: usize, matrices: &[f64]) -> Vec<f64> {
         }
     }
     let mut inverse = vec![0.0; symmetric.len()];
-    // Those that are singular are NaN.
+    // Inverses of singular matrices are NaN.
     let _ = linalg::inverse(2 * n, &symmetric, &mut inverse, &mut Workspace::new());
     let corner = |at: usize| {
         let (matrix, i, j) = (at / (n * n), at / n % n, at % n);
@@ -47,13 +48,13 @@ pub(crate) fn times(n: usize, matrix: &[f64], x: &[f64]) -> Vec<f64> {
     (0..n).map(|i| dot(&matrix[i * n..(i + 1) * n], x)).collect()
 }
 
-/// Rows and columns of some indices.
+/// The rows and columns of the given indices.
 pub(crate) fn part(n: usize, matrix: &[f64], indices: &[usize]) -> Vec<f64> {
     indices.iter().flat_map(|&i| indices.iter().map(move |&j| matrix[i * n + j])).collect()
 }
 
-/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate: a torque depends on the links that its joint carries, few of many in a
-/// tree, so that a block has few columns.
+/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate. A torque depends only on the links that its joint carries, so that a block
+/// has few columns other than 0.
 pub(super) struct Products {
     m: usize,
     /// Rows of each coordinate, `(rows, m)`.
@@ -63,7 +64,7 @@ pub(super) struct Products {
 }
 
 impl Products {
-    /// Of rows of `n` coordinates, `m` numbers each.
+    /// For rows of `m` numbers of `n` coordinates.
     pub fn new(n: usize, m: usize) -> Self {
         Self { m, rows: vec![Vec::new(); n], packed: Vec::new(), product: Vec::new() }
     }
@@ -77,7 +78,7 @@ impl Products {
         }
     }
 
-    /// Adds what is left.
+    /// Adds the products of the remaining rows.
     pub fn finish(&mut self, sum: &mut [f64]) {
         (0..self.rows.len()).for_each(|coordinate| self.multiply(coordinate, sum));
     }
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_without_data_is_left_alone() {
+    fn a_direction_without_data_gets_the_smallest_solution() {
         let inverse = inverse(2, &[1.0, 1.0, 1.0, 1.0]).unwrap();
         let x = times(2, &inverse, &[2.0, 2.0]);
         assert!((x[0] + x[1] - 2.0).abs() < 1e-3, "{x:?}");

@@ -1,4 +1,4 @@
-//! What sensors read along a motion, `y = h(q, v, a, t; p)`, where other quantities than the coordinates were measured.
+//! Readings of sensors along a motion, `y = h(q, v, a, t; p)`, if other quantities than the coordinates were measured.
 //!
 //! With the derivatives `(Q, V)` of a state by the initial state and the constants, those of a reading are `h_q Q + h_v V + h_a A + h_p`, where
 //! `A = a_q Q + a_v V + a_p` follows from the equations of motion.
@@ -16,20 +16,20 @@ use std::sync::Arc;
 /// The measured quantities of a system.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured {
-    /// Those that are angles: readings that differ by full turns are the same.
+    /// Marks the angles: readings that differ by full turns are equal.
     pub angles: Vec<bool>,
-    /// The reading that each coordinate is, if there is one.
+    /// For each coordinate, the index of the reading that measures it directly, if there is one.
     pub sources: Vec<Option<usize>>,
-    /// `true` if a formula has accelerations.
+    /// `true` if a formula contains accelerations.
     accelerated: bool,
-    /// How many known functions of the time they take: the time itself, then inputs.
+    /// Number of known functions of the time in the formulas: the time itself, then inputs.
     known: usize,
-    /// Of `(q, v, a, known)`: the readings, `(m)`, and their derivatives by `q`, `v`, `a` and the chosen parameters, `(m, 3n + chosen)`.
+    /// Computes the readings, `(m)`, and their derivatives by `q`, `v`, `a` and the chosen parameters, `(m, 3n + chosen)`, from `(q, v, a, known)`.
     program: Arc<Program<f64>>,
 }
 
 impl Measured {
-    /// Records the formulas of a system, with slopes by the parameters of these indices; `None` if it has no table `[measured]`.
+    /// Records the formulas of a system, with derivatives by the chosen parameters; `None` if the system has no table `[measured]`.
     ///
     /// # Errors
     /// [`TapeError`] for formulas that are too long.
@@ -76,12 +76,12 @@ impl Measured {
         self.angles.len()
     }
 
-    /// `true` if a coordinate is not read itself, so that initial states are searched.
+    /// `true` if a coordinate is not measured directly, so that initial states must be searched.
     pub fn is_searched(&self) -> bool {
         self.sources.contains(&None)
     }
 
-    /// Smoothed readings as smoothed coordinates, if every coordinate is read itself.
+    /// The smoothed coordinates, if every coordinate is measured directly.
     pub fn coordinates(&self, smoothed: &[Option<Smoothed>]) -> Option<Vec<Option<Smoothed>>> {
         let sources: Vec<usize> = self.sources.iter().copied().collect::<Option<_>>()?;
         Some(smoothed.iter().map(|own| own.as_ref().map(|own| own.columns(self.count(), &sources))).collect())
@@ -107,28 +107,28 @@ pub(super) fn check_columns(instance: &SystemInstance<f64>, recording: &Recordin
     if instance.acting_constraints()?.is_empty() { Ok(()) } else { Err(IdentifyError::ConstrainedReadings) }
 }
 
-/// Readings of the states of lanes, and buffers for them.
+/// Computes the readings of states side by side, with their derivatives.
 pub(super) struct ReadingSlopes<'a> {
     measured: &'a Measured,
     replay: Replay<f64>,
     a: Vec<f64>,
     known: Vec<f64>,
     /// Readings, `(lanes, m)`.
-    pub seen: Vec<f64>,
+    pub readings: Vec<f64>,
     /// Derivatives of the formulas, `(lanes, m, 3n + chosen)`.
     by_state: Vec<f64>,
-    /// Derivatives by initial states and constants, `(lanes, m, columns)`; empty if those of states are.
+    /// Derivatives by initial states and constants, `(lanes, m, columns)`; empty if those of the states are empty.
     pub slopes: Vec<f64>,
 }
 
 impl<'a> ReadingSlopes<'a> {
     pub fn new(measured: &'a Measured) -> Self {
         let replay = Replay::new(Arc::clone(&measured.program));
-        let [a, known, seen, by_state, slopes] = [(); 5].map(|()| Vec::new());
-        Self { measured, replay, a, known, seen, by_state, slopes }
+        let [a, known, readings, by_state, slopes] = [(); 5].map(|()| Vec::new());
+        Self { measured, replay, a, known, readings, by_state, slopes }
     }
 
-    /// Evaluates the readings of all lanes at a sample of their segments, with derivatives if the states have some.
+    /// Computes the readings of all lanes at a sample of their segments, with derivatives if the states have derivatives.
     pub fn evaluate(
         &mut self,
         (follower, course): (&mut Follower<'_>, &Course<'_>),
@@ -148,11 +148,11 @@ impl<'a> ReadingSlopes<'a> {
         if accelerated {
             follower.accelerate(values, (&state.q, &state.v), &[], &mut self.a);
         }
-        self.seen.resize(lanes * m, 0.0);
+        self.readings.resize(lanes * m, 0.0);
         self.by_state.resize(lanes * m * width, 0.0);
         let inputs: [&[f64]; 4] = [&state.q, &state.v, &self.a, &self.known];
         // Shapes are those of the recorded program.
-        let _ = self.replay.evaluate(lanes, &inputs, values, &mut [&mut self.seen, &mut self.by_state]);
+        let _ = self.replay.evaluate(lanes, &inputs, values, &mut [&mut self.readings, &mut self.by_state]);
         let columns = state.q_slopes.len() / (lanes * n).max(1);
         self.slopes.clear();
         self.slopes.resize(lanes * m * columns, 0.0);
@@ -166,7 +166,7 @@ impl<'a> ReadingSlopes<'a> {
         self.chain((n, m, columns), state);
     }
 
-    /// Derivatives by initial states and constants from those by states.
+    /// Chain rule: derivatives by initial states and constants from those by states.
     fn chain(&mut self, (n, m, columns): (usize, usize, usize), state: &State) {
         let width = self.by_state.len() * columns / self.slopes.len();
         let rows = self.by_state.chunks_exact(width).zip(self.slopes.chunks_exact_mut(columns)).enumerate();
@@ -182,8 +182,8 @@ impl<'a> ReadingSlopes<'a> {
     }
 }
 
-/// Adds the effect of positions, velocities and constants by way of the accelerations to the derivatives of readings, `(lanes, m, 3n + chosen)`;
-/// `slopes` are those of the accelerations, `(lanes, n, 2n + chosen)`.
+/// Chain rule for accelerations: adds the effect of positions, velocities and constants through the accelerations to the derivatives of readings,
+/// `(lanes, m, 3n + chosen)`. `slopes` are the derivatives of the accelerations, `(lanes, n, 2n + chosen)`.
 fn through_accelerations((n, m, chosen): (usize, usize, usize), by_state: &mut [f64], slopes: &[f64]) {
     let (width, own) = (3 * n + chosen, 2 * n + chosen);
     for (rows, slopes) in by_state.chunks_exact_mut(m * width).zip(slopes.chunks_exact(n * own)) {
@@ -198,12 +198,12 @@ fn through_accelerations((n, m, chosen): (usize, usize, usize), by_state: &mut [
 }
 
 impl Problem<'_> {
-    /// Smallest number of samples in a segment: as many readings as of positions.
+    /// Smallest number of samples in a segment, so that it has as many readings as [`LEAST_SEGMENT`] positions would have.
     pub(super) fn least_segment(&self) -> usize {
         (LEAST_SEGMENT * self.n()).div_ceil(self.width()).max(LEAST_SEGMENT)
     }
 
-    /// What is read at the last sample of each segment, `(m)`.
+    /// Readings at the last sample of each segment, `(m)`.
     pub(super) fn last_readings(&self, x: &[f64], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let Some(measured) = self.measured else { return self.ends(x, segments) };
         let (m, values) = (measured.count(), self.parameters(x));
@@ -213,10 +213,10 @@ impl Problem<'_> {
             let is_last = |segment: &Segment| sample + 1 == segment.samples;
             if segments.iter().any(|segment| is_last(segment)) {
                 reader.evaluate((follower, &self.course), &values, (segments, sample), state);
-                let lanes = segments.iter().zip(&mut found).zip(reader.seen.chunks_exact(m));
+                let lanes = segments.iter().zip(&mut found).zip(reader.readings.chunks_exact(m));
                 lanes
                     .filter(|((segment, _), _)| is_last(segment))
-                    .for_each(|((_, into), seen)| into.copy_from_slice(seen));
+                    .for_each(|((_, into), readings)| into.copy_from_slice(readings));
             }
         });
         found
@@ -267,7 +267,7 @@ mod tests {
         Follower::new(&course).follow(&instance.parameters, &[&segment], true, |follower, sample, state| {
             reader.evaluate((follower, &course), &instance.parameters, (&[&segment], sample), state);
         });
-        (reader.seen, reader.slopes)
+        (reader.readings, reader.slopes)
     }
 
     #[test]

@@ -1,12 +1,12 @@
-//! The constants of a known Lagrangian from recorded motion.
+//! Identifies the constants of a known Lagrangian from recorded motion.
 //!
-//! A least-squares fit to smoothed accelerations comes first. Then Levenberg and Marquardt's method fits the motion itself by multiple shooting:
-//! the recording is divided into segments, each with an initial state of its own; the equations of motion are integrated along each segment, and
-//! constants, initial states and sensor constants are adjusted until the measured positions are fitted best. Segments grow as long as that
-//! reduces the standard errors. Only positions enter with noise, so that the noise causes no bias.
+//! A least-squares fit to smoothed accelerations comes first. Then the motion itself is fitted by multiple shooting with the method of Levenberg and
+//! Marquardt: the recording is divided into segments, each with its own initial state. The equations of motion are integrated along each segment,
+//! and constants, initial states and sensor constants are adjusted to minimize the residuals of the measured positions. Segments grow as long as
+//! that reduces the standard errors. Only the positions are noisy, so that the noise causes no bias.
 //!
-//! For machines under known forces that are noisier than their motion, such as robots, the forces are fitted instead: those of a chain of links
-//! are linear in its constants, however many there are.
+//! For machines whose known forces are noisier than their motion, such as robots, the constants are fitted to the forces instead. The forces of a
+//! chain of links are linear in its constants, so that many constants can be fitted at once.
 //!
 //! ```
 //! use lnn::identification::{IdentifyOptions, identify};
@@ -20,7 +20,7 @@
 //! let track = RecordedTrajectory { name: "swing".into(), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] };
 //! let recording = Recording { coordinates: vec!["theta".into()], periodic: vec![true], tracks: vec![track] };
 //! let form = configure::<f64>("n-pendulum", &[("n".into(), "1".into())])?;
-//! let found = identify(&form, &recording, &IdentifyOptions { constants: vec!["l".into()], ..Default::default() })?;
+//! let found = identify(&form, &recording, &IdentifyOptions::new().constants(["l"]))?;
 //! assert!((found.constants[0].value - 0.7).abs() < 1e-6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -44,14 +44,17 @@ mod follow;
 mod found;
 mod initial_states;
 mod innovations;
+mod interpolations;
 mod invariants;
 pub(crate) mod linear;
 mod measured;
+mod motion_result;
 mod moves;
+mod options;
 mod per_trajectory;
 mod pieces;
 mod quality;
-mod says;
+mod report;
 #[cfg(test)]
 mod search_tests;
 mod smoothed;
@@ -62,7 +65,6 @@ mod tests;
 mod thresholds;
 mod unknowns;
 mod verdict;
-mod ways;
 
 pub use by_trajectory::{ByTrajectory, OfTrajectory, Scatter};
 pub use error::IdentifyError;
@@ -72,56 +74,10 @@ pub use found::{
     Undetermined,
 };
 pub(crate) use innovations::Disturbances;
+pub use options::IdentifyOptions;
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
 pub(crate) use stages::{choose_steps, joined, spread_of, thinned};
 pub use verdict::Verdict;
 
-use crate::cancellation::Cancellation;
-use crate::recording::Targets;
 pub use crate::rollout::Between;
-use serde::Deserialize;
-
-/// Options of [`identify`].
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct IdentifyOptions {
-    /// Symbols of the unknown constants; if empty, those that the system marks to be learned, or all if it marks none.
-    pub constants: Vec<String>,
-    /// Coordinates whose sensor has an unknown offset.
-    pub offsets: Vec<String>,
-    /// Coordinates whose sensor has an unknown gain.
-    pub gains: Vec<String>,
-    /// Coordinates whose sensor has an unknown delay.
-    pub delays: Vec<String>,
-    /// Standard deviation of every coordinate's noise; estimated if not given.
-    pub noise: Option<Vec<f64>>,
-    /// Standard deviations of the positions of every trajectory, `(samples, n)` each, in the units of the coordinates; residuals are weighted by
-    /// them. Empty if they are not known.
-    #[serde(default)]
-    pub errors: Vec<Vec<f64>>,
-    /// Readings of positions that are missing, `true` in `(samples, n)` of every trajectory; numbers in their place only start the search. Empty
-    /// if none is missing.
-    #[serde(default)]
-    pub missing: Vec<Vec<bool>>,
-    /// Inputs of the forces of the system at the samples of every trajectory, `(samples, inputs)` each, in the order of their names.
-    #[serde(default)]
-    pub inputs: Vec<Vec<f64>>,
-    /// What is fitted, [`Targets::Motion`] or [`Targets::Forces`]; by default the forces of a chain of links under known forces, otherwise the
-    /// motion.
-    pub targets: Option<Targets>,
-    /// Interpolation of known forces and inputs between the samples; by default the one that fits the motion best.
-    pub between: Option<Between>,
-    /// Length of the segments in s; chosen by the data if not given.
-    pub segment: Option<f64>,
-    /// Residuals beyond three standard deviations count linearly, which limits the influence of outliers.
-    pub robust: bool,
-    /// Every trajectory is identified alone, too, and the constants are compared; 64 trajectories at most.
-    #[serde(default)]
-    pub by_trajectory: bool,
-    /// Threads; 0 for one. The result does not depend on their number.
-    pub threads: usize,
-    /// Cancels the search, and receives reports of its progress.
-    #[serde(skip)]
-    pub cancellation: Cancellation,
-}

@@ -1,7 +1,8 @@
-//! Finite moves along open directions confirm the names of combinations that stay constant, and return undetermined unknowns to their start.
+//! Finite moves along open directions. They confirm which combinations of unknowns are determined, and return undetermined unknowns to their
+//! starting values.
 
-use super::descent::mute;
-use super::determined::{Column, Determined};
+use super::descent::hold_fixed;
+use super::determined::{Determined, OpenDirection};
 use super::invariants::{Invariant, Kind, products, sums};
 use super::linear::{inverse_with, times};
 use super::solve::{Normal, Problem};
@@ -9,43 +10,43 @@ use super::thresholds::{EQUAL_FIT_INCREASE, MOVE, MOVED_DECREMENT, MOVED_HALVING
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
-/// Moves away from fitted unknowns.
+/// Moves away from a fit.
 pub(super) struct Moves<'a> {
     pub problem: &'a Problem<'a>,
     pub determined: &'a Determined,
     /// Variance of the residuals.
     pub variance: f64,
-    /// The normal equations at other unknowns, with initial states fitted.
+    /// Gives the normal equations at other unknowns, with the initial states fitted.
     pub normal_at: &'a dyn Fn(&[f64]) -> Option<Normal>,
 }
 
 /// A group of open directions and the combinations that they leave unchanged.
 pub(super) struct Group<'a> {
-    pub columns: Vec<&'a Column>,
-    /// Unknowns that take part.
+    pub columns: Vec<&'a OpenDirection>,
+    /// Unknowns that a direction changes.
     pub inside: Vec<usize>,
     pub kind: Kind,
     pub invariants: Vec<Invariant>,
-    /// Moved unknowns that fit the motion equally well.
-    pub moved: Vec<Vec<f64>>,
+    /// Points along the directions that fit the motion equally well.
+    pub points: Vec<Vec<f64>>,
 }
 
 impl<'a> Group<'a> {
-    /// Directions without names.
-    pub fn without_names(columns: Vec<&'a Column>) -> Self {
+    /// Directions without invariants.
+    pub fn without_invariants(columns: Vec<&'a OpenDirection>) -> Self {
         let m = columns.first().map_or(0, |column| column.change.len());
         let inside = (0..m).filter(|&k| columns.iter().any(|column| column.change[k] != 0.0)).collect();
-        Self { columns, inside, kind: Kind::Product, invariants: Vec::new(), moved: Vec::new() }
+        Self { columns, inside, kind: Kind::Product, invariants: Vec::new(), points: Vec::new() }
     }
 
-    /// `true` if as many combinations have names as are determined.
-    pub fn is_named(&self) -> bool {
+    /// `true` if every determined combination is among the invariants.
+    pub fn is_complete(&self) -> bool {
         self.invariants.len() + self.columns.len() == self.inside.len()
     }
 
     /// The directions at a point that was reached by moving along them.
     pub fn changes_at(&self, x: &[f64], moved: &[f64]) -> Vec<Vec<f64>> {
-        let turned = |column: &&Column| {
+        let transported = |column: &&OpenDirection| {
             let parts = column.change.iter().zip(x.iter().zip(moved));
             let part = |(change, (x, moved)): (&f64, (&f64, &f64))| match self.kind {
                 Kind::Product if *x != 0.0 => change * moved / x,
@@ -53,34 +54,34 @@ impl<'a> Group<'a> {
             };
             parts.map(part).collect()
         };
-        self.columns.iter().map(turned).collect()
+        self.columns.iter().map(transported).collect()
     }
 }
 
 impl<'a> Moves<'a> {
-    /// Fits unknowns with the pivots and the silent ones held fixed; returns the sum of squares in units of the variance.
+    /// Fits the unknowns again, with the pivots and the unknowns without effect held fixed; returns the sum of squares in units of the variance.
     pub fn refit(&self, mut x: Vec<f64>) -> Option<(Vec<f64>, f64)> {
         let m = x.len();
         let held = |k: usize| {
-            self.determined.silent.contains(&k) || self.determined.open.iter().any(|column| column.pivot == k)
+            self.determined.without_effect.contains(&k) || self.determined.open.iter().any(|column| column.pivot == k)
         };
         let held: Vec<bool> = (0..m).map(held).collect();
-        let followed = |x: &[f64]| (self.normal_at)(x).filter(|n| n.failed == 0 && n.square.is_finite());
-        let mut best = followed(&x)?;
+        let normal_at = |x: &[f64]| (self.normal_at)(x).filter(|n| n.failed == 0 && n.square.is_finite());
+        let mut best = normal_at(&x)?;
         for _ in 0..MOVED_ITERATIONS {
             if self.problem.cancellation.is_cancelled() {
                 return None;
             }
             let (mut matrix, mut right) = (best.matrix.clone(), best.right.clone());
-            mute(&held, &mut matrix, &mut right);
+            hold_fixed(&held, &mut matrix, &mut right);
             let mut change = times(m, &inverse_with(m, &matrix, RIDGE)?, &right);
             if dot(&change, &right) < MOVED_DECREMENT * self.variance {
                 break;
             }
             let mut better = None;
             for _ in 0..MOVED_HALVINGS {
-                let moved = self.problem.moved(&x, &change, &best);
-                better = followed(&moved).filter(|tried| tried.square < best.square).map(|tried| (moved, tried));
+                let moved = self.problem.stepped(&x, &change, &best);
+                better = normal_at(&moved).filter(|tried| tried.square < best.square).map(|tried| (moved, tried));
                 if better.is_some() {
                     break;
                 }
@@ -92,19 +93,19 @@ impl<'a> Moves<'a> {
         Some((x, best.square / self.variance))
     }
 
-    /// Groups of open directions with the names that finite moves confirm.
+    /// Groups of open directions with the invariants that finite moves confirm.
     pub fn groups(&self, x: &[f64]) -> Vec<Group<'a>> {
         let base = if self.determined.open.is_empty() { None } else { self.refit(x.to_vec()) };
         let of = |places: Vec<usize>| {
-            let mut best = Group::without_names(places.iter().map(|&at| &self.determined.open[at]).collect());
+            let mut best = Group::without_invariants(places.iter().map(|&at| &self.determined.open[at]).collect());
             let Some((x, square)) = &base else { return best };
             for kind in [Kind::Product, Kind::Sum] {
-                if best.is_named() {
+                if best.is_complete() {
                     break;
                 }
-                let (invariants, moved) = self.confirmed((x, *square), &best, kind);
+                let (invariants, points) = self.confirmed((x, *square), &best, kind);
                 if invariants.len() > best.invariants.len() {
-                    best = Group { kind, invariants, moved, ..best };
+                    best = Group { kind, invariants, points, ..best };
                 }
             }
             best
@@ -112,40 +113,41 @@ impl<'a> Moves<'a> {
         self.determined.groups().into_iter().map(of).collect()
     }
 
-    /// Names of one kind whose values stay within their errors when pivots are moved and the other unknowns are fitted again.
+    /// Invariants of one kind whose values stay within their standard errors when the pivots are moved and the other unknowns are fitted again, with
+    /// the points that were reached.
     fn confirmed(&self, (x, square): (&[f64], f64), group: &Group<'_>, kind: Kind) -> (Vec<Invariant>, Vec<Vec<f64>>) {
-        let mut left = match kind {
+        let mut candidates = match kind {
             Kind::Product => products(&group.columns, x, &group.inside),
             Kind::Sum => sums(&group.columns, &group.inside, x.len()),
         };
         let mut points = Vec::new();
         for moves in self.moves_of(x, &group.columns) {
-            if left.is_empty() {
+            if candidates.is_empty() {
                 break;
             }
             let moved = self.refit(along(x, &moves, kind));
             let Some((moved, _)) = moved.filter(|(_, after)| after - square < EQUAL_FIT_INCREASE) else {
-                left.clear();
+                candidates.clear();
                 break;
             };
             let stays = |known: &Invariant| {
                 let error = self.determined.error_of(&known.gradient(x));
                 (known.value(&moved) - known.value(x)).abs() <= error
             };
-            left.retain(stays);
+            candidates.retain(stays);
             points.push(moved);
         }
-        (left, points)
+        (candidates, points)
     }
 
-    /// Unknowns as near to their start as the determined sums and products allow.
+    /// The unknowns as close to their starting values as the determined sums and products allow.
     pub fn least_change(&self, x: &[f64], start: &[f64], groups: &[Group<'_>]) -> Vec<f64> {
-        if self.determined.silent.is_empty() && self.determined.open.is_empty() {
+        if self.determined.without_effect.is_empty() && self.determined.open.is_empty() {
             return x.to_vec();
         }
         let mut near = x.to_vec();
-        self.determined.silent.iter().for_each(|&k| near[k] = start[k]);
-        for group in groups.iter().filter(|group| group.is_named()) {
+        self.determined.without_effect.iter().for_each(|&k| near[k] = start[k]);
+        for group in groups.iter().filter(|group| group.is_complete()) {
             match group.kind {
                 Kind::Product => nearest_product(&mut near, start, group),
                 Kind::Sum => {
@@ -158,10 +160,10 @@ impl<'a> Moves<'a> {
         near.map_or_else(|| x.to_vec(), |(x, _)| x)
     }
 
-    /// Moves along each direction, up and down, and along several together, with alternating signs: an invariant of each single direction need
-    /// not be one of all. A pivot far below its size is first raised to it.
-    fn moves_of<'c>(&self, x: &[f64], columns: &[&'c Column]) -> Vec<Vec<(&'c Column, f64)>> {
-        let factors = |column: &'c Column| {
+    /// Moves along each direction, up and down, and along all together, with alternating signs, because an invariant of each single direction need not
+    /// be one of all. A pivot far below its size is first raised to it.
+    fn moves_of<'c>(&self, x: &[f64], columns: &[&'c OpenDirection]) -> Vec<Vec<(&'c OpenDirection, f64)>> {
+        let factors = |column: &'c OpenDirection| {
             let far = self.determined.size[column.pivot] / x[column.pivot].abs();
             [(column, MOVE.max(far.min(f64::MAX))), (column, MOVE.recip())]
         };
@@ -181,7 +183,7 @@ impl<'a> Moves<'a> {
 }
 
 /// Unknowns moved along directions until each pivot has changed by a factor.
-fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
+fn along(x: &[f64], moves: &[(&OpenDirection, f64)], kind: Kind) -> Vec<f64> {
     let mut moved = x.to_vec();
     for (column, factor) in moves {
         let (pivot, own) = (x[column.pivot], column.change[column.pivot]);
@@ -197,7 +199,7 @@ fn along(x: &[f64], moves: &[(&Column, f64)], kind: Kind) -> Vec<f64> {
     moved
 }
 
-/// Moves `x` along directions to the smallest change from `start` in units of `size`.
+/// Moves `x` along directions to the point with the smallest change from `start`, in units of `size`.
 pub(super) fn nearest(x: &mut [f64], start: &[f64], columns: &[&[f64]], size: &[f64]) {
     let count = columns.len();
     let scaled: Vec<Vec<f64>> =
@@ -211,9 +213,9 @@ pub(super) fn nearest(x: &mut [f64], start: &[f64], columns: &[&[f64]], size: &[
     }
 }
 
-/// The same along products of powers, in logarithms.
+/// The same along directions that leave products of powers unchanged, in logarithms.
 fn nearest_product(x: &mut [f64], start: &[f64], group: &Group<'_>) {
-    let exponents = |column: &Column| {
+    let exponents = |column: &OpenDirection| {
         let relative = |(change, x): (&f64, &f64)| if *change == 0.0 { 0.0 } else { change / x };
         column.change.iter().zip(x.iter()).map(relative).collect::<Vec<f64>>()
     };

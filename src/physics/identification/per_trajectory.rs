@@ -1,4 +1,4 @@
-//! Constants with a value for each trajectory.
+//! Parameters that have a separate value for each trajectory.
 
 use super::thresholds::MOST_OWN_CONSTANTS;
 use super::{IdentifyError, IdentifyOptions};
@@ -7,7 +7,7 @@ use crate::recording::{RecordedTrajectory, Recording};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// The system with a constant for each trajectory in place of every parameter that has such values, and the options that mark the trajectories;
+/// Replaces every such parameter of the system by one constant for each trajectory, and adds inputs to the options that mark the trajectories.
 /// `None` for a system without such parameters.
 pub(super) fn per_trajectory(
     instance: &SystemInstance<f64>,
@@ -29,7 +29,7 @@ pub(super) fn per_trajectory(
         own.with_default(&parameter.symbol, *value);
     }
     let PerTrajectory { description: all, marks, unknown } = own.per_trajectory(&names)?;
-    // Every input is the mark of a trajectory, or was measured.
+    // Every input either marks a trajectory or was measured.
     let measured: Vec<&String> = description.inputs.keys().collect();
     let place = |list: &[&String], name: &String| list.iter().position(|own| *own == name);
     let marks: Vec<&String> = marks.iter().collect();
@@ -52,7 +52,7 @@ pub(super) fn per_trajectory(
     Ok(Some((instance, IdentifyOptions { constants, inputs, ..options.clone() })))
 }
 
-/// The name of a trajectory: what distinguishes it in its file, or the name of the file.
+/// The name of a trajectory: its label within its file, or the name of the file.
 fn label(track: &RecordedTrajectory) -> String {
     match track.name.rsplit_once(" trajectory ") {
         Some((_, label)) => label.to_string(),

@@ -1,6 +1,6 @@
-//! Pieces of recorded motion between long gaps; each sample has a position and a velocity for an initial state.
+//! Pieces of recorded motion between long gaps, which give initial states for segments.
 //!
-//! Smoothing does not reach across a long gap, but the equations of motion do: pieces matter only at the beginning of the search.
+//! Smoothing does not bridge a long gap, but the integration does: pieces matter only at the beginning of the search.
 
 use super::follow::Segment;
 use super::stages::thinned;
@@ -12,26 +12,27 @@ use crate::recording::survey::{Stillness, stillness};
 use crate::recording::{Clock, Filled, RecordedTrajectory, Recording};
 use std::ops::Range;
 
-/// A piece of a trajectory.
+/// A piece of a trajectory between long gaps.
 pub(super) struct Piece {
     pub track: usize,
     pub samples: Range<usize>,
-    /// Its number among the long pieces.
+    /// Its index among the long pieces, if it is one.
     long: Option<usize>,
 }
 
 /// The pieces of a recording, in order.
 pub(super) struct Pieces<'a> {
     recording: &'a Recording,
-    /// Pieces of a recording, trajectory by trajectory.
+    /// All pieces, trajectory by trajectory.
     all: Vec<Piece>,
-    /// The long pieces as separate trajectories, with the trajectory and the samples they come from; of repeated measurements only the first.
+    /// The long pieces as separate trajectories.
     pub long: Recording,
+    /// The trajectory and the samples that each of them comes from.
     origin: Vec<(usize, Vec<usize>)>,
-    /// Their motion, if there are any.
+    /// Smoothing of the long pieces; `None` if there are none.
     pub smoothing: Option<Smoothing>,
     pub smoothed: Vec<Option<Smoothed>>,
-    /// Usual step in s.
+    /// Typical step between samples in s.
     pub step: f64,
     /// Standard deviation of every coordinate's noise, as given or as estimated.
     pub noise: Vec<f64>,
@@ -41,96 +42,128 @@ pub(super) struct Pieces<'a> {
     pub still: Vec<String>,
 }
 
+/// The samples of a piece as a trajectory of its own, with their indices in the whole one; of repeated measurements only the first.
+struct Part {
+    track: RecordedTrajectory,
+    samples: Vec<usize>,
+}
+
+/// Divides the trajectories of a recording at their long gaps.
+fn divided(recording: &Recording) -> (Vec<Piece>, Vec<Part>) {
+    let (mut pieces, mut parts) = (Vec::new(), Vec::new());
+    for (track, recorded) in recording.tracks.iter().enumerate().filter(|(_, t)| t.len() >= LEAST_TRACK) {
+        // Repeated measurements of a state count once.
+        let distinct: Vec<usize> =
+            (0..recorded.len()).filter(|&k| k == 0 || recorded.times[k] > recorded.times[k - 1]).collect();
+        let times: Vec<f64> = distinct.iter().map(|&k| recorded.times[k]).collect();
+        let clock = Clock::of(&times);
+        let gap = |k: &usize| !clock.reaches_across(times[*k] - times[k - 1]);
+        let bounds: Vec<usize> = [0].into_iter().chain((1..times.len()).filter(gap)).chain([times.len()]).collect();
+        for pair in bounds.windows(2) {
+            let samples = distinct[pair[0]..pair[1]].to_vec();
+            let end = distinct.get(pair[1]).copied().unwrap_or(recorded.len());
+            pieces.push(Piece { track, samples: samples[0]..end, long: None });
+            parts.push(Part { track: selected(recorded, &samples, recording.n()), samples });
+        }
+    }
+    (pieces, parts)
+}
+
+/// Times and values of one coordinate in the pieces of a trajectory.
+struct Readings {
+    track: usize,
+    times: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// The readings of coordinate `i` by piece. Missing readings are left out, because the numbers in their place have no noise.
+fn readings(pieces: &[Piece], parts: &[Part], (n, i): (usize, usize), missing: &[Vec<bool>]) -> Vec<Readings> {
+    let of = |(piece, part): (&Piece, &Part)| {
+        let own = missing.get(piece.track).filter(|own| !own.is_empty());
+        let kept = (0..part.track.len()).filter(|&k| !own.is_some_and(|own| own[part.samples[k] * n + i]));
+        let (times, values) = kept.map(|k| (part.track.times[k], part.track.q[k * n + i])).unzip();
+        Readings { track: piece.track, times, values }
+    };
+    pieces.iter().zip(parts).map(of).collect()
+}
+
+/// Standard deviation of the noise of a coordinate, estimated from all pieces or from those of one trajectory.
+fn estimated(readings: &[Readings], track: Option<usize>) -> f64 {
+    let own = readings.iter().filter(|own| track.is_none_or(|track| own.track == track));
+    noise(own.map(|own| (own.times.as_slice(), own.values.as_slice())), 1, 0).sigma
+}
+
+/// Chooses the smoothing of the long pieces; `None` if these are too short.
+fn smoothing(long: &Recording, noise: Option<Vec<f64>>) -> Result<Option<Smoothing>, IdentifyError> {
+    let choices = SmoothOptions { noise, ..SmoothOptions::default() };
+    match (!long.tracks.is_empty()).then(|| Smoothing::choose(long, &choices)).transpose() {
+        Ok(smoothing) => Ok(smoothing),
+        Err(SmoothError::Short { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
 impl<'a> Pieces<'a> {
-    /// From a recording; `filled` contains it with its held readings interpolated.
+    /// The pieces of a recording; `filled` contains it with its held readings interpolated.
     pub fn new(
         recording: &'a Recording,
         filled: Option<&Filled>,
         options: &IdentifyOptions,
     ) -> Result<Self, IdentifyError> {
         let n = recording.n();
-        let (mut all, mut parts) = (Vec::new(), Vec::new());
-        for (track, recorded) in recording.tracks.iter().enumerate().filter(|(_, t)| t.len() >= LEAST_TRACK) {
-            // Repeated measurements of a state count once.
-            let distinct: Vec<usize> =
-                (0..recorded.len()).filter(|&k| k == 0 || recorded.times[k] > recorded.times[k - 1]).collect();
-            let times: Vec<f64> = distinct.iter().map(|&k| recorded.times[k]).collect();
-            let clock = Clock::of(&times);
-            let gap = |k: &usize| !clock.reaches_across(times[*k] - times[k - 1]);
-            let bounds: Vec<usize> = [0].into_iter().chain((1..times.len()).filter(gap)).chain([times.len()]).collect();
-            for pair in bounds.windows(2) {
-                let states = &distinct[pair[0]..pair[1]];
-                let end = distinct.get(pair[1]).copied().unwrap_or(recorded.len());
-                parts.push((part(recorded, states, n), states.to_vec()));
-                all.push(Piece { track, samples: states[0]..end, long: None });
-            }
-        }
-        let usable: usize = all.iter().map(|piece: &Piece| piece.samples.len()).sum();
-        if usable < LEAST_SAMPLES {
-            return Err(IdentifyError::Short { found: usable, needed: LEAST_SAMPLES });
+        let (mut all, parts) = divided(recording);
+        let found: usize = all.iter().map(|piece| piece.samples.len()).sum();
+        if found < LEAST_SAMPLES {
+            return Err(IdentifyError::Short { found, needed: LEAST_SAMPLES });
         }
         let mut long = Recording { tracks: Vec::new(), ..recording.clone() };
         let mut origin = Vec::new();
-        for (piece, (part, states)) in
-            all.iter_mut().zip(&parts).filter(|(_, (part, _))| part.len() >= LEAST_SMOOTHED_SAMPLES)
-        {
+        let enough = |(_, part): &(&mut Piece, &Part)| part.track.len() >= LEAST_SMOOTHED_SAMPLES;
+        for (piece, part) in all.iter_mut().zip(&parts).filter(enough) {
             piece.long = Some(origin.len());
-            long.tracks.push(part.clone());
-            origin.push((piece.track, states.clone()));
+            long.tracks.push(part.track.clone());
+            origin.push((piece.track, part.samples.clone()));
         }
-        // Numbers in place of missing readings have no noise.
-        let read = |i: usize| -> Vec<(usize, Vec<f64>, Vec<f64>)> {
-            let of = |(piece, (part, states)): (&Piece, &(RecordedTrajectory, Vec<usize>))| {
-                let own = options.missing.get(piece.track).filter(|own| !own.is_empty());
-                let kept = (0..part.len()).filter(|&k| !own.is_some_and(|own| own[states[k] * n + i]));
-                let (times, values) = kept.map(|k| (part.times[k], part.q[k * n + i])).unzip();
-                (piece.track, times, values)
-            };
-            all.iter().zip(&parts).map(of).collect()
-        };
-        let readings: Vec<_> = (0..n).map(read).collect();
-        let estimated = |i: usize, track: Option<usize>| {
-            let own = readings[i].iter().filter(|(of, ..)| track.is_none_or(|track| *of == track));
-            noise(own.map(|(_, times, values)| (times.as_slice(), values.as_slice())), 1, 0).sigma
-        };
-        let gaps = options.missing.iter().flatten().any(|missing| *missing);
-        let given = gaps.then(|| (0..n).map(|i| estimated(i, None)).collect());
-        let choices = SmoothOptions { noise: options.noise.clone().or(given), ..SmoothOptions::default() };
         // Short pieces help to estimate the noise, but are not smoothed.
-        let chosen = (!long.tracks.is_empty()).then(|| Smoothing::choose(&long, &choices)).transpose();
-        let smoothing = match chosen {
-            Ok(smoothing) => smoothing,
-            Err(SmoothError::Short { .. }) => None,
-            Err(error) => return Err(error.into()),
-        };
-        let step = smoothing.as_ref().map_or_else(|| usual_step(&parts), |smoothing| smoothing.step);
+        let readings: Vec<_> = (0..n).map(|i| readings(&all, &parts, (n, i), &options.missing)).collect();
+        let gaps = options.missing.iter().flatten().any(|missing| *missing);
+        let given = gaps.then(|| (0..n).map(|i| estimated(&readings[i], None)).collect());
+        let smoothing = smoothing(&long, options.noise.clone().or(given))?;
+        let step = smoothing.as_ref().map_or_else(|| typical_step(&parts), |smoothing| smoothing.step);
         let sigma = |i: usize| match (&smoothing, &options.noise) {
             (Some(smoothing), _) => smoothing.coordinates[i].noise.sigma,
             (None, Some(given)) => given[i],
-            (None, None) => estimated(i, None),
+            (None, None) => estimated(&readings[i], None),
         };
         let noise: Vec<f64> = (0..n).map(sigma).collect();
-        let of = |track: usize| (0..n).map(|i| estimated(i, Some(track))).collect();
+        let of = |track: usize| (0..n).map(|i| estimated(&readings[i], Some(track))).collect();
         let noise_of = (0..recording.tracks.len()).map(of).collect();
         let still = smoothing.as_ref().map_or_else(Vec::new, |smoothing| stillness(&long, smoothing));
         let still = still.into_iter().filter(|(_, how)| !matches!(how, Stillness::Copy(_)));
         let still = still
             .map(|(i, how)| format!("{} {how}; nothing can be learned about it", recording.coordinates[i]))
             .collect();
-        let smooth =
-            |track: &RecordedTrajectory| smoothing.as_ref().map(|smoothing| smoothing.apply(track)).transpose();
-        let mut smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
-        if let Some(filled) = filled {
-            // Smoothed values weight the readings around held ones as if the held ones were missing.
-            for ((track, smoothed), (from, samples)) in long.tracks.iter_mut().zip(&smoothed).zip(&origin) {
-                let held = samples.iter().flat_map(|k| &filled.held[*from][k * n..(k + 1) * n]);
-                let values = smoothed.iter().flat_map(|smoothed| &smoothed.q);
-                let held = track.q.iter_mut().zip(values).zip(held).filter(|(_, held)| **held);
-                held.for_each(|((q, value), _)| *q = *value);
-            }
-            smoothed = long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        let smoothed = Vec::new();
+        let mut pieces = Self { recording, all, long, origin, smoothing, smoothed, step, noise, noise_of, still };
+        pieces.smooth(filled)?;
+        Ok(pieces)
+    }
+
+    /// Smooths the long pieces, the second time with smoothed values in place of held readings: these weight the readings around as if the held
+    /// ones were missing.
+    fn smooth(&mut self, filled: Option<&Filled>) -> Result<(), IdentifyError> {
+        let (n, smoothing) = (self.recording.n(), self.smoothing.as_ref());
+        let smooth = |track: &RecordedTrajectory| smoothing.map(|smoothing| smoothing.apply(track)).transpose();
+        self.smoothed = self.long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        let Some(filled) = filled else { return Ok(()) };
+        for ((track, smoothed), (from, samples)) in self.long.tracks.iter_mut().zip(&self.smoothed).zip(&self.origin) {
+            let held = samples.iter().flat_map(|k| &filled.held[*from][k * n..(k + 1) * n]);
+            let values = smoothed.iter().flat_map(|smoothed| &smoothed.q);
+            let held = track.q.iter_mut().zip(values).zip(held).filter(|(_, held)| **held);
+            held.for_each(|((q, value), _)| *q = *value);
         }
-        Ok(Self { recording, all, long, origin, smoothing, smoothed, step, noise, noise_of, still })
+        self.smoothed = self.long.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+        Ok(())
     }
 
     /// Trajectory and sample index of a sample of a long piece.
@@ -174,7 +207,7 @@ impl<'a> Pieces<'a> {
         gaps
     }
 
-    /// Segments of about so many samples. A short piece forms one segment with the pieces after it.
+    /// Segments of about this many samples. A short piece forms one segment with the pieces after it.
     pub fn cut(&self, samples: usize) -> Vec<Segment> {
         let mut segments: Vec<Segment> = Vec::new();
         for pieces in self.all.chunk_by(|one, next| one.track == next.track) {
@@ -198,7 +231,7 @@ impl<'a> Pieces<'a> {
         thinned(segments)
     }
 
-    /// Position and velocity at a sample, smoothed or by a polynomial through the samples near it.
+    /// Position and velocity at a sample, from the smoothed motion or from a polynomial through the samples nearby.
     pub fn start(&self, track: usize, sample: usize) -> Vec<f64> {
         let n = self.recording.n();
         let behind = self.all.partition_point(|piece| (piece.track, piece.samples.start) <= (track, sample));
@@ -212,8 +245,8 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// A range of samples of a trajectory.
-fn part(track: &RecordedTrajectory, samples: &[usize], n: usize) -> RecordedTrajectory {
+/// The given samples of a trajectory.
+fn selected(track: &RecordedTrajectory, samples: &[usize], n: usize) -> RecordedTrajectory {
     let rows = |values: &[f64]| match values.is_empty() {
         true => Vec::new(),
         false => samples.iter().flat_map(|&k| values[k * n..(k + 1) * n].to_vec()).collect(),
@@ -223,16 +256,16 @@ fn part(track: &RecordedTrajectory, samples: &[usize], n: usize) -> RecordedTraj
     RecordedTrajectory { name, times, q, v, a: rows(&track.a), force: rows(&track.force) }
 }
 
-/// Median step within pieces, or across their gaps if there are no other steps.
-fn usual_step(parts: &[(RecordedTrajectory, Vec<usize>)]) -> f64 {
+/// Median step within pieces; 1 if no piece has a step.
+fn typical_step(parts: &[Part]) -> f64 {
     let mut steps: Vec<f64> =
-        parts.iter().flat_map(|(part, _)| part.times.windows(2).map(|pair| pair[1] - pair[0])).collect();
+        parts.iter().flat_map(|part| part.track.times.windows(2).map(|pair| pair[1] - pair[0])).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Position and velocity at a sample by a quadratic polynomial through all samples of its piece and, if these are few, the samples nearest to it
-/// in time.
+/// Position and velocity at a sample, from a quadratic polynomial through all samples of its piece and, if these are few, the samples closest in
+/// time.
 fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usize>) -> Vec<f64> {
     let (mut first, mut end) = (piece.start.min(sample), piece.end.max(sample + 1));
     let now = track.times[sample];
@@ -250,7 +283,7 @@ fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usiz
             (0..n).for_each(|c| rights[c][i] += row[i] * track.q[k * n + c]);
         }
     }
-    // Pieces of fewer than three times the smallest polynomial.
+    // Fewer than three times leave the polynomial open: the smallest one is taken.
     (0..3).for_each(|i| matrix[4 * i] += POLYNOMIAL_RIDGE);
     let mut start = vec![0.0; 2 * n];
     for (i, right) in rights.iter().enumerate() {

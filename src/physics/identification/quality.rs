@@ -1,4 +1,4 @@
-//! Tests of residuals: whether they are noise, and which samples are outliers.
+//! Tests of the residuals: whether they are consistent with the noise, and which samples are outliers.
 
 use super::follow::Segment;
 use super::found::{Outlier, Residual};
@@ -12,8 +12,8 @@ use super::verdict::Verdict;
 use crate::recording::robust_deviation;
 use crate::scalar::Real;
 
-/// Probability that a variable of the F distribution with these degrees of freedom is larger: Paulson's normal approximation of its cube root
-/// (Annals of Mathematical Statistics 13 (1942) 233), and Wilson and Hilferty's of chi squared for many of the second.
+/// Upper tail of the F distribution with the given degrees of freedom: Paulson's normal approximation of its cube root
+/// (Annals of Mathematical Statistics 13 (1942) 233), which becomes Wilson and Hilferty's of chi squared for a large second number.
 pub(super) fn tail(ratio: f64, first: f64, second: f64) -> f64 {
     let [a, b] = [first, second].map(|freedom| 2.0 / (9.0 * freedom));
     let root = ratio.max(0.0).cbrt();
@@ -25,14 +25,14 @@ pub(super) fn tail(ratio: f64, first: f64, second: f64) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Correlation {
     /// Autocorrelation at lag 1.
-    pub neighbours: f64,
-    /// Probability that independent residuals are as correlated (Ljung and Box, Biometrika 65 (1978) 297).
+    pub at_lag_one: f64,
+    /// Probability that independent residuals are at least as correlated (Ljung and Box, Biometrika 65 (1978) 297).
     pub probability: f64,
-    /// Number of samples over which residuals are clearly correlated.
+    /// Number of lags over which residuals are significantly correlated.
     pub length: usize,
 }
 
-/// Autocorrelation of runs of numbers, where missing ones are `NaN`.
+/// Autocorrelation of the numbers in several runs; missing numbers are `NaN`.
 pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
     let (squares, count) = runs
         .iter()
@@ -55,13 +55,13 @@ pub(super) fn correlation(runs: &[Vec<f64>]) -> Correlation {
     let statistic: f64 = (1..=lags).map(|lag| at(lag).0.powi(2)).sum();
     let length = (1..longest / 2).find(|&lag| at(lag).0 < UNCORRELATED).unwrap_or(longest / 2);
     Correlation {
-        neighbours: first / f64::sqrt(pairs.max(1.0)),
+        at_lag_one: first / f64::sqrt(pairs.max(1.0)),
         probability: tail(statistic / lags as f64, lags as f64, 1e9),
         length,
     }
 }
 
-/// Innovations of every reading along segments with unknown initial states: for a correct model they are independent, with variance 1.
+/// Innovations of every reading along segments with unknown initial states. For a right model they are independent, with variance 1.
 pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<Vec<f64>>> {
     let n = problem.sigma.len();
     let mut open = problem.clone();
@@ -73,21 +73,21 @@ pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]
     for batch in order.chunks(LANES) {
         let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
         if problem.measured.is_some() {
-            open.disturbances.vague = problem.vague(x, &lanes);
+            open.disturbances.start_variances = problem.start_variances(x, &lanes);
         }
         open.residuals(x, &lanes, true, |lane, sample, i, r, _| found[i][batch[lane]][sample] = r);
     }
     found
 }
 
-/// Standard deviation of the residuals of a coordinate by the median of their size, which is robust against outliers.
-pub(super) fn usual(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> f64 {
+/// Standard deviation of the residuals of a coordinate, from the median of their sizes, which is robust against outliers.
+pub(super) fn typical_size(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> f64 {
     let own = residuals.iter().flat_map(|segment| segment.iter().skip(coordinate).step_by(n));
     let mut sizes: Vec<f64> = own.copied().filter(|r| r.is_finite()).collect();
     if sizes.is_empty() { 0.0 } else { robust_deviation(&mut sizes) }
 }
 
-/// Outliers, the farthest first, and their number.
+/// Outliers, the largest first, and their number.
 pub(super) fn outliers(
     (segments, residuals): (&[Segment], &[Vec<f64>]),
     n: usize,
@@ -96,10 +96,10 @@ pub(super) fn outliers(
     let mut found = Vec::new();
     for i in 0..n {
         let of = |segment: &Vec<f64>| segment.iter().skip(i).step_by(n).copied().collect::<Vec<_>>();
-        let usual = usual(residuals, n, i);
+        let typical = typical_size(residuals, n, i);
         for (segment, residuals) in segments.iter().zip(residuals) {
-            for (sample, r) in of(residuals).into_iter().enumerate().filter(|(_, r)| r.abs() > OUTLIER * usual) {
-                found.push((segment.track, segment.first + sample, i, r / usual.max(f64::MIN_POSITIVE)));
+            for (sample, r) in of(residuals).into_iter().enumerate().filter(|(_, r)| r.abs() > OUTLIER * typical) {
+                found.push((segment.track, segment.first + sample, i, r / typical.max(f64::MIN_POSITIVE)));
             }
         }
     }
@@ -128,39 +128,39 @@ pub(super) fn mean_eigenvalue(matrix: &[f64], n: usize) -> f64 {
 /// Evidence for and against a model.
 pub(super) struct Evidence<'a> {
     pub converged: bool,
-    /// By coordinate, with its noise and its spread; a spread of 0 means that there is nothing to compare with.
+    /// Residuals by coordinate; a spread of 0 means that there is no scale to compare with.
     pub residuals: &'a [Residual],
-    /// Size of the residuals of every coordinate, robust against outliers.
+    /// Robust size of the residuals of every coordinate.
     pub sizes: Vec<f64>,
-    /// The same size due to integration and rounding alone.
+    /// The size that integration and rounding alone cause.
     pub exact: Vec<f64>,
-    /// Probability that independent residuals are as correlated, for each coordinate, corrected for the number of coordinates.
+    /// p-value of the test of independence for each coordinate, corrected for the number of coordinates.
     pub probabilities: Vec<f64>,
     /// Share of outliers.
     pub outliers: f64,
-    /// Probability that noise makes the constants of segments differ as much.
+    /// p-value of the test that segments share their constants.
     pub agreement: f64,
-    /// Probability that noise causes the discontinuities between segments, and their typical length in s.
+    /// p-value of the test that segments continue each other, and their typical length in s.
     pub continuation: (f64, f64),
 }
 
 impl Evidence<'_> {
-    /// Accepts residuals that are as small as integration and rounding allow.
+    /// The verdict on the model: residuals as small as integration and rounding allow are accepted whatever their correlation.
     pub fn verdict(&self) -> Verdict {
         let all = |times: f64| self.sizes.iter().zip(&self.exact).all(|(size, exact)| *size <= times * exact);
-        let near = |(size, residual): (&f64, &Residual)| *size <= COARSE_OVER_NOISE * residual.noise;
-        let refusal = self.refusal();
-        let exact =
-            all(1.0) || refusal.is_some() && all(COARSE_INTEGRATION) && self.sizes.iter().zip(self.residuals).all(near);
-        match refusal {
-            Some(refusal) if !self.converged => refusal,
+        let small = |(size, residual): (&f64, &Residual)| *size <= COARSE_OVER_NOISE * residual.noise;
+        let objection = self.objection();
+        let exact = all(1.0)
+            || objection.is_some() && all(COARSE_INTEGRATION) && self.sizes.iter().zip(self.residuals).all(small);
+        match objection {
+            Some(objection) if !self.converged => objection,
             _ if exact => Verdict::Exact,
-            refusal => refusal.unwrap_or(Verdict::Explained),
+            objection => objection.unwrap_or(Verdict::Explained),
         }
     }
 
-    /// The first objection to the model.
-    fn refusal(&self) -> Option<Verdict> {
+    /// The first condition that the model violates.
+    fn objection(&self) -> Option<Verdict> {
         let share = |i: usize| {
             let spread = self.residuals[i].spread;
             if spread > 0.0 { self.sizes[i] / spread } else { 0.0 }
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn tails_are_those_of_tables() {
-        // F(5, 10) is beyond 3.3258 in 5 of 100, F(1, 30) beyond 7.5625 in 1, chi squared of 20 beyond 37.5662 in 1.
+        // F(5, 10) exceeds 3.3258 in 5 of 100 cases, F(1, 30) exceeds 7.5625 in 1, and chi squared with 20 degrees of freedom exceeds 37.5662 in 1.
         for (ratio, first, second, exact) in
             [(3.3258, 5.0, 10.0, 0.05), (7.5625, 1.0, 30.0, 0.01), (37.5662 / 20.0, 20.0, 1e9, 0.01)]
         {
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn independent_numbers_pass_and_others_do_not() {
+    fn independent_numbers_pass_and_correlated_ones_do_not() {
         let mut rng = RngStream::Region.generator(1);
         let mut series = |memory: f64| {
             let mut last = 0.0;
@@ -230,7 +230,7 @@ mod tests {
         let refused = (0..200).filter(|_| series(0.0).probability < SIGNIFICANCE).count();
         assert!(refused <= 8, "{refused}");
         let coloured = series(0.9);
-        assert!(coloured.probability < 1e-30 && (coloured.neighbours - 0.9).abs() < 0.05, "{coloured:?}");
+        assert!(coloured.probability < 1e-30 && (coloured.at_lag_one - 0.9).abs() < 0.05, "{coloured:?}");
         assert!((10..80).contains(&coloured.length), "{coloured:?}");
         assert!(series(0.15).probability < SIGNIFICANCE);
     }

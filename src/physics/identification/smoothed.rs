@@ -1,4 +1,4 @@
-//! Least-squares fits to smoothed motion: to its accelerations, where the fit to the motion begins, or to known forces.
+//! Least-squares fits to smoothed motion: to its accelerations, which gives starting values for the fit to the motion, or to known forces.
 
 use super::averages::Averages;
 use super::closed::FreePart;
@@ -13,13 +13,14 @@ use super::thresholds::{
 use crate::recording::smooth::Smoothed;
 use std::ops::Range;
 
-/// States with their accelerations, `(states, n)`, and the expected errors of these.
+/// Smoothed states with their accelerations and known forces, `(states, n)` each.
 #[derive(Default)]
 pub(super) struct States {
     pub q: Vec<f64>,
     pub v: Vec<f64>,
     pub a: Vec<f64>,
     pub force: Vec<f64>,
+    /// Expected errors of the accelerations.
     pub a_error: Vec<f64>,
     /// Trajectory and sample of every state.
     pub places: Vec<(usize, usize)>,
@@ -27,23 +28,23 @@ pub(super) struct States {
     pub weight: Vec<f64>,
     /// Number of samples between states.
     pub stride: usize,
-    /// Number of states on either side over which force equations are averaged, twice: the weights form a triangle.
+    /// Number of states on either side over which force equations are averaged. The average is taken twice, so that the weights form a triangle.
     pub averaged: usize,
-    /// Weights of the force equations in averages, `(states, n)`; empty for equal weights.
+    /// Weights of the force equations in these averages, `(states, n)`; empty for equal weights.
     pub share: Vec<f64>,
     /// Units in which forces on the coordinates are compared under constraints, `(n)`.
     pub units: Vec<f64>,
 }
 
-/// What the constants are fitted to.
+/// The quantity that the constants are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Met {
+pub(super) enum Quantity {
     Accelerations,
     Forces,
 }
 
 impl States {
-    /// From the samples with full windows.
+    /// The states at samples with full smoothing windows.
     pub fn new(problem: &Problem<'_>, smoothed: &[Option<Smoothed>]) -> Self {
         let n = problem.course.equations.n;
         let (mut states, mut force) = (Self::default(), vec![0.0; n]);
@@ -69,7 +70,7 @@ impl States {
             }
         }
         states.weight = states.a_error.iter().map(|error| error.max(1e-300).recip()).collect();
-        // A single sample that happens to look exact must not outweigh all others.
+        // A single sample that appears exact must not outweigh all others.
         let mut sorted = states.weight.clone();
         sorted.sort_by(f64::total_cmp);
         let most = MOST_WEIGHT * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
@@ -77,6 +78,7 @@ impl States {
         states
     }
 
+    /// Number of states.
     pub fn len(&self, n: usize) -> usize {
         self.q.len() / n
     }
@@ -87,7 +89,7 @@ impl States {
         (track, problem.course.recording.tracks[track].times[sample])
     }
 
-    /// Calls `visit` with every batch of states: the integrator, the batch's offset among the numbers, and its accelerations for constants `x`.
+    /// Calls `visit` with every batch of states: the evaluated equations, the range of the batch in the arrays, and its accelerations for constants `x`.
     pub fn batches(
         &self,
         problem: &Problem<'_>,
@@ -109,12 +111,18 @@ impl States {
         }
     }
 
-    /// Residuals with their slopes by the constants, `(numbers, m)`, in batches of states: `visit(first number, residuals, slopes)`.
-    fn residuals(&self, problem: &Problem<'_>, x: &[f64], met: Met, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+    /// Calls `visit(first index, residuals, slopes)` with the residuals of every batch of states and their derivatives by the constants.
+    fn residuals(
+        &self,
+        problem: &Problem<'_>,
+        x: &[f64],
+        quantity: Quantity,
+        mut visit: impl FnMut(usize, &[f64], &[f64]),
+    ) {
         let (n, values) = (problem.course.equations.n, problem.parameters(x));
         let width = 2 * n + problem.course.chosen;
-        let (mut residual, mut rows, mut kept) = (Vec::new(), Vec::new(), Kept::default());
-        // A residual and its slopes.
+        let (mut residual, mut rows, mut pending) = (Vec::new(), Vec::new(), PendingRows::default());
+        // Length of a row: a residual and its derivatives.
         let one = width - 2 * n + 1;
         let mut averages = Averages::new(self, (n, one));
         self.batches(problem, x, |follower, range, a| {
@@ -122,59 +130,59 @@ impl States {
             let (q, v) = (&self.q[range.clone()], &self.v[range]);
             rows.clear();
             residual.resize(a.len(), 0.0);
-            if met == Met::Accelerations {
+            if quantity == Quantity::Accelerations {
                 residual.iter_mut().zip(measured.iter().zip(a)).for_each(|(r, (measured, a))| *r = measured - *a);
                 for slopes in follower.slopes(&values, (q, v, a)).chunks_exact(width) {
                     rows.extend_from_slice(&slopes[2 * n..]);
                 }
                 return visit(first, &residual, &rows);
             }
-            follower.lacking_forces(measured, &mut residual);
+            follower.unbalanced_forces(measured, &mut residual);
             let slopes = follower.force_slopes(&values, (q, v, measured)).chunks_exact(width);
             for (r, slopes) in residual.iter().zip(slopes) {
                 rows.push(*r);
                 rows.extend_from_slice(&slopes[2 * n..]);
             }
-            self.free_part(follower, |free| free.take_all(&mut rows, one));
+            self.with_free_part(follower, |free| free.project_all(&mut rows, one));
             for row in rows.chunks_exact(n * one) {
-                averages.take(row, |mean| kept.take(mean, one, LANES * n, &mut visit));
+                averages.take(row, |mean| pending.take(mean, one, LANES * n, &mut visit));
             }
         });
-        kept.finish(&mut visit);
+        pending.finish(&mut visit);
     }
 
-    /// Calls `act` with what tells the part of forces on the states evaluated last that constraints cannot balance; not without constraints.
-    pub fn free_part(&self, follower: &Follower<'_>, act: impl FnOnce(FreePart<'_>)) {
+    /// Under constraints, calls `act` with the projection of forces to the part that the constraints cannot balance, at the states evaluated last.
+    pub fn with_free_part(&self, follower: &Follower<'_>, act: impl FnOnce(FreePart<'_>)) {
         let (n, rows) = (self.units.len(), follower.rows());
         if n > 0 && !rows.is_empty() {
             act(FreePart { rows, constraints: follower.constraints(), units: &self.units });
         }
     }
 
-    /// Normal equations, with the right-hand sides of batches of states; `None` where no residual is finite.
-    pub fn normal(&self, problem: &Problem<'_>, x: &[f64], met: Met) -> Option<Normal> {
+    /// Normal equations with the right-hand sides of batches of states; `None` if no residual is finite.
+    pub fn normal(&self, problem: &Problem<'_>, x: &[f64], quantity: Quantity) -> Option<Normal> {
         let m = problem.chosen.len();
         let mut products = Products::new(problem.course.equations.n, m);
         let mut matrix = vec![0.0; m * m];
         let add = |i: usize, row: &[f64], factor: f64| products.add(i, row, factor, &mut matrix);
-        let normal = self.right(problem, x, met, add)?;
+        let normal = self.right_hand_side(problem, x, quantity, add)?;
         products.finish(&mut matrix);
         let diagonal = (0..m).map(|k| matrix[k * m + k]).collect();
         Some(Normal { matrix, diagonal, ..normal })
     }
 
-    /// Normal equations without their matrix, the sum over rows of the products of `add(coordinate, row, factor)`.
-    fn right(
+    /// Normal equations without their matrix; `add(coordinate, row, factor)` receives the weighted rows, whose products sum to the matrix.
+    fn right_hand_side(
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        met: Met,
+        quantity: Quantity,
         mut add: impl FnMut(usize, &[f64], f64),
     ) -> Option<Normal> {
         let (n, m) = (problem.course.equations.n, problem.chosen.len());
         let mut normal = Normal { right: vec![0.0; m], held: vec![false; m], ..Normal::default() };
-        self.residuals(problem, x, met, |first, residuals, slopes| {
-            let mut part = vec![0.0; m];
+        self.residuals(problem, x, quantity, |first, residuals, slopes| {
+            let mut right = vec![0.0; m];
             for (k, residual) in residuals.iter().enumerate() {
                 let (weight, row) = (self.weight[first + k], &slopes[k * m..(k + 1) * m]);
                 let residual = residual * weight;
@@ -186,22 +194,22 @@ impl States {
                 let size = residual.abs();
                 let cut = if size > HUBER { HUBER / size } else { 1.0 };
                 normal.square += if size > HUBER { HUBER * (2.0 * size - HUBER) } else { residual * residual };
-                part.iter_mut().zip(row).for_each(|(sum, x)| *sum += cut * weight * x * residual);
+                right.iter_mut().zip(row).for_each(|(sum, x)| *sum += cut * weight * x * residual);
                 add((first + k) % n, row, cut.sqrt() * weight);
             }
-            normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
-            normal.parts.push(part);
+            normal.right.iter_mut().zip(&right).for_each(|(sum, x)| *sum += x);
+            normal.rights.push(right);
         });
         (normal.count > 0.0).then_some(normal)
     }
 
-    /// Force residuals, `(states, n)`, and their averages.
+    /// Force residuals, `(states, n)`, and their averages over neighbouring states.
     pub fn force_residuals(&self, problem: &Problem<'_>, x: &[f64]) -> [Vec<f64>; 2] {
         let mut all = vec![0.0; self.q.len()];
         self.batches(problem, x, |follower, range, _| {
             let found = &mut all[range.clone()];
-            follower.lacking_forces(&self.a[range], found);
-            self.free_part(follower, |free| free.take_all(found, 1));
+            follower.unbalanced_forces(&self.a[range], found);
+            self.with_free_part(follower, |free| free.project_all(found, 1));
         });
         let (n, mut means) = (problem.course.equations.n, Vec::with_capacity(all.len()));
         let mut averages = Averages::new(self, (n, 1));
@@ -209,21 +217,21 @@ impl States {
         [all, means]
     }
 
-    /// Fits constants to the smoothed motion; returns the normal equations there, `None` if no residual is finite.
-    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, met: Met) -> Option<Normal> {
-        let mut best = self.normal(problem, x, met)?;
-        let given = if met == Met::Forces { &self.force } else { &self.a };
+    /// Fits the constants to the smoothed motion; returns the normal equations at the end, `None` if no residual is finite.
+    pub fn fit(&self, problem: &Problem<'_>, x: &mut Vec<f64>, quantity: Quantity) -> Option<Normal> {
+        let mut best = self.normal(problem, x, quantity)?;
+        let given = if quantity == Quantity::Forces { &self.force } else { &self.a };
         let size: f64 = given.iter().zip(&self.weight).map(|(a, w)| (a * w).powi(2)).sum();
-        // Forces are often linear in the constants, and the matrix of one step is then that of the next.
-        let mut linear = met == Met::Forces;
+        // Forces are often linear in the constants. The matrix of one step can then be used for the next.
+        let mut linear = quantity == Quantity::Forces;
         let mut damping = if linear { 1e-9 } else { 1e-3 };
-        let (mut kept, mut before) = (false, f64::INFINITY);
+        let (mut matrix_kept, mut before) = (false, f64::INFINITY);
         for _ in 0..SMOOTHED_ITERATIONS {
-            let muted = problem.too_weak(x, &best, NO_EFFECT_IN_SEARCH * size);
-            problem.judge(x, &mut best, &muted, damping > MOST_DAMPING);
-            if kept && !best.converged && best.decrement > MATRIX_KEPT * before {
-                best = self.normal(problem, x, met)?;
-                (linear, kept) = (false, false);
+            let fixed = problem.too_weak(x, &best, NO_EFFECT_IN_SEARCH * size);
+            problem.record_convergence(x, &mut best, &fixed, damping > MOST_DAMPING);
+            if matrix_kept && !best.converged && best.decrement > MATRIX_KEPT * before {
+                best = self.normal(problem, x, quantity)?;
+                (linear, matrix_kept) = (false, false);
                 continue;
             }
             let residual = (best.square / best.count.max(1.0)).sqrt();
@@ -231,17 +239,17 @@ impl States {
                 break;
             }
             before = best.decrement;
-            let change = problem.step(x, &mut best, &muted, damping).change;
-            let moved = problem.moved(x, &change, &best);
+            let change = problem.step(x, &mut best, &fixed, damping).change;
+            let moved = problem.stepped(x, &change, &best);
             let tried = match linear {
-                true => self.right(problem, &moved, met, |_, _, _| ()),
-                false => self.normal(problem, &moved, met),
+                true => self.right_hand_side(problem, &moved, quantity, |_, _, _| ()),
+                false => self.normal(problem, &moved, quantity),
             };
             match tried {
                 Some(mut tried) if tried.square < best.square => {
                     if linear {
                         tried.keep_matrix(best);
-                        kept = true;
+                        matrix_kept = true;
                     }
                     (*x, best) = (moved, tried);
                     damping = f64::max(damping / 10.0, LEAST_DAMPING);
@@ -254,20 +262,20 @@ impl States {
 }
 
 impl Normal {
-    /// `true` if the sum of squares is smaller than that of a fit nearer to the given constants by more than two ways to write a law differ.
-    fn is_better(&self, nearer: &Self) -> bool {
-        self.square < (1.0 - LEAST_PHASE_DECREASE) * nearer.square
+    /// `true` if the sum of squares is significantly smaller than that of a fit closer to the given constants.
+    fn is_better(&self, closer: &Self) -> bool {
+        self.square < (1.0 - LEAST_PHASE_DECREASE) * closer.square
     }
 }
 
 impl States {
-    /// As [`States::fit`] to accelerations, of forces that may have a phase: the sum of squares has many minima over a frequency, as many as
-    /// there are periods in the recording, and over the wave number of a field that the motion crosses, so that the fit begins at several values
-    /// of it. In a long recording a wide range is searched by a short part, which doubles. Returns the constants, by their places, whose range
-    /// was searched in part only, and that part.
+    /// Fits the constants to the accelerations, as [`States::fit`], for forces that may have a phase. The sum of squares has as many minima over a
+    /// frequency as there are periods in the recording, and similarly over the wave number of a field that the motion crosses. The fit therefore
+    /// begins at several values of such a constant. A wide range is searched in a short part of a long recording first, which then doubles. Returns
+    /// the constants, by index, whose range was searched only in part, and that part.
     pub fn fit_phases(&self, problem: &Problem<'_>, x: &mut Vec<f64>) -> Option<Vec<(usize, [f64; 2])>> {
         let given = x.clone();
-        let mut best = self.fit(problem, x, Met::Accelerations)?;
+        let mut best = self.fit(problem, x, Quantity::Accelerations)?;
         let mut cut = Vec::new();
         for k in 0..problem.chosen.len() {
             let Some(whole) = self.phase_step(problem, (&given, k)) else { continue };
@@ -286,7 +294,7 @@ impl States {
             let mut from = given.clone();
             loop {
                 let part = (share < 1.0).then(|| self.beginning(problem, share));
-                let found = part.as_ref().unwrap_or(self).nearest(problem, (&from, k), step, count);
+                let found = part.as_ref().unwrap_or(self).best_start(problem, (&from, k), step, count);
                 let Some((tried, found)) = found else { break };
                 if share == 1.0 {
                     if found.is_better(&best) {
@@ -301,8 +309,8 @@ impl States {
         Some(cut)
     }
 
-    /// The best of the fits that begin at a value of constant `k` and at `count` others on either side of it; of equal ones the nearest.
-    fn nearest(
+    /// The best of the fits that begin at a value of constant `k` and at `count` values on either side of it; of equally good ones the closest.
+    fn best_start(
         &self,
         problem: &Problem<'_>,
         (from, k): (&[f64], usize),
@@ -313,7 +321,7 @@ impl States {
         for place in std::iter::once(0.0).chain((1..=count).flat_map(|j| [j as f64, -(j as f64)])) {
             let mut tried = from.to_vec();
             tried[k] += place * step;
-            let Some(found) = self.fit(problem, &mut tried, Met::Accelerations) else { continue };
+            let Some(found) = self.fit(problem, &mut tried, Quantity::Accelerations) else { continue };
             if best.as_ref().is_none_or(|(_, best)| found.is_better(best)) {
                 best = Some((tried, found));
             }
@@ -321,7 +329,7 @@ impl States {
         best
     }
 
-    /// The states within the first share of the time.
+    /// The states within the first `share` of the time.
     fn beginning(&self, problem: &Problem<'_>, share: f64) -> Self {
         let n = problem.course.equations.n;
         let [low, high] = self.span(problem);
@@ -350,43 +358,43 @@ impl States {
         times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)])
     }
 
-    /// Largest change of a constant, of the range that is searched and its halves, that leaves the derivatives of the accelerations by it almost
-    /// parallel. `None` for the whole range: the constant, such as a stiffness, is none of a phase. No growth of the derivatives is looked for,
-    /// since smoothing leaves out the beginning of a recording.
+    /// Largest change of a constant, among the searched range and its halves, that leaves the derivatives of the accelerations by the constant almost
+    /// parallel. `None` if the whole range does: the constant, such as a stiffness, is not part of a phase. Growth of the derivatives is not tested,
+    /// because smoothing omits the beginning of a recording.
     fn phase_step(&self, problem: &Problem<'_>, (x, k): (&[f64], usize)) -> Option<f64> {
         let m = problem.chosen.len();
         let derivatives = |change: f64| {
             let (mut moved, mut found) = (x.to_vec(), Vec::new());
             moved[k] += change;
-            self.residuals(problem, &moved, Met::Accelerations, |first, _, slopes| {
+            self.residuals(problem, &moved, Quantity::Accelerations, |first, _, slopes| {
                 let rows = slopes.chunks_exact(m).zip(&self.weight[first..]);
                 found.extend(rows.map(|(row, weight)| weight * row[k]));
             });
             found
         };
-        let here = derivatives(0.0);
-        let alike = |change: &f64| {
-            let there = derivatives(*change);
-            let pairs = here.iter().zip(&there).filter(|(a, b)| a.is_finite() && b.is_finite());
+        let unchanged = derivatives(0.0);
+        let parallel = |change: &f64| {
+            let changed = derivatives(*change);
+            let pairs = unchanged.iter().zip(&changed).filter(|(a, b)| a.is_finite() && b.is_finite());
             let [ab, aa, bb] = pairs.fold([0.0; 3], |[ab, aa, bb], (a, b)| [ab + a * b, aa + a * a, bb + b * b]);
             ab >= LEAST_COSINE * (aa * bb).sqrt()
         };
         let range = if x[k] == 0.0 { 1.0 } else { PHASE_RANGE * x[k].abs() };
-        let step = (0..PHASE_HALVINGS).map(|halvings| range * 0.5f64.powi(halvings)).find(alike)?;
+        let step = (0..PHASE_HALVINGS).map(|halvings| range * 0.5f64.powi(halvings)).find(parallel)?;
         (step < range).then_some(step)
     }
 }
 
-/// Residuals and slopes of states, until they are a batch.
+/// Residuals and their derivatives that wait until they fill a batch.
 #[derive(Default)]
-struct Kept {
+struct PendingRows {
     residuals: Vec<f64>,
     slopes: Vec<f64>,
     first: usize,
 }
 
-impl Kept {
-    /// Takes rows of a residual and its slopes, `one` numbers each; hands on `batch` of them.
+impl PendingRows {
+    /// Adds rows of a residual and its derivatives, `one` numbers each; passes them on once there are `batch`.
     fn take(&mut self, rows: &[f64], one: usize, batch: usize, visit: &mut impl FnMut(usize, &[f64], &[f64])) {
         for row in rows.chunks_exact(one) {
             self.residuals.push(row[0]);
@@ -397,6 +405,7 @@ impl Kept {
         }
     }
 
+    /// Passes on the remaining rows.
     fn finish(&mut self, visit: &mut impl FnMut(usize, &[f64], &[f64])) {
         if !self.residuals.is_empty() {
             visit(self.first, &self.residuals, &self.slopes);

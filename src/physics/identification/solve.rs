@@ -1,10 +1,10 @@
-//! Multiple shooting: fits constants and the initial states of all segments by Levenberg and Marquardt's method.
+//! Multiple shooting: residuals and normal equations of constants, sensor constants and the initial states of segments.
 //!
 //! Every segment has an initial state of its own, which is eliminated from the normal equations.
 
 use super::descent::Spectrum;
 use super::follow::{Course, Follower, Segment, State};
-use super::innovations::Disturbances;
+use super::innovations::{Disturbances, Filter};
 use super::linear::{inverse_with, times};
 use super::measured::{Measured, ReadingSlopes};
 use super::thresholds::{FAILED_SQUARE, GIVEN_WEIGHT, HUBER, LANES, RIDGE, START_ROUNDS};
@@ -29,7 +29,7 @@ pub(crate) struct Sensor {
 }
 
 impl Sensor {
-    /// Value of a perfect sensor.
+    /// The value of a perfect sensor.
     pub fn perfect(self) -> f64 {
         if self.kind == SensorKind::Gain { 1.0 } else { 0.0 }
     }
@@ -45,22 +45,22 @@ pub(crate) struct Problem<'a> {
     pub chosen: Vec<usize>,
     pub ranges: Vec<Range>,
     pub sensors: Vec<Sensor>,
-    /// What was measured in place of the coordinates; nothing if these were. What follows here is by coordinate, or by reading.
+    /// Quantities that were measured in place of the coordinates, if any. The fields below are by coordinate, or by such a reading.
     pub measured: Option<&'a Measured>,
     /// Standard deviation of every coordinate's noise.
     pub sigma: Vec<f64>,
-    /// The same by trajectory if trajectories differ; otherwise empty.
+    /// The same by trajectory, if trajectories differ; otherwise empty.
     pub sigma_of: Vec<Vec<f64>>,
-    /// The same for every sample if known, `(samples, n)` by trajectory; otherwise empty.
+    /// The same for every sample, if known, `(samples, n)` by trajectory; otherwise empty.
     pub errors: &'a [Vec<f64>],
-    /// Readings of positions that are missing, `(samples, n)` of each track; empty if none is.
+    /// Marks of missing readings of positions, `(samples, n)` by trajectory; empty if none is missing.
     pub missing: &'a [Vec<bool>],
-    /// First samples after long gaps, by trajectory: there the number of turns of an angle is unknown.
+    /// First samples after long gaps, by trajectory; the number of turns of an angle within a gap is unknown.
     pub gaps: Vec<Vec<usize>>,
     /// Spread of every coordinate over all samples.
     pub spread: Vec<f64>,
     pub robust: bool,
-    /// Disturbances of the motion that the equations do not contain.
+    /// Disturbances of the motion.
     pub disturbances: Disturbances,
     pub threads: usize,
     /// Cancels every loop.
@@ -81,23 +81,23 @@ pub(crate) struct Linear {
 pub(crate) struct Normal {
     pub matrix: Vec<f64>,
     pub right: Vec<f64>,
-    /// Diagonal with initial states held fixed.
+    /// Its diagonal with the initial states held fixed.
     pub diagonal: Vec<f64>,
     /// The right-hand side of every segment.
-    pub parts: Vec<Vec<f64>>,
+    pub rights: Vec<Vec<f64>>,
     pub square: f64,
     /// Number of residuals minus the numbers of initial states.
     pub count: f64,
     pub failed: usize,
     /// Newton decrement of the initial states, per number.
-    pub of_starts: f64,
+    pub start_decrement: f64,
     /// Newton decrement over the variance of the noise: the decrease of the sum of squares that another step would bring.
     pub decrement: f64,
-    /// `true` if that is far below 1.
+    /// `true` if the decrement is far below 1.
     pub converged: bool,
     /// Constants at the bound of their range, beyond which the fit would be better.
     pub held: Vec<bool>,
-    /// Eigenvectors of the matrix, once a step needed them.
+    /// Eigenvectors of the matrix, from the first step on.
     pub(super) spectrum: Option<Spectrum>,
 }
 
@@ -108,12 +108,12 @@ impl Normal {
         Self { matrix: vec![0.0; m * m], right, diagonal, held: vec![false; m], ..Self::default() }
     }
 
-    /// Takes the matrix of other normal equations.
+    /// Replaces the matrix by that of other normal equations.
     pub fn keep_matrix(&mut self, other: Self) {
         (self.matrix, self.diagonal, self.spectrum) = (other.matrix, other.diagonal, other.spectrum);
     }
 
-    /// The same, with constants at their bounds treated as known to far below their least value.
+    /// The same, with constants at their bounds treated as given.
     pub fn with_held(mut self) -> Self {
         let m = self.right.len();
         self.spectrum = None;
@@ -125,15 +125,111 @@ impl Normal {
     }
 }
 
+/// Compares the integrated motion of segments with the readings.
+struct Comparison<'a> {
+    problem: &'a Problem<'a>,
+    segments: &'a [&'a Segment],
+    /// Offset, gain and delay of the sensor of every reading.
+    sensors: Vec<[f64; 3]>,
+    /// Delays other than 0, each with the states at the earlier times.
+    delayed: Vec<(f64, State)>,
+    reader: Option<ReadingSlopes<'a>>,
+    /// Filters of the segments; empty if residuals are independent.
+    filters: Vec<Filter>,
+    /// Derivatives of the last residual; empty if not requested.
+    row: Vec<f64>,
+    /// Number of derivatives by initial state and constants, the first ones of a row.
+    columns: usize,
+}
+
+impl<'a> Comparison<'a> {
+    fn new(problem: &'a Problem<'a>, x: &[f64], segments: &'a [&'a Segment], derivatives: bool) -> Self {
+        let columns = problem.course.starts() + problem.chosen.len();
+        let width = columns + problem.sensors.len();
+        let filters = problem.filters(segments.len(), width);
+        let sensors: Vec<[f64; 3]> = (0..problem.width()).map(|i| problem.sensor(x, i)).collect();
+        let mut delayed: Vec<(f64, State)> = Vec::new();
+        for [_, _, delay] in &sensors {
+            if *delay != 0.0 && delayed.iter().all(|(known, _)| known != delay) {
+                delayed.push((*delay, State::default()));
+            }
+        }
+        let row = vec![0.0; if derivatives || !filters.is_empty() { width } else { 0 }];
+        let reader = problem.measured.map(ReadingSlopes::new);
+        Self { problem, segments, sensors, delayed, reader, filters, row, columns }
+    }
+
+    /// Evaluates delayed states and measured formulas at a sample of all segments.
+    fn evaluate(&mut self, follower: &mut Follower<'_>, values: &[f64], sample: usize, state: &State) {
+        for (delay, late) in &mut self.delayed {
+            follower.shifted(values, (self.segments, sample), (state, -*delay), late);
+        }
+        if let Some(reader) = &mut self.reader {
+            reader.evaluate((follower, &self.problem.course), values, (self.segments, sample), state);
+        }
+    }
+
+    /// The residual, or the innovation, of reading `i` of a lane at a sample of its trajectory; writes its derivatives to the row. Of angles that
+    /// may have `turned`, full turns are removed.
+    fn residual(&mut self, (lane, i): (usize, usize), (place, turned): (usize, bool), state: &State) -> f64 {
+        let (problem, track) = (self.problem, self.segments[lane].track);
+        let (width, columns) = (problem.width(), self.columns);
+        let recording = problem.course.recording;
+        let at = lane * width + i;
+        let [offset, gain, delay] = self.sensors[i];
+        let late = self.delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
+        let (predicted, slopes) = match &self.reader {
+            Some(reader) => (reader.readings[at], &reader.slopes),
+            None => (late.q[at], &late.q_slopes),
+        };
+        let sigma = problem.sigma_at(track, place, i);
+        let mut difference = recording.tracks[track].q[place * width + i] - gain * predicted - offset;
+        if problem.measured.is_some_and(|measured| measured.angles[i]) || turned && recording.periodic[i] {
+            difference -= TAU * (difference / TAU).round();
+        }
+        if !self.row.is_empty() {
+            let factor = gain / sigma;
+            self.row.iter_mut().zip(&slopes[at * columns..(at + 1) * columns]).for_each(|(r, q)| *r = factor * q);
+            for (sensor, r) in problem.sensors.iter().zip(&mut self.row[columns..]) {
+                *r = match (sensor.coordinate == i, sensor.kind) {
+                    (false, _) => 0.0,
+                    (_, SensorKind::Offset) => sigma.recip(),
+                    (_, SensorKind::Gain) => predicted / sigma,
+                    (_, SensorKind::Delay) => -gain * late.v[at] / sigma,
+                };
+            }
+        }
+        match self.filters.get_mut(lane) {
+            Some(filter) => filter.pass(difference / sigma, &mut self.row),
+            None => difference / sigma,
+        }
+    }
+
+    /// Adds the disturbance of the known forces over one interval to the filters; `follower` evaluated the states last.
+    fn disturb(&mut self, follower: &Follower<'_>, state: &State) {
+        let (problem, n) = (self.problem, self.problem.n());
+        let starts = problem.course.starts();
+        let slopes = state.by_starts(n, (starts, self.columns));
+        let impulses = problem.impulses(&slopes, &follower.mobility(), problem.course.step);
+        self.filters.iter_mut().zip(impulses.chunks_exact(n * starts)).for_each(|(filter, own)| filter.disturb(own));
+    }
+}
+
 impl Problem<'_> {
     /// Number of coordinates.
     pub(super) fn n(&self) -> usize {
         self.course.equations.n
     }
 
-    /// Number of readings of a sample: of positions, or of what was measured in their place.
+    /// Number of readings of a sample: positions, or the quantities measured in their place.
     pub(super) fn width(&self) -> usize {
         self.sigma.len()
+    }
+
+    /// Starting values of the unknown constants, and perfect sensors.
+    pub fn given(&self) -> Vec<f64> {
+        let sensors = self.sensors.iter().map(|sensor| sensor.perfect());
+        self.chosen.iter().map(|&k| self.values[k]).chain(sensors).collect()
     }
 
     /// Number of unknowns other than initial states.
@@ -167,12 +263,12 @@ impl Problem<'_> {
         }
     }
 
-    /// `true` for a position that was not read.
+    /// `true` for a missing reading.
     fn is_missing(&self, track: usize, sample: usize, i: usize) -> bool {
         self.missing.get(track).and_then(|track| track.get(sample * self.width() + i)).is_some_and(|missing| *missing)
     }
 
-    /// Number of positions of segments that were read.
+    /// Number of readings of segments, missing ones left out.
     pub fn readings(&self, segments: &[Segment]) -> f64 {
         let n = self.width();
         let of = |segment: &Segment| {
@@ -189,9 +285,9 @@ impl Problem<'_> {
         self.gaps.get(segment.track).and_then(next).is_some_and(|gap| gap <= sample)
     }
 
-    /// Calls `visit(segment, sample, reading, residual, row)` along segments: residuals of positions in units of noise and, if requested,
-    /// their derivatives by initial state, constants and sensors of one lane; innovations if there are disturbances. Returns the sum of the
-    /// logarithms of the innovations' variances, in units of the noise.
+    /// Integrates segments and calls `visit(segment, sample, reading, residual, row)` for every reading. Residuals are in units of the noise; the row
+    /// holds their derivatives by initial state, constants and sensor constants, if requested. With disturbances, `visit` receives innovations
+    /// instead. Returns the sum of the logarithms of the innovations' variances, in units of the noise.
     pub(super) fn residuals(
         &self,
         x: &[f64],
@@ -199,81 +295,31 @@ impl Problem<'_> {
         derivatives: bool,
         mut visit: impl FnMut(usize, usize, usize, f64, &[f64]),
     ) -> f64 {
-        let (n, m, width) = (self.n(), self.chosen.len(), self.width());
+        let (n, width) = (self.n(), self.width());
         let values = self.parameters(x);
-        let starts = self.course.starts();
-        let columns = starts + m;
-        let mut filters = self.filters(segments.len(), columns + self.sensors.len());
-        let derivatives = derivatives || !filters.is_empty();
-        let sensors: Vec<[f64; 3]> = (0..width).map(|i| self.sensor(x, i)).collect();
-        let mut row = vec![0.0; if derivatives { columns + self.sensors.len() } else { 0 }];
+        let mut comparison = Comparison::new(self, x, segments, derivatives);
+        let derivatives = derivatives || !comparison.filters.is_empty();
         let mut a = vec![0.0; segments.len() * n];
         let noisy = !self.disturbances.force.is_empty();
-        let mut delayed: Vec<(f64, State)> = Vec::new();
-        for [_, _, delay] in &sensors {
-            if *delay != 0.0 && delayed.iter().all(|(known, _)| known != delay) {
-                delayed.push((*delay, State::default()));
-            }
-        }
-        let mut reader = self.measured.map(ReadingSlopes::new);
-        let is_angle = |i: usize| self.measured.is_some_and(|measured| measured.angles[i]);
-        let read = |follower: &mut Follower<'_>, sample: usize, state: &State| {
-            for (delay, late) in &mut delayed {
-                follower.shifted(&values, (segments, sample), (state, -*delay), late);
-            }
-            if let Some(reader) = &mut reader {
-                reader.evaluate((follower, &self.course), &values, (segments, sample), state);
-            }
+        Follower::new(&self.course).follow(&values, segments, derivatives, |follower, sample, state| {
+            comparison.evaluate(follower, &values, sample, state);
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
                 let place = segment.first + sample;
                 let turned = self.is_beyond_gap(segment, place);
-                let measured = &self.course.recording.tracks[segment.track].q[place * width..][..width];
                 for i in (0..width).filter(|i| !self.is_missing(segment.track, place, *i)) {
-                    let at = lane * width + i;
-                    let [offset, gain, delay] = sensors[i];
-                    let late = delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
-                    let (seen, slopes) = match &reader {
-                        Some(reader) => (reader.seen[at], &reader.slopes),
-                        None => (late.q[at], &late.q_slopes),
-                    };
-                    let sigma = self.sigma_at(segment.track, place, i);
-                    let mut missed = measured[i] - gain * seen - offset;
-                    if is_angle(i) || turned && self.course.recording.periodic[i] {
-                        missed -= TAU * (missed / TAU).round();
-                    }
-                    let residual = missed / sigma;
-                    if derivatives {
-                        let slopes = &slopes[at * columns..(at + 1) * columns];
-                        let factor = gain / sigma;
-                        row.iter_mut().zip(slopes).for_each(|(r, q)| *r = factor * q);
-                        for (sensor, r) in self.sensors.iter().zip(&mut row[columns..]) {
-                            *r = match (sensor.coordinate == i, sensor.kind) {
-                                (false, _) => 0.0,
-                                (_, SensorKind::Offset) => sigma.recip(),
-                                (_, SensorKind::Gain) => seen / sigma,
-                                (_, SensorKind::Delay) => -gain * late.v[at] / sigma,
-                            };
-                        }
-                    }
-                    let residual = match filters.get_mut(lane) {
-                        Some(filter) => filter.pass(residual, &mut row),
-                        None => residual,
-                    };
-                    visit(lane, sample, i, residual, &row);
+                    let residual = comparison.residual((lane, i), (place, turned), state);
+                    visit(lane, sample, i, residual, &comparison.row);
                 }
             }
             if noisy {
                 follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
-                let slopes = state.by_starts(n, (starts, columns));
-                let impulses = self.impulses(&slopes, &follower.mobility(), self.course.step);
-                filters.iter_mut().zip(impulses.chunks_exact(n * starts)).for_each(|(filter, own)| filter.disturb(own));
+                comparison.disturb(follower, state);
             }
-        };
-        Follower::new(&self.course).follow(&values, segments, derivatives, read);
-        filters.iter().map(|filter| filter.log_variance).sum()
+        });
+        comparison.filters.iter().map(|filter| filter.log_variance).sum()
     }
 
-    /// Normal equations of a batch of segments; `None` for those that cannot be followed.
+    /// Normal equations of a batch of segments; `None` for those that cannot be integrated.
     pub(super) fn batch(&self, x: &[f64], segments: &[&Segment]) -> Vec<Option<Linear>> {
         let starts = self.course.starts();
         let width = starts + self.unknowns();
@@ -379,7 +425,7 @@ impl Problem<'_> {
             normal.square += linear.square;
             normal.count += linear.count;
             let inverse = self.start_inverse(linear, 0.0);
-            normal.of_starts += dot(&times(starts, &inverse, &linear.right[..starts]), &linear.right[..starts]);
+            normal.start_decrement += dot(&times(starts, &inverse, &linear.right[..starts]), &linear.right[..starts]);
             let mixed = |i: usize, k: usize| linear.matrix[i * width + starts + k];
             let mut solved = vec![0.0; starts * m];
             for i in 0..starts {
@@ -398,9 +444,9 @@ impl Problem<'_> {
                 }
             }
             normal.right.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
-            normal.parts.push(part);
+            normal.rights.push(part);
         }
-        normal.of_starts /= (starts * segments.len().max(1)) as f64;
+        normal.start_decrement /= (starts * segments.len().max(1)) as f64;
         normal
     }
 

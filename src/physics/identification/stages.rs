@@ -1,28 +1,26 @@
-//! Stages of identification: from smoothed accelerations to longer and longer segments of motion.
+//! The stages of identification: fits to smoothed accelerations, then to longer and longer segments of the motion.
 
 use super::by_trajectory::by_trajectory;
-use super::choices::{check_errors, chosen, inputs, met, missing, sensors};
-use super::covariance::{Root, Weighing, agreement, continuation, long_run, scores};
+use super::choices::{check_errors, chosen, fitted_quantity, inputs, missing, sensors};
 use super::first_fit::first_fit;
 use super::follow::{Course, Segment};
-use super::found::{Identified, Outlier, Residual, ResidualPath};
+use super::found::Identified;
 use super::initial_states::SEARCHED;
 use super::innovations::Disturbances;
+use super::interpolations::{Rivals, best_interpolation};
 use super::measured::{Measured, check_columns};
+use super::motion_result::result;
 use super::per_trajectory::per_trajectory;
 use super::pieces::Pieces;
-use super::quality::{Correlation, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, usual};
-use super::smoothed::{Met, States};
-use super::solve::{Normal, Problem};
+use super::smoothed::{Quantity, States};
+use super::solve::{Normal, Problem, Sensor};
 use super::thresholds::{
     EQUAL_SQUARES, EXACT_RESIDUAL, FEW_START_ROUNDS, FIRST_SEGMENT, INTEGRATION_ERROR, ITERATIONS, LAST_ITERATIONS,
-    LEAST_ERROR_DECREASE, LEAST_FREEDOM, LEAST_NOISE, LEAST_NOISE_LEFT, LEAST_OWN_NOISE_SAMPLES,
-    LEAST_SCATTERED_SEGMENTS, LEAST_SEGMENT, MOST_FIRST_SAMPLES, MOST_INCREASE, MOST_OVER_NOISE, MOST_SAMPLES,
-    MOST_SUBSTEPS, NEAR_DECREMENT, OWN_NOISE_ERRORS, OWN_NOISE_RATIO, SCATTER_ERRORS, SEGMENTS_OF_RUN, SHORT_OF_CHOSEN,
-    SIGNIFICANCE, START_ROUNDS, STEP_PROBES, USUAL_FIRST_SAMPLES,
+    LEAST_ERROR_DECREASE, LEAST_NOISE, LEAST_NOISE_LEFT, LEAST_OWN_NOISE_SAMPLES, LEAST_SCATTERED_SEGMENTS,
+    LEAST_SEGMENT, MOST_FIRST_SAMPLES, MOST_INCREASE, MOST_OVER_NOISE, MOST_SAMPLES, MOST_SUBSTEPS, NEAR_DECREMENT,
+    OWN_NOISE_ERRORS, OWN_NOISE_RATIO, SCATTER_ERRORS, SEGMENTS_OF_RUN, SHORT_OF_CHOSEN, START_ROUNDS, STEP_PROBES,
+    USUAL_FIRST_SAMPLES,
 };
-use super::unknowns::unknowns;
-use super::ways::{Rivals, best_between};
 use super::{Between, IdentifyError, IdentifyOptions, Verdict, by_forces};
 use crate::lagrangian::system::Range;
 use crate::lagrangian::{Equations, SystemInstance};
@@ -30,7 +28,7 @@ use crate::names::rounded;
 use crate::recording::{Filled, Recording, deviation, filled, rms};
 use std::f64::consts::TAU;
 
-/// Constants, sensors and initial states with the normal equations there.
+/// Fitted constants, sensor constants and initial states, with the normal equations at these values.
 #[derive(Clone)]
 pub(super) struct Fitted {
     pub x: Vec<f64>,
@@ -45,8 +43,8 @@ impl Fitted {
         self.normal.square / self.normal.count.max(1.0)
     }
 
-    /// `true` for a fit that reached the noise with every constant inside its range: no better fit is to be expected.
-    fn is_plain(&self) -> bool {
+    /// `true` for a fit that reached the noise with every constant inside its range: no better fit can be expected.
+    fn is_sufficient(&self) -> bool {
         let inside = !self.normal.held.contains(&true);
         self.normal.converged && inside && self.mean_square() < MOST_OVER_NOISE * MOST_OVER_NOISE
     }
@@ -55,31 +53,31 @@ impl Fitted {
     /// segments' scores if residuals are correlated along a segment. The second number is the share of the latter.
     pub fn inflation(&self) -> (f64, f64) {
         let square = self.mean_square();
-        let (m, count) = (self.x.len(), self.normal.parts.len());
+        let (m, count) = (self.x.len(), self.normal.rights.len());
         if count < LEAST_SCATTERED_SEGMENTS {
             return (square, 1.0);
         }
         let ratio = |k: usize| {
-            let scatter: f64 = self.normal.parts.iter().map(|part| part[k] * part[k]).sum();
+            let scatter: f64 = self.normal.rights.iter().map(|part| part[k] * part[k]).sum();
             scatter / self.normal.matrix[k * m + k]
         };
         let mut ratios: Vec<f64> = (0..m).map(ratio).filter(|ratio| ratio.is_finite()).collect();
         ratios.sort_by(f64::total_cmp);
         let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(square) / square;
-        // Scatter of noise itself is not exactly one.
-        let plain = scatter <= 1.0 + SCATTER_ERRORS * (2.0 / count as f64).sqrt();
-        if plain { (square, 1.0) } else { (square * scatter, scatter) }
+        // The scatter that noise causes is itself only estimated.
+        let independent = scatter <= 1.0 + SCATTER_ERRORS * (2.0 / count as f64).sqrt();
+        if independent { (square, 1.0) } else { (square * scatter, scatter) }
     }
 
-    /// Unknowns with a visible effect.
-    fn seen(&self) -> Vec<bool> {
+    /// Marks the unknowns with a visible effect.
+    fn visible(&self) -> Vec<bool> {
         let m = self.x.len();
         let own = |k: usize| self.normal.matrix[k * m + k];
         (0..m).map(|k| own(k) > 0.0 && (self.x[k] == 0.0 || own(k) * self.x[k] * self.x[k] > 1.0)).collect()
     }
 
-    /// Mean log standard error of some unknowns, each with the others fixed.
-    fn spread(&self, of: &[bool]) -> f64 {
+    /// Mean log standard error of the marked unknowns, each with the others held fixed.
+    fn mean_log_error(&self, of: &[bool]) -> f64 {
         let m = self.x.len();
         let own = |k: usize| self.normal.matrix[k * m + k].max(f64::MIN_POSITIVE);
         let logarithms: Vec<f64> = (0..m).filter(|k| of[*k]).map(|k| own(k).ln()).collect();
@@ -87,20 +85,21 @@ impl Fitted {
         (self.inflation().0.ln() - mean) / 2.0
     }
 
-    /// `true` if it determines the unknowns better than another fit: those with a visible effect in either; errors of the others are rounding.
-    fn tells_more_than(&self, other: &Self) -> bool {
-        let either: Vec<bool> = self.seen().into_iter().zip(other.seen()).map(|(a, b)| a || b).collect();
-        self.spread(&either) < other.spread(&either) - LEAST_ERROR_DECREASE
+    /// `true` if its standard errors are smaller than those of another fit. Unknowns without a visible effect in either fit do not count: their
+    /// errors are rounding.
+    fn determines_better_than(&self, other: &Self) -> bool {
+        let either: Vec<bool> = self.visible().into_iter().zip(other.visible()).map(|(a, b)| a || b).collect();
+        self.mean_log_error(&either) < other.mean_log_error(&either) - LEAST_ERROR_DECREASE
     }
 }
 
-/// Identifies the constants of a system from recorded motion; angles are unwrapped, numbers are in the units of the system.
+/// Identifies the constants of a system from recorded motion. Angles must be unwrapped, and numbers in the units of the system.
 ///
-/// If the file of the system has a table `[measured]`, the recording holds these quantities in place of the coordinates, under their names and
-/// in their order, [`SystemInstance::measured`]; what is said of positions then holds for readings.
+/// If the system file has a table `[measured]`, the recording holds these quantities in place of the coordinates, under their names and in their
+/// order, [`SystemInstance::measured`]. Every statement about positions then applies to these readings.
 ///
 /// # Errors
-/// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and positions that constraints do not allow.
+/// [`IdentifyError`] for options and recordings that do not match the system, motion that is too short, and positions off a constraint.
 /// Constants that the motion does not determine are not an error, nor is a model that does not fit: the result reports them.
 pub fn identify(
     instance: &SystemInstance<f64>,
@@ -108,8 +107,8 @@ pub fn identify(
     options: &IdentifyOptions,
 ) -> Result<Identified, IdentifyError> {
     let mut found = match per_trajectory(instance, recording, options)? {
-        Some((instance, options)) => together(&instance, recording, &options)?,
-        None => together(instance, recording, options)?,
+        Some((instance, options)) => identify_together(&instance, recording, &options)?,
+        None => identify_together(instance, recording, options)?,
     };
     if options.by_trajectory {
         found.by_trajectory = Some(by_trajectory(instance, recording, options, &found)?);
@@ -117,8 +116,8 @@ pub fn identify(
     Ok(found)
 }
 
-/// The constants of all trajectories together.
-fn together(
+/// Identifies the constants of all trajectories together.
+fn identify_together(
     instance: &SystemInstance<f64>,
     recording: &Recording,
     options: &IdentifyOptions,
@@ -129,13 +128,13 @@ fn together(
     check_errors(recording, &options.errors)?;
     let inputs = inputs(instance, recording, options)?;
     let filled = filled(recording);
-    let mut repeated = filled.as_ref().map_or_else(Vec::new, repeated);
-    repeated.extend(missing(recording, &options.missing)?);
+    let mut notes = filled.as_ref().map_or_else(Vec::new, repeated_readings);
+    notes.extend(missing(recording, &options.missing)?);
     let filled = Filled::without(filled, recording, &options.missing);
     let recording = filled.as_ref().map_or(recording, |filled| &filled.recording);
     let chosen = chosen(instance, options)?;
     let sensors = sensors(instance, recording, options)?;
-    let met = met(instance, recording, options)?;
+    let quantity = fitted_quantity(instance, recording, options)?;
     let stop = &options.cancellation;
     stop.stage("equations of motion");
     let unknown = || IdentifyError::Unknown { system: instance.system.name.to_string() };
@@ -146,133 +145,214 @@ fn together(
     stop.stage("smoothed motion");
     let pieces = Pieces::new(recording, filled.as_ref(), options)?;
     let spread: Vec<f64> = (0..n).map(|i| spread_of(recording, i)).collect();
-    let least: Vec<f64> = spread.iter().map(|spread| LEAST_NOISE * spread).collect();
-    let known = options.noise.is_some() || !options.errors.is_empty();
-    let noise = |i: usize| match options.errors.is_empty() {
-        true => pieces.noise[i].max(least[i]),
-        false => rms(options.errors.iter().flat_map(|errors| errors.iter().skip(i).step_by(n)).copied()),
-    };
-    let mut noise: Vec<f64> = (0..n).map(noise).collect();
-    let forced = recording.tracks.iter().any(|track| !track.force.is_empty());
+    let setup = Setup { instance, options, recording, pieces: &pieces, spread: &spread, notes };
     let course = Course {
         recording,
         equations: &equations,
         chosen: chosen.len(),
         between: options.between.unwrap_or(Between::Linear),
-        inputs: inputs.clone(),
+        inputs,
         step: pieces.step,
         substeps: 1,
     };
-    let start: Vec<f64> = chosen.iter().map(|&k| instance.parameters[k]).collect();
-    let given: Vec<f64> = start.iter().copied().chain(sensors.iter().map(|sensor| sensor.perfect())).collect();
-    let mut problem = Problem {
-        course,
-        values: instance.parameters.clone(),
-        ranges: instance.system.parameters.iter().map(|parameter| parameter.range).collect(),
-        chosen,
-        sensors,
-        measured: measured.as_ref(),
-        sigma: noise.clone(),
-        sigma_of: Vec::new(),
-        errors: &options.errors,
-        missing: &options.missing,
-        gaps: pieces.gaps(),
-        spread,
-        robust: options.robust,
-        disturbances: Disturbances::default(),
-        threads: options.threads.max(1),
-        cancellation: options.cancellation.clone(),
+    let problem = setup.problem(course, (chosen, sensors), measured.as_ref());
+    stop.check()?;
+    let on_pieces = setup.on_pieces(&problem);
+    let found = match quantity {
+        Quantity::Forces => setup.fit_forces(&on_pieces)?,
+        Quantity::Accelerations => setup.fit_motion(problem, &on_pieces)?,
     };
-    stop.check()?;
-    let of_piece = |track: usize| inputs.get(pieces.origin(track, 0).0).copied();
-    let of_pieces = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
-    let course = Course { recording: &pieces.long, inputs: of_pieces, ..problem.course.clone() };
-    let on_pieces = Problem { course, missing: &[], ..problem.clone() };
-    if met == Met::Forces {
-        stop.stage("forces");
-        let smoothing = pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
-        let mut found = by_forces::identify(instance, &on_pieces, smoothing, (given, pieces.cut_long()))?;
-        for outlier in &mut found.outliers {
-            (outlier.track, outlier.sample) = pieces.origin(outlier.track, outlier.sample);
-        }
-        found.obstacles = [pieces.still, repeated].concat();
-        return Ok(found.named(recording, options.robust));
-    }
-    let (mut fitted, cut) = first_fit(&mut problem, (&on_pieces, &pieces), (instance, &given), options)?;
-    if options.segment.is_none() {
-        fitted = shortened(&problem, fitted);
-    }
-    if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
-        refit(&problem, &mut fitted, ITERATIONS);
-    }
-    // The noise of the forces is now known, so that the smoothest curve through it does not win.
-    let (best, mut rivals) = best_between(&mut problem, fitted, &Rivals::all(options, forced || instance.has_inputs()));
-    fitted = best;
-    if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
-        refit(&problem, &mut fitted, ITERATIONS);
-    }
-    if !known {
-        weigh(&mut problem, &fitted);
-        choose_steps(&mut problem, &fitted.x, &fitted.segments);
-        refit(&problem, &mut fitted, ITERATIONS);
-    }
-    stop.stage("longer segments");
-    fitted = grown(&mut problem, fitted, options.segment);
-    if forced {
-        // Force errors accumulate: longer segments show them best.
-        let mut longer = joined(&fitted.segments);
-        problem.settle(&fitted.x, &mut longer, START_ROUNDS);
-        problem.estimate_force_noise(&fitted.x, &longer);
-    }
-    if !known {
-        weigh(&mut problem, &fitted);
-        choose_steps(&mut problem, &fitted.x, &fitted.segments);
-    }
-    refit(&problem, &mut fitted, LAST_ITERATIONS);
-    smooth(&mut problem, &mut fitted);
-    // Longer segments exclude more of the interpolations.
-    (fitted, rivals) = best_between(&mut problem, fitted, &rivals);
-    fitted = unturned(&problem, released(&problem, fitted, &given), &given);
-    if !problem.sigma_of.is_empty() {
-        let own = |i: usize| {
-            let squares = recording.tracks.iter().zip(&pieces.noise_of);
-            squares.map(|(track, noise)| track.len() as f64 * noise[i].powi(2)).sum::<f64>()
-        };
-        noise = (0..n).map(|i| (own(i) / recording.samples() as f64).sqrt().max(least[i])).collect();
-    }
-    stop.check()?;
-    stop.stage("what is determined");
-    let mut found = result(instance, &problem, &fitted, (&start, &noise), known);
-    stop.check()?;
-    if pieces.still.len() == n {
-        // Coordinates that all stand still cannot confirm a model.
-        let coordinate = recording.coordinates[0].clone();
-        (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
-    }
-    let searched = |(k, [low, high]): &(usize, [f64; 2])| {
-        let symbol = &instance.system.parameters[problem.chosen[*k]].symbol;
-        let [low, high] = [low, high].map(|x| rounded(*x, 4));
-        format!("{symbol} was searched from {low} to {high}; begin nearer if it may lie outside")
-    };
-    found.obstacles = [pieces.still, repeated, cut.iter().map(searched).collect()].concat();
-    if equations.rows.is_some() {
-        let states = States::new(&on_pieces, &pieces.smoothed);
-        found.obstacles.extend(on_pieces.off_constraints(&fitted.x, (&states.q, &states.v)));
-    }
-    if problem.measured.is_some_and(Measured::is_searched) && !found.explained {
-        found.obstacles.push(SEARCHED.to_string());
-    }
-    rivals.widen(&mut found);
-    Ok(found.named(recording, options.robust))
+    Ok(found.finished(recording, options.robust))
 }
 
-/// Messages about readings that a sensor repeated.
-fn repeated(filled: &Filled) -> Vec<String> {
+/// What the stages of one identification share.
+struct Setup<'a> {
+    instance: &'a SystemInstance<f64>,
+    options: &'a IdentifyOptions,
+    recording: &'a Recording,
+    pieces: &'a Pieces<'a>,
+    /// Spread of every coordinate over all samples.
+    spread: &'a [f64],
+    /// Messages about readings that are repeated or missing.
+    notes: Vec<String>,
+}
+
+impl<'a> Setup<'a> {
+    /// The problem of the whole recording.
+    fn problem(
+        &self,
+        course: Course<'a>,
+        (chosen, sensors): (Vec<usize>, Vec<Sensor>),
+        measured: Option<&'a Measured>,
+    ) -> Problem<'a> {
+        let Self { instance, options, pieces, spread, .. } = *self;
+        Problem {
+            course,
+            values: instance.parameters.clone(),
+            ranges: instance.system.parameters.iter().map(|parameter| parameter.range).collect(),
+            chosen,
+            sensors,
+            measured,
+            sigma: self.noise(),
+            sigma_of: Vec::new(),
+            errors: &options.errors,
+            missing: &options.missing,
+            gaps: pieces.gaps(),
+            spread: spread.to_vec(),
+            robust: options.robust,
+            disturbances: Disturbances::default(),
+            threads: options.threads.max(1),
+            cancellation: options.cancellation.clone(),
+        }
+    }
+
+    /// The same problem for the long pieces alone.
+    fn on_pieces<'b>(&self, problem: &Problem<'b>) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        let pieces = self.pieces;
+        let of_piece = |track: usize| problem.course.inputs.get(pieces.origin(track, 0).0).copied();
+        let inputs = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
+        let course = Course { recording: &pieces.long, inputs, ..problem.course.clone() };
+        Problem { course, missing: &[], ..problem.clone() }
+    }
+
+    /// `true` if the noise of the positions is given.
+    fn knows_noise(&self) -> bool {
+        self.options.noise.is_some() || !self.options.errors.is_empty()
+    }
+
+    /// `true` if known forces act.
+    fn is_forced(&self) -> bool {
+        self.recording.tracks.iter().any(|track| !track.force.is_empty())
+    }
+
+    /// Standard deviation of every coordinate's noise before the fit, as given or as estimated.
+    fn noise(&self) -> Vec<f64> {
+        let (n, errors) = (self.spread.len(), &self.options.errors);
+        let of = |i: usize| match errors.is_empty() {
+            true => self.pieces.noise[i].max(LEAST_NOISE * self.spread[i]),
+            false => rms(errors.iter().flat_map(|errors| errors.iter().skip(i).step_by(n)).copied()),
+        };
+        (0..n).map(of).collect()
+    }
+
+    /// The same for trajectories whose noise differs: the root mean square over the samples.
+    fn noise_by_trajectory(&self) -> Vec<f64> {
+        let of = |i: usize| {
+            let squares = self.recording.tracks.iter().zip(&self.pieces.noise_of);
+            let square = squares.map(|(track, noise)| track.len() as f64 * noise[i].powi(2)).sum::<f64>();
+            (square / self.recording.samples() as f64).sqrt().max(LEAST_NOISE * self.spread[i])
+        };
+        (0..self.spread.len()).map(of).collect()
+    }
+
+    /// Constants fitted to the known forces on the long pieces.
+    fn fit_forces(&self, problem: &Problem<'_>) -> Result<Identified, IdentifyError> {
+        self.options.cancellation.stage("forces");
+        let smoothing = self.pieces.smoothing.as_ref().ok_or(IdentifyError::Lost)?;
+        let start = (problem.given(), self.pieces.cut_long());
+        let mut found = by_forces::identify(self.instance, problem, smoothing, start)?;
+        for outlier in &mut found.outliers {
+            (outlier.track, outlier.sample) = self.pieces.origin(outlier.track, outlier.sample);
+        }
+        found.obstacles = [&self.pieces.still[..], &self.notes].concat();
+        Ok(found)
+    }
+
+    /// Constants fitted to the motion.
+    fn fit_motion(&self, mut problem: Problem<'a>, on_pieces: &Problem<'_>) -> Result<Identified, IdentifyError> {
+        let (stop, given) = (&self.options.cancellation, problem.given());
+        let (fitted, searched) =
+            first_fit(&mut problem, (on_pieces, self.pieces), (self.instance, &given), self.options)?;
+        let (fitted, rivals) = self.refined(&mut problem, fitted);
+        stop.stage("longer segments");
+        let (fitted, rivals) = self.completed(&mut problem, fitted, &rivals);
+        let fitted = without_full_turns(&problem, restarted_from_bounds(&problem, fitted, &given), &given);
+        let noise = if problem.sigma_of.is_empty() { self.noise() } else { self.noise_by_trajectory() };
+        stop.check()?;
+        stop.stage("what is determined");
+        let start = (&given[..problem.chosen.len()], &noise[..]);
+        let mut found = result(self.instance, &problem, &fitted, start, self.knows_noise());
+        stop.check()?;
+        if self.pieces.still.len() == self.recording.n() {
+            // Coordinates that all stand still cannot confirm a model.
+            let coordinate = self.recording.coordinates[0].clone();
+            (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
+        }
+        found.obstacles = [&self.pieces.still[..], &self.notes, &self.searched(&problem, &searched)].concat();
+        if problem.course.equations.rows.is_some() {
+            let states = States::new(on_pieces, &self.pieces.smoothed);
+            found.obstacles.extend(on_pieces.off_constraints(&fitted.x, (&states.q, &states.v)));
+        }
+        if problem.measured.is_some_and(Measured::is_searched) && !found.explained {
+            found.obstacles.push(SEARCHED.to_string());
+        }
+        rivals.widen(&mut found);
+        Ok(found)
+    }
+
+    /// The fit of the first segments with their best length, interpolation and noise, and the interpolations that fit as well.
+    fn refined(&self, problem: &mut Problem<'_>, mut fitted: Fitted) -> (Fitted, Rivals) {
+        let (options, forced) = (self.options, self.is_forced());
+        if options.segment.is_none() {
+            fitted = shortened(problem, fitted);
+        }
+        if forced && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+            refit(problem, &mut fitted, ITERATIONS);
+        }
+        // The noise of the forces is now known, so that the smoothest curve through them has no advantage.
+        let (mut fitted, rivals) =
+            best_interpolation(problem, fitted, &Rivals::all(options, forced || self.instance.has_inputs()));
+        if forced && options.between.is_none() && problem.estimate_force_noise(&fitted.x, &fitted.segments) {
+            refit(problem, &mut fitted, ITERATIONS);
+        }
+        if !self.knows_noise() {
+            update_noise(problem, &fitted);
+            choose_steps(problem, &fitted.x, &fitted.segments);
+            refit(problem, &mut fitted, ITERATIONS);
+        }
+        (fitted, rivals)
+    }
+
+    /// The last fit: to segments as long as useful, with the noise that these show.
+    fn completed(&self, problem: &mut Problem<'_>, fitted: Fitted, rivals: &Rivals) -> (Fitted, Rivals) {
+        let mut fitted = lengthened(problem, fitted, self.options.segment);
+        if self.is_forced() {
+            // Force errors accumulate: longer segments show them best.
+            let mut longer = joined(&fitted.segments);
+            problem.settle(&fitted.x, &mut longer, START_ROUNDS);
+            problem.estimate_force_noise(&fitted.x, &longer);
+        }
+        if !self.knows_noise() {
+            update_noise(problem, &fitted);
+            choose_steps(problem, &fitted.x, &fitted.segments);
+        }
+        refit(problem, &mut fitted, LAST_ITERATIONS);
+        refine_steps(problem, &mut fitted);
+        // Longer segments exclude more of the interpolations.
+        best_interpolation(problem, fitted, rivals)
+    }
+
+    /// Messages about constants whose range was searched only in part.
+    fn searched(&self, problem: &Problem<'_>, ranges: &[(usize, [f64; 2])]) -> Vec<String> {
+        let of = |(k, [low, high]): &(usize, [f64; 2])| {
+            let symbol = &self.instance.system.parameters[problem.chosen[*k]].symbol;
+            let [low, high] = [low, high].map(|x| rounded(*x, 4));
+            format!("{symbol} was searched from {low} to {high}; start closer to the true value if it may lie outside")
+        };
+        ranges.iter().map(of).collect()
+    }
+}
+
+/// Messages about readings that repeat the previous one.
+fn repeated_readings(filled: &Filled) -> Vec<String> {
     let recording = &filled.recording;
     let of = |(i, name): (usize, &String)| {
         let (held, samples) = (filled.count(i), recording.samples());
-        let says = "readings repeat the previous one during motion; they were interpolated from their neighbours";
-        (held > 0).then(|| format!("{name}: {held} of {samples} {says}"))
+        let problem = "readings repeat the previous one during motion; they were interpolated from their neighbours";
+        (held > 0).then(|| format!("{name}: {held} of {samples} {problem}"))
     };
     recording.coordinates.iter().enumerate().filter_map(of).collect()
 }
@@ -284,7 +364,7 @@ pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
     if spread > 0.0 { spread } else { 1.0 }
 }
 
-/// Samples of the first segments: a few time scales of the fastest coordinate, or the requested number if that is smaller.
+/// Number of samples in a first segment: a few time scales of the fastest coordinate, or the requested number if that is smaller.
 pub(super) fn first_samples(
     (v, a): (&[f64], &[f64]),
     (n, step): (usize, f64),
@@ -304,7 +384,7 @@ pub(super) fn first_samples(
     Ok(samples.min(wanted))
 }
 
-/// Segments up to the number of samples that can be followed: runs of consecutive segments, so that they can be joined later.
+/// Leaves out segments beyond the largest number of samples. Runs of consecutive segments are kept, so that these can be joined later.
 pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
     let all: usize = segments.iter().map(|segment| segment.samples).sum();
     if all <= MOST_SAMPLES {
@@ -316,19 +396,19 @@ pub(crate) fn thinned(segments: Vec<Segment>) -> Vec<Segment> {
     segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect()
 }
 
-/// The better fit of the first segments from either of two starts; segments that cannot be followed are left out. The second start is tried if
-/// the first one does not reach the noise.
-pub(super) fn first(
+/// The better fit of the first segments from two starting points. The second one is tried only if the fit from the first does not reach the noise.
+/// Segments that cannot be integrated are left out.
+pub(super) fn fit_first_segments(
     problem: &mut Problem<'_>,
     starts: [Vec<f64>; 2],
     segments: Vec<Segment>,
 ) -> Result<Fitted, IdentifyError> {
     let mut best: Option<Fitted> = None;
     for x in starts {
-        if best.as_ref().is_some_and(Fitted::is_plain) {
+        if best.as_ref().is_some_and(Fitted::is_sufficient) {
             break;
         }
-        let tried = first_from(problem, x, segments.clone());
+        let tried = fit_from(problem, x, segments.clone());
         problem.cancellation.check()?;
         let Some(tried) = tried else { continue };
         if best.as_ref().is_none_or(|best| tried.normal.square < best.normal.square) {
@@ -341,10 +421,10 @@ pub(super) fn first(
     Ok(best)
 }
 
-/// The fit of the first segments from given values.
-fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Option<Fitted> {
+/// The fit of the first segments from one starting point; `None` if no segment can be integrated.
+fn fit_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Option<Fitted> {
     problem.course.substeps = 1;
-    problem.bring(&x, &mut segments);
+    problem.project_starts(&x, &mut segments);
     choose_steps(problem, &x, &segments);
     let followed = problem.all(&x, &segments);
     let mut kept = followed.iter().map(Option::is_some);
@@ -361,8 +441,8 @@ fn first_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>
     Some(fitted)
 }
 
-/// The better of two fits: one with constants at their bounds, and one that restarts these from their given values.
-fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
+/// The better of two fits: the given one, and one that restarts the constants at their bounds from their starting values.
+fn restarted_from_bounds(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     if !fitted.normal.held.contains(&true) {
         return fitted;
     }
@@ -375,8 +455,8 @@ fn released(problem: &Problem<'_>, fitted: Fitted, given: &[f64]) -> Fitted {
     if better { tried } else { fitted }
 }
 
-/// The fit with constants that are known up to full turns, such as a phase, brought next to their given values.
-fn unturned(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted {
+/// Shifts constants that are determined up to full turns, such as a phase, next to their starting values.
+fn without_full_turns(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted {
     for (k, &parameter) in problem.chosen.iter().enumerate().filter(|(_, k)| problem.ranges[**k] == Range::Any) {
         let turns = ((fitted.x[k] - given[k]) / TAU).round();
         let mut tried = fitted.x.clone();
@@ -392,14 +472,15 @@ fn unturned(problem: &Problem<'_>, mut fitted: Fitted, given: &[f64]) -> Fitted 
     fitted
 }
 
+/// Fits the constants and the initial states again.
 pub(super) fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
     fitted.substeps = problem.course.substeps;
     fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
 }
 
-/// Takes smaller steps of integration until the search converges: where a force turns sharply, such as dry friction, the error of the steps
-/// depends roughly on the constants, and the sum of squares with it.
-fn smooth(problem: &mut Problem<'_>, fitted: &mut Fitted) {
+/// Halves the integration steps until the search converges. Where a force changes abruptly, such as dry friction, the integration error is not a
+/// smooth function of the constants, and neither is the sum of squares.
+fn refine_steps(problem: &mut Problem<'_>, fitted: &mut Fitted) {
     while !fitted.normal.converged && fitted.normal.failed == 0 && problem.course.substeps < MOST_SUBSTEPS {
         if problem.cancellation.is_cancelled() {
             break;
@@ -416,12 +497,13 @@ fn smooth(problem: &mut Problem<'_>, fitted: &mut Fitted) {
 
 fn log(fitted: &Fitted, what: &str) {
     let (x, samples) = (&fitted.x, fitted.segments.first().map_or(0, |segment| segment.samples));
-    let (square, spread) = (fitted.mean_square(), fitted.spread(&fitted.seen()));
+    let (square, spread) = (fitted.mean_square(), fitted.mean_log_error(&fitted.visible()));
     let (segments, substeps) = (fitted.segments.len(), fitted.substeps);
     tracing::debug!(?x, samples, segments, substeps, square, spread, failed = fitted.normal.failed, "{what}");
 }
 
-/// Chooses as many integration steps between samples as keep the integrator's error below a share of the noise; `true` if their number changes.
+/// Increases the number of integration steps between samples until the integration error is small compared with the noise; `true` if the number
+/// changes.
 pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
     let before = problem.course.substeps;
     let stride = segments.len().div_ceil(STEP_PROBES).max(1);
@@ -446,11 +528,11 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     problem.course.substeps != before
 }
 
-/// Weights coordinates by their residuals, and trajectories by their own residuals where they clearly differ.
-fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
+/// Replaces the noise of every coordinate by the size of its residuals, for each trajectory separately if trajectories differ significantly.
+fn update_noise(problem: &mut Problem<'_>, fitted: &Fitted) {
     let (n, tracks) = (problem.sigma.len(), problem.course.recording.tracks.len());
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
-    let taken = fitted.normal.count / problem.readings(&fitted.segments);
+    let freedom = fitted.normal.count / problem.readings(&fitted.segments);
     // Residuals in the units of the coordinates, `(tracks, n)`.
     let mut own = vec![Vec::new(); tracks * n];
     for (segment, residuals) in fitted.segments.iter().zip(&residuals) {
@@ -459,36 +541,36 @@ fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
         }
     }
     let mut of = vec![vec![0.0; n]; tracks];
-    let mut unlike = false;
+    let mut differ = false;
     for i in 0..n {
         let least = (LEAST_NOISE * problem.spread[i]).max(LEAST_NOISE_LEFT * problem.sigma[i]);
-        let size = |values: Vec<f64>| (deviation_of(values, problem.robust) / taken.sqrt()).max(least);
+        let size = |values: Vec<f64>| (deviation_of(values, problem.robust) / freedom.sqrt()).max(least);
         let whole = size(own.iter().skip(i).step_by(n).flatten().copied().collect());
         // Integration errors of exact motion are not noise.
         let noisy = whole > EXACT_RESIDUAL * problem.spread[i];
         problem.sigma[i] = whole;
         for (track, of) in of.iter_mut().enumerate() {
             let values = &own[track * n + i];
-            let count = independent(values);
+            let count = independent_samples(values);
             of[i] = if values.len() < LEAST_OWN_NOISE_SAMPLES { whole } else { size(values.clone()) };
             // The log of a standard deviation has a standard error of one over the root of twice the count.
-            unlike |=
+            differ |=
                 noisy && (of[i] / whole).ln().abs() > OWN_NOISE_RATIO.max(OWN_NOISE_ERRORS / (2.0 * count).sqrt());
         }
     }
-    problem.sigma_of = if unlike { of } else { Vec::new() };
+    problem.sigma_of = if differ { of } else { Vec::new() };
 }
 
-/// Effective number of independent samples for a mean square, by the autocorrelation.
-fn independent(values: &[f64]) -> f64 {
+/// Effective number of independent samples in a mean square, from the autocorrelation at lag 1.
+fn independent_samples(values: &[f64]) -> f64 {
     let square: f64 = values.iter().map(|x| x * x).sum();
     let product: f64 = values.windows(2).map(|pair| pair[0] * pair[1]).sum();
-    let alike = (product / square).powi(2);
-    let share = (1.0 - alike) / (1.0 + alike);
+    let correlation = (product / square).powi(2);
+    let share = (1.0 - correlation) / (1.0 + correlation);
     if share.is_finite() { values.len() as f64 * share } else { 0.0 }
 }
 
-/// Root mean square, or a robust estimate from the median of the size, which is 0.6745 of it for normal numbers.
+/// Root mean square, or a robust estimate from the median of the sizes, which is 0.6745 times the standard deviation of normal numbers.
 fn deviation_of(mut values: Vec<f64>, robust: bool) -> f64 {
     if !robust {
         return rms(values);
@@ -515,7 +597,7 @@ pub(crate) fn joined(segments: &[Segment]) -> Vec<Segment> {
     joined.into_iter().map(|(segment, _)| segment).collect()
 }
 
-/// Halves every segment that is long enough; both halves start on the fitted motion.
+/// Halves every segment that is long enough. Both halves start on the fitted motion.
 fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
     let long = |segment: &&Segment| segment.samples >= 2 * problem.least_segment();
     let to_middle = |segment: &Segment| Segment { samples: segment.samples / 2 + 1, ..segment.clone() };
@@ -535,8 +617,8 @@ fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
     segments
 }
 
-/// For a model that does not fit, shortens segments while that reduces the standard errors: the effect of a missing term accumulates along a
-/// segment.
+/// Halves the segments of a model that does not fit, as long as that reduces the standard errors: the effect of a missing term accumulates along
+/// a segment.
 fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
     while fitted.mean_square() > MOST_OVER_NOISE * MOST_OVER_NOISE && !problem.cancellation.is_cancelled() {
         let segments = halved(problem, &fitted);
@@ -547,7 +629,7 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
         problem.settle(&shorter.x, &mut shorter.segments, FEW_START_ROUNDS);
         refit(problem, &mut shorter, ITERATIONS);
         log(&shorter, "shorter");
-        if shorter.normal.failed > 0 || !shorter.tells_more_than(&fitted) {
+        if shorter.normal.failed > 0 || !shorter.determines_better_than(&fitted) {
             break;
         }
         fitted = shorter;
@@ -555,18 +637,18 @@ fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
     fitted
 }
 
-/// Joins segments while that reduces the standard errors.
-fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
-    let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
-    let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * SHORT_OF_CHOSEN < wanted);
-    while wanted_more != Some(false) && !problem.cancellation.is_cancelled() {
+/// Joins adjacent segments as long as that reduces the standard errors, or up to the wanted length.
+fn lengthened(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
+    let seconds = |segments: &[Segment]| typical_samples(segments) as f64 * problem.course.step;
+    let mut too_short = wanted.map(|wanted| seconds(&fitted.segments) * SHORT_OF_CHOSEN < wanted);
+    while too_short != Some(false) && !problem.cancellation.is_cancelled() {
         let segments = joined(&fitted.segments);
         if segments.len() == fitted.segments.len() {
             break;
         }
         let mut longer = Fitted { segments, ..fitted.clone() };
         choose_steps(problem, &longer.x, &longer.segments);
-        // No number of steps is known to follow longer segments well enough.
+        // Even the largest number of steps does not integrate longer segments accurately.
         if wanted.is_none() && problem.course.substeps == MOST_SUBSTEPS && fitted.substeps < MOST_SUBSTEPS {
             problem.course.substeps = fitted.substeps;
             break;
@@ -574,153 +656,24 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         problem.settle(&longer.x, &mut longer.segments, START_ROUNDS);
         refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");
-        // Along chaotic motion the search gets stuck on the roughness of the sum of squares.
-        let is_followed = longer.normal.decrement < NEAR_DECREMENT || !fitted.normal.converged;
-        let met =
-            longer.normal.failed == 0 && longer.mean_square() < MOST_INCREASE * fitted.mean_square() && is_followed;
-        if wanted.is_none() && !(met && longer.tells_more_than(&fitted)) {
+        // For chaotic motion the sum of squares is rough, and the search stalls.
+        let has_arrived = longer.normal.decrement < NEAR_DECREMENT || !fitted.normal.converged;
+        let acceptable =
+            longer.normal.failed == 0 && longer.mean_square() < MOST_INCREASE * fitted.mean_square() && has_arrived;
+        if wanted.is_none() && !(acceptable && longer.determines_better_than(&fitted)) {
             problem.course.substeps = fitted.substeps;
             break;
         }
         fitted = longer;
-        let seconds = usual_samples(&fitted.segments) as f64 * problem.course.step;
-        wanted_more = wanted.map(|wanted| seconds * SHORT_OF_CHOSEN < wanted);
+        let seconds = typical_samples(&fitted.segments) as f64 * problem.course.step;
+        too_short = wanted.map(|wanted| seconds * SHORT_OF_CHOSEN < wanted);
     }
     fitted
 }
 
 /// Number of samples of a typical segment.
-fn usual_samples(segments: &[Segment]) -> usize {
+pub(super) fn typical_samples(segments: &[Segment]) -> usize {
     let mut samples: Vec<usize> = segments.iter().map(|segment| segment.samples).collect();
     samples.sort_unstable();
     samples.get(samples.len() / 2).copied().unwrap_or(0)
-}
-
-fn result(
-    instance: &SystemInstance<f64>,
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    (start, noise): (&[f64], &[f64]),
-    known: bool,
-) -> Identified {
-    let n = problem.sigma.len();
-    let recording = problem.course.recording;
-    let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
-    let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
-    let numbers = problem.readings(&fitted.segments);
-    let taken = (fitted.normal.count - fitted.x.len() as f64).max(1.0) / numbers;
-    let weighing = Weighing::of(&residuals, problem.robust, taken);
-    let follow: Vec<Correlation> =
-        innovations(problem, &fitted.x, &fitted.segments).iter().map(|runs| correlation(runs)).collect();
-    let is_white = |of: &Correlation| of.probability * n as f64 >= SIGNIFICANCE;
-    // Outliers do not excuse the other samples.
-    let size = |i: usize| usual(&residuals, n, i) * problem.sigma[i] / taken.sqrt();
-    let of = |i: usize| {
-        let own = residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n).copied());
-        let rms = rms(own.filter(|r| r.is_finite())) / taken.sqrt() * problem.sigma[i];
-        let (coordinate, spread) = (recording.coordinates[i].clone(), problem.spread[i]);
-        let (autocorrelation, white) = (follow[i].neighbours, is_white(&follow[i]));
-        Residual { coordinate, rms, noise: noise[i], spread, autocorrelation, white }
-    };
-    let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
-    let far = |track: usize, sample: usize, i: usize, size: f64| Outlier {
-        track,
-        sample,
-        trajectory: String::new(),
-        row: 0,
-        time: recording.tracks[track].times[sample],
-        coordinate: recording.coordinates[i].clone(),
-        size,
-    };
-    let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
-    // A correlation whose end is not seen within segments continues in the next ones.
-    let longest = fitted.segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
-    let window = |of: &Correlation| if 4 * of.length >= longest { 4 * longest } else { 2 * of.length };
-    let lags = follow.iter().filter(|of| !is_white(of)).map(window).max();
-    let agreement = agreement(problem, &fitted.x, &fitted.segments, weighing);
-    let segment_seconds = usual_samples(&fitted.segments) as f64 * problem.course.step;
-    let continuation = (continuation(problem, fitted, weighing), segment_seconds);
-    let (normal, inflation) = informed(problem, fitted, (weighing, lags), known);
-    let verdict = Evidence {
-        converged: fitted.normal.converged,
-        sizes: (0..n).map(size).collect(),
-        exact: (0..n).map(|i| EXACT_RESIDUAL * problem.spread[i]).collect(),
-        residuals: &by_coordinate,
-        probabilities: follow.iter().map(|of| (of.probability * n as f64).min(1.0)).collect(),
-        outliers: outlier_count as f64 / numbers,
-        agreement,
-        continuation,
-    }
-    .verdict();
-    Identified {
-        converged: fitted.normal.converged,
-        decrement: fitted.normal.decrement,
-        explained: verdict.explains(),
-        verdict,
-        over_noise: over_noise(&by_coordinate),
-        residuals: by_coordinate,
-        outliers,
-        outlier_count,
-        paths: paths(problem, &fitted.segments, &residuals),
-        inflation,
-        force_noise: problem.disturbances.force.clone(),
-        samples: fitted.segments.iter().map(|segment| segment.samples).sum(),
-        segments: fitted.segments.len(),
-        segment_seconds,
-        substeps: fitted.substeps,
-        between: (instance.has_inputs() || recording.tracks.iter().any(|track| !track.force.is_empty()))
-            .then_some(problem.course.between),
-        ..unknowns(
-            instance,
-            problem,
-            // A constant at its bound counts as given.
-            &Fitted { normal: normal.with_held(), ..fitted.clone() },
-            (start, 1.0),
-            (Met::Accelerations, &normal_at),
-        )
-    }
-}
-
-/// Positions of the segments and their residuals, in SI; `residuals` are in units of the noise.
-fn paths(problem: &Problem<'_>, segments: &[Segment], residuals: &[Vec<f64>]) -> Vec<ResidualPath> {
-    let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
-        let noise = |sample: usize, i: usize| problem.sigma_at(segment.track, sample, i);
-        ResidualPath::of(problem.course.recording, segment, residuals, noise)
-    };
-    segments.iter().zip(residuals).map(of).collect()
-}
-
-/// Normal equations whose covariance is that of the residuals, and the factor by which correlated residuals increase variances. Correlated
-/// residuals have `lags`; with `given` noise, residuals count as at least that large.
-fn informed(
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    (weighing, lags): (Weighing, Option<usize>),
-    given: bool,
-) -> (Normal, f64) {
-    let m = fitted.x.len();
-    let root = Root::of(m, &fitted.normal.matrix);
-    let bread = weighing.bread * weighing.bread;
-    let plain = weighing.square * bread;
-    let least = if given { plain.max(1.0) } else { plain.max(f64::MIN_POSITIVE) };
-    let Some(lags) = lags else {
-        let unit = vec![0.0; root.forward.len().pow(2)];
-        return (root.informed(&fitted.normal, &unit, least), 1.0);
-    };
-    let scores = scores(problem, &fitted.x, &fitted.segments);
-    let [wide, narrow] = [lags, lags / 2].map(|lags| long_run(&scores, &fitted.segments, m, lags));
-    // A kernel that is 1 over the first half of the lags, where correlated noise gets its full weight (Politis and Romano, J. Time Series
-    // Analysis 16 (1995) 67).
-    let flat: Vec<f64> = wide.iter().zip(&narrow).map(|(wide, narrow)| 2.0 * wide - narrow).collect();
-    let mut seen = root.seen(m, &flat);
-    seen.iter_mut().for_each(|x| *x *= bread);
-    let mean = mean_eigenvalue(&seen, root.forward.len());
-    let inflation = (mean / plain).max(1.0);
-    // Initial states and constants use up as many of a few independent numbers as of many: correlated residuals fall below the noise by more
-    // than independent ones.
-    let numbers = problem.readings(&fitted.segments);
-    let taken = (numbers - fitted.normal.count + m as f64) / numbers;
-    let hidden = (1.0 - taken) / (1.0 - taken * inflation).max(LEAST_FREEDOM);
-    seen.iter_mut().for_each(|x| *x *= hidden);
-    (root.informed(&fitted.normal, &seen, least), inflation * hidden)
 }

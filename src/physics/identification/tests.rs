@@ -174,7 +174,7 @@ fn what_a_larger_motion_would_tell_is_said() {
     let found = identify(&spring(&[]), &recording, &IdentifyOptions::default()).unwrap();
     let open = &found.undetermined[0];
     assert!(open.constants.contains(&"c".to_string()) && open.relative_error.is_some(), "{open:?}");
-    assert!(open.cure.contains("x goes farther"), "{open:?}");
+    assert!(open.cure.contains("larger range of x"), "{open:?}");
     // What is known is the stiffness at the size of the motion.
     let [known] = &open.known[..] else { panic!("{open:?}") };
     let factor = |name: &str| known.terms.iter().find(|(known, _)| known == name).map_or(0.0, |(_, factor)| *factor);

@@ -1,12 +1,12 @@
-//! Results for constants and sensors: values, standard errors, undetermined directions, and combinations that are nevertheless determined.
+//! The results for constants and sensors: values, standard errors, undetermined directions, and combinations that are determined nevertheless.
 
 use super::bodies;
-use super::cure::{ByForces, Examiner};
+use super::cure::{Examiner, LinearDirections};
 use super::determined::{Determined, echelon};
 use super::found::{Combination, Constant, Correlations, Identified, SensorConstant, Undetermined};
 use super::invariants::{Invariant, Kind, unit_of, written};
 use super::moves::{Group, Moves, nearest};
-use super::smoothed::Met;
+use super::smoothed::Quantity;
 use super::solve::{Normal, Problem, Sensor, SensorKind};
 use super::stages::Fitted;
 use super::thresholds::{NO_DEPENDENCE, SUM_ROUNDING};
@@ -22,20 +22,19 @@ struct Names<'a> {
 /// Normal equations at other unknowns; `None` where they cannot be formed.
 pub(super) type NormalAt<'a> = &'a dyn Fn(&[f64]) -> Option<Normal>;
 
-/// Constants and sensors of a fit that ended at `fitted`; the caller adds the residuals. `normal_at` gives the normal equations at other
-/// unknowns.
+/// The results for the constants and sensors of a fit; the caller adds the residuals. `normal_at` gives the normal equations at other unknowns.
 pub(super) fn unknowns(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
     fitted: &Fitted,
     (start, variance): (&[f64], f64),
-    (met, normal_at): (Met, NormalAt<'_>),
+    (quantity, normal_at): (Quantity, NormalAt<'_>),
 ) -> Identified {
     let m = fitted.x.len();
     let recording = problem.course.recording;
     let before: Vec<f64> = start.iter().copied().chain(problem.sensors.iter().map(|sensor| sensor.perfect())).collect();
-    // The determined sums show what is not determined.
-    let is_linear = met == Met::Forces && problem.is_linear(&fitted.segments);
+    // The list of determined sums then shows what is not determined.
+    let is_linear = quantity == Quantity::Forces && problem.is_linear(&fitted.segments);
     let from = if is_linear { NO_DEPENDENCE } else { 1.0 };
     let determined = Determined::new(problem, (&fitted.x, &before), &fitted.normal, (variance, from));
     let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
@@ -57,15 +56,15 @@ pub(super) fn unknowns(
             let changes = determined.changes();
             let columns: Vec<&[f64]> = changes.iter().map(Vec::as_slice).collect();
             nearest(&mut x, &before, &columns, &determined.size);
-            let open = examiner.by_forces(&x, (&changes, &determined.size));
-            (together(&names, &open, &examiner.still()), base_parameters(&determined, &names, &x))
+            let open = examiner.linear_directions(&x, (&changes, &determined.size));
+            (linear_directions(&names, &open, &examiner.still()), base_parameters(&determined, &names, &x))
         }
         false => {
             let square = fitted.normal.square / fitted.normal.count.max(1.0);
             let moves = Moves { problem, determined: &determined, variance: square.max(f64::MIN_POSITIVE), normal_at };
             let groups = moves.groups(&x);
             x = moves.least_change(&x, &before, &groups);
-            let mut open = silent(&determined, &names, |group| examiner.cure(&fitted.x, group));
+            let mut open = without_effect(&determined, &names, |group| examiner.cure(&fitted.x, group));
             open.extend(groups.iter().map(|group| described(&determined, &names, (&fitted.x, group), &examiner)));
             (open, Vec::new())
         }
@@ -100,6 +99,7 @@ pub(super) fn unknowns(
     Identified { constants, sensors, correlations, undetermined, combinations, bodies, ..Identified::default() }
 }
 
+/// The name of a sensor constant.
 fn kind(kind: SensorKind) -> &'static str {
     match kind {
         SensorKind::Offset => "offset",
@@ -118,15 +118,16 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Names<'_> {
+    /// The names of some unknowns.
     fn of(&self, places: &[usize]) -> Vec<String> {
         places.iter().map(|&k| self.all[k].to_string()).collect()
     }
 
-    /// An invariant with its value and error at `x`.
+    /// An invariant with its value and standard error at `x`.
     fn combination(&self, determined: &Determined, invariant: &Invariant, x: &[f64]) -> Combination {
         let terms = invariant.terms(&self.all);
-        let has_part = |k: &usize| invariant.factors[*k] != 0.0;
-        let parts = (0..self.all.len()).filter(has_part).map(|k| (self.units[k], invariant.factors[k]));
+        let occurs = |k: &usize| invariant.factors[*k] != 0.0;
+        let parts = (0..self.all.len()).filter(occurs).map(|k| (self.units[k], invariant.factors[k]));
         let parts: Vec<(&str, f64)> = parts.collect();
         let unit = match invariant.kind {
             Kind::Sum => parts.first().map_or("", |(unit, _)| unit).to_string(),
@@ -143,26 +144,31 @@ impl Names<'_> {
     }
 }
 
-/// Constants that have no visible effect.
-fn silent(determined: &Determined, names: &Names<'_>, cure: impl Fn(&Group<'_>) -> String) -> Vec<Undetermined> {
+/// Describes the constants without a visible effect.
+fn without_effect(
+    determined: &Determined,
+    names: &Names<'_>,
+    cure: impl Fn(&Group<'_>) -> String,
+) -> Vec<Undetermined> {
     let m = determined.size.len();
     let of = |&k: &usize| {
         let alone = (0..m).map(|j| if j == k { determined.size[k] } else { 0.0 }).collect();
         let columns = echelon(vec![alone], &determined.size);
-        let group = Group::without_names(columns.iter().collect());
+        let group = Group::without_invariants(columns.iter().collect());
         let relative_error = determined.relative_error(&columns[0].change);
-        let text = format!("{} is not determined{}", names.all[k], in_words(relative_error));
+        let text = format!("{} is not determined{}", names.all[k], error_in_words(relative_error));
         let (constants, directions) = (names.of(&[k]), vec![vec![1.0]]);
         Undetermined { constants, directions, known: Vec::new(), relative_error, text, cure: cure(&group) }
     };
-    determined.silent.iter().map(of).collect()
+    determined.without_effect.iter().map(of).collect()
 }
 
-fn in_words(relative_error: Option<f64>) -> String {
+/// The relative error as the end of a sentence.
+fn error_in_words(relative_error: Option<f64>) -> String {
     relative_error.map(|error| format!(", relative error {error:.1}")).unwrap_or_default()
 }
 
-/// Describes a group of open directions in words.
+/// Describes a group of open directions.
 fn described(
     determined: &Determined,
     names: &Names<'_>,
@@ -177,7 +183,7 @@ fn described(
     let errors: Option<Vec<f64>> =
         group.columns.iter().map(|column| determined.relative_error(&column.change)).collect();
     let relative_error = errors.map(|errors| errors.into_iter().fold(0.0, f64::max));
-    let error = in_words(relative_error);
+    let error = error_in_words(relative_error);
     let all = listed(&constants);
     let known_names: Vec<&str> = known.iter().map(|known| known.name.as_str()).collect();
     let numbers = || {
@@ -187,15 +193,15 @@ fn described(
         };
         directions.iter().map(of).collect::<Vec<_>>().join("; or ")
     };
-    let text = match (group.inside.len(), known.is_empty(), group.is_named()) {
+    let text = match (group.inside.len(), known.is_empty(), group.is_complete()) {
         (1, ..) => format!("{all} is not determined{error}"),
         (_, false, true) => format!("{all} cannot be separated{error}; determined: {}", known_names.join(", ")),
         (_, true, _) => format!(
-            "{all} cannot be separated{error}; relative to their sizes, they can change together: {}",
+            "{all} cannot be separated{error}; they can change together, relative to their sizes: {}",
             numbers()
         ),
         (_, false, false) => format!(
-            "{all} cannot be separated{error}; determined: {}; relative to their sizes, they can change together: {}",
+            "{all} cannot be separated{error}; determined: {}; they can change together, relative to their sizes: {}",
             known_names.join(", "),
             numbers()
         ),
@@ -203,30 +209,26 @@ fn described(
     Undetermined { constants, directions, known, relative_error, text, cure: examiner.cure(x, group) }
 }
 
-/// Constants that are determined only within sums, in words.
-fn together(names: &Names<'_>, open: &ByForces, still: &[String]) -> Vec<Undetermined> {
-    let here = match still {
-        [] => "record motion that goes farther or faster, or that moves other joints".to_string(),
-        [single] => format!("record motion of {single}, which stands still, or motion that goes farther or faster"),
-        many => format!("record motion of {}, which stand still, or motion that goes farther or faster", listed(many)),
+/// Describes the open directions of equations that are linear in the constants.
+fn linear_directions(names: &Names<'_>, open: &LinearDirections, still: &[String]) -> Vec<Undetermined> {
+    let record = match still {
+        [] => "record larger or faster motion, or move other joints".to_string(),
+        [single] => format!("record motion of {single}, which stands still, or larger or faster motion"),
+        many => format!("record motion of {}, which stand still, or larger or faster motion", listed(many)),
     };
-    let always = "no motion can separate them: the forces depend only on their sums".to_string();
-    let told = |(changes, text, cure): (&Vec<Vec<f64>>, &str, String)| {
+    let none = "no motion can separate them, because the forces depend only on their sums".to_string();
+    let describe = |(changes, text, cure): (&Vec<Vec<f64>>, &str, String)| {
         let inside = |k: &usize| changes.iter().any(|change| change[*k] != 0.0);
         let constants = names.of(&(0..names.all.len()).filter(inside).collect::<Vec<_>>());
         let text = format!("{} {text}", listed(&constants));
         Undetermined { constants, directions: Vec::new(), known: Vec::new(), relative_error: None, text, cure }
     };
     let all = [
-        (
-            &open.silent,
-            "have no effect on the forces, whatever the motion",
-            "fix them: no motion depends on them".to_string(),
-        ),
-        (&open.always, "appear in the equations only in sums", always),
-        (&open.here, "cannot be separated by this motion", here),
+        (&open.without_effect, "do not affect the forces of any motion", "fix them at known values".to_string()),
+        (&open.inseparable, "occur in the equations only in sums", none),
+        (&open.undetermined, "cannot be separated by this motion", record),
     ];
-    all.into_iter().filter(|(changes, ..)| !changes.is_empty()).map(told).collect()
+    all.into_iter().filter(|(changes, ..)| !changes.is_empty()).map(describe).collect()
 }
 
 /// Sums of constants that determine the forces: the base parameters of a robot (Khalil and Dombre, "Modeling, Identification and Control of

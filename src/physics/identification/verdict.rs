@@ -6,18 +6,18 @@ use std::fmt::{Display, Formatter, Result};
 
 /// Whether the model fits the recording, and if not, why.
 ///
-/// A model fits a recording if all of the following holds; the verdict names the first condition that fails:
-/// the search has converged; residuals are below half of the motion and as large as the noise; at most one sample in a hundred is an outlier;
-/// residuals are not correlated over time; segments agree about the constants, and every second segment can start where the one before it ends.
+/// A model fits a recording if all of the following conditions hold. The verdict names the first one that fails: the search has converged; residuals
+/// are below half of the spread and consistent with the noise; at most one sample in a hundred is an outlier; residuals are not correlated over time;
+/// segments agree about the constants; and every second segment can start where the previous one ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Verdict {
     /// Residuals are consistent with the noise.
     Explained,
-    /// Residuals are as small as integration and rounding allow.
+    /// Residuals are as small as the accuracy of the integration.
     Exact,
-    /// The search ended before the best constants were reached.
+    /// The search ended before it reached the best constants.
     #[default]
     NotConverged,
     /// The noise is at least half of the fitted quantity.
@@ -45,19 +45,19 @@ pub enum Verdict {
     Correlated {
         /// The coordinate.
         coordinate: String,
-        /// Probability that independent noise is as correlated by chance.
+        /// p-value: probability that independent noise is at least as correlated.
         probability: f64,
         /// Residual over the spread of the fitted quantity.
         share: f64,
     },
     /// Segments disagree about the constants.
     Disagreement {
-        /// Probability that noise makes them differ as much.
+        /// p-value: probability that noise makes them differ at least as much.
         probability: f64,
     },
     /// Segments do not continue each other.
     Discontinuous {
-        /// Probability that noise causes discontinuities as large.
+        /// p-value: probability that noise causes discontinuities at least as large.
         probability: f64,
         /// Their typical length in s.
         seconds: f64,
@@ -105,7 +105,7 @@ impl Display for Verdict {
             }
             Self::Discontinuous { probability, seconds } => write!(
                 f,
-                "the model follows segments of {} s, but these do not continue each other (p-value {}): \
+                "the model fits segments of {} s, but these do not continue each other (p-value {}): \
                  a slowly acting term is missing, or the noise varies slowly.",
                 rounded(*seconds, 2),
                 rounded(*probability, 2)

@@ -339,7 +339,7 @@ fn forced(seeds: u64, force_noise: f64, right: bool) -> Outcome<Tally> {
 /// Arms by their torques.
 fn arms(seeds: u64, reading: (f64, f64), right: bool) -> Outcome<Tally> {
     let mut tally = Tally::of(right);
-    let options = IdentifyOptions { targets: Some(Targets::Forces), threads: 2, ..IdentifyOptions::default() };
+    let options = IdentifyOptions::new().targets(Targets::Forces).threads(2);
     // Each is fitted 21 times.
     for seed in 0..seeds.div_ceil(2) {
         let mut rng = RngStream::Test.generator(2000 + seed);
@@ -363,7 +363,7 @@ fn differ(seeds: u64, (memory, factor): (f64, f64)) -> Outcome<usize> {
             recording.tracks.extend(form.free(values, 1, &mut rng)?.tracks);
         }
         add(&mut recording, (SIZE, memory), &mut rng);
-        let options = IdentifyOptions { by_trajectory: true, ..IdentifyOptions::default() };
+        let options = IdentifyOptions::new().by_trajectory(true);
         let found = identify(&form.system(true, &[])?, &recording, &options)?;
         said += usize::from(found.by_trajectory.ok_or("no scatter")?.scatter.iter().any(|scatter| scatter.differs));
     }
@@ -376,7 +376,7 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
     const WRONG: RangeInclusive<f64> = 0.0..=0.05;
     const RANGES: RangeInclusive<f64> = 0.83..=0.97;
     let plain = IdentifyOptions::default();
-    let robust = IdentifyOptions { robust: true, ..plain.clone() };
+    let robust = plain.clone().robust(true);
     let nothing = |_: &mut Recording, _: &mut RandomGenerator| ();
     let noise = |recording: &mut Recording, rng: &mut RandomGenerator| {
         recording.tracks.iter_mut().flat_map(|track| &mut track.q).for_each(|q| *q = normal(rng));

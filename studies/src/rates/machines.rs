@@ -440,7 +440,7 @@ impl Machine {
             let Recorded { recording, inputs } = self.record(&mut rng)?;
             let away = |x: f64, rng: &mut RandomGenerator| x * rng.random_range(1.0 - AWAY..1.0 + AWAY);
             let start: Vec<_> = truth.iter().map(|(name, x)| (name.clone(), away(*x, &mut rng).to_string())).collect();
-            let options = IdentifyOptions { inputs, threads: 2, ..IdentifyOptions::default() };
+            let options = IdentifyOptions::new().inputs(inputs).threads(2);
             match identify(&self.system(right, &start)?, &recording, &options) {
                 Ok(found) => tally.count(seed, &found, &pairs),
                 Err(error) => tally.refused(seed, &error.to_string()),

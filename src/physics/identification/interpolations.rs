@@ -1,5 +1,4 @@
-//! Interpolation of known forces between the samples: the one that fits the motion best, and how the unknowns differ for others that fit as
-//! well.
+//! Chooses the interpolation of known forces between the samples, and widens the standard errors if several interpolations fit equally well.
 
 use super::found::Identified;
 use super::solve::Problem;
@@ -7,30 +6,31 @@ use super::stages::{Fitted, refit};
 use super::thresholds::{FEW_START_ROUNDS, ITERATIONS, RIVAL_DIFFERENCE, RIVAL_INCREASE};
 use super::{Between, IdentifyOptions};
 
-/// Interpolations that the motion does not exclude, the best first, and the largest difference of the unknowns for one of the others.
+/// Interpolations that the motion does not exclude, the best first.
 #[derive(Default)]
 pub(super) struct Rivals {
-    ways: Vec<Between>,
-    farthest: Vec<f64>,
+    interpolations: Vec<Between>,
+    /// Largest change of every unknown if another of them is used.
+    largest_change: Vec<f64>,
 }
 
 impl Rivals {
     /// All interpolations of forces, if the options leave the choice open.
     pub fn all(options: &IdentifyOptions, forced: bool) -> Self {
         let open = forced && options.between.is_none();
-        Self { ways: if open { Between::ALL.to_vec() } else { Vec::new() }, farthest: Vec::new() }
+        Self { interpolations: if open { Between::ALL.to_vec() } else { Vec::new() }, largest_change: Vec::new() }
     }
 }
 
-/// The fit with that one of the interpolations that fits the motion best, and those that it does not exclude.
-pub(super) fn best_between(problem: &mut Problem<'_>, fitted: Fitted, rivals: &Rivals) -> (Fitted, Rivals) {
-    if rivals.ways.is_empty() {
+/// Fits the motion with every interpolation; returns the best fit, and the interpolations that it does not exclude.
+pub(super) fn best_interpolation(problem: &mut Problem<'_>, fitted: Fitted, rivals: &Rivals) -> (Fitted, Rivals) {
+    if rivals.interpolations.is_empty() {
         return (fitted, Rivals::default());
     }
     let mut best = 0;
     let first = problem.course.between;
     let mut tried = vec![(first, fitted)];
-    for between in rivals.ways.iter().copied().filter(|way| *way != first) {
+    for between in rivals.interpolations.iter().copied().filter(|other| *other != first) {
         problem.course.between = between;
         let mut own = tried[best].1.clone();
         problem.settle(&own.x, &mut own.segments, FEW_START_ROUNDS);
@@ -44,17 +44,17 @@ pub(super) fn best_between(problem: &mut Problem<'_>, fitted: Fitted, rivals: &R
     let (between, fitted) = tried.swap_remove(best);
     problem.course.between = between;
     let limit = fitted.normal.square + RIVAL_INCREASE * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
-    let mut rivals = Rivals { ways: vec![between], farthest: vec![0.0; fitted.x.len()] };
+    let mut rivals = Rivals { interpolations: vec![between], largest_change: vec![0.0; fitted.x.len()] };
     for (between, own) in tried.iter().filter(|(_, own)| own.normal.failed == 0 && own.normal.square < limit) {
-        rivals.ways.push(*between);
-        let off = own.x.iter().zip(&fitted.x).map(|(own, best)| (own - best).abs());
-        rivals.farthest.iter_mut().zip(off).for_each(|(most, off)| *most = most.max(off));
+        rivals.interpolations.push(*between);
+        let changes = own.x.iter().zip(&fitted.x).map(|(own, best)| (own - best).abs());
+        rivals.largest_change.iter_mut().zip(changes).for_each(|(most, change)| *most = most.max(change));
     }
     (fitted, rivals)
 }
 
 impl Rivals {
-    /// Widens the standard errors of unknowns that differ between interpolations, and reports those that at least double.
+    /// Adds the differences between interpolations to the standard errors, and reports the unknowns whose errors at least double.
     pub fn widen(&self, found: &mut Identified) {
         let names = found.constants.iter().map(|c| c.symbol.clone());
         let names: Vec<String> =
@@ -62,19 +62,19 @@ impl Rivals {
         let errors = found.constants.iter_mut().map(|c| &mut c.standard_error);
         let errors = errors.chain(found.sensors.iter_mut().map(|s| &mut s.standard_error));
         let mut doubled = Vec::new();
-        for ((error, off), name) in errors.zip(&self.farthest).zip(names) {
+        for ((error, change), name) in errors.zip(&self.largest_change).zip(names) {
             if let Some(error) = error {
-                if *off > RIVAL_DIFFERENCE * *error {
+                if *change > RIVAL_DIFFERENCE * *error {
                     doubled.push(name);
                 }
-                *error = error.hypot(*off);
+                *error = error.hypot(*change);
             }
         }
         if !doubled.is_empty() {
-            let ways: Vec<&str> = self.ways.iter().map(|way| way.name()).collect();
-            let (ways, names) = (ways.join(", "), doubled.join(", "));
+            let all: Vec<&str> = self.interpolations.iter().map(|between| between.name()).collect();
+            let (all, names) = (all.join(", "), doubled.join(", "));
             found.obstacles.push(format!(
-                "forces between the samples may be {ways}: the standard errors of {names} include the difference"
+                "these interpolations of the forces fit equally well: {all}; the standard errors of {names} include the difference"
             ));
         }
     }

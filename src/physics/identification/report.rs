@@ -6,18 +6,18 @@ use crate::findings::Findings;
 use crate::names::{number, pluralize, rounded};
 
 impl Identified {
-    /// The constants, the undetermined combinations, the residuals and the verdict, as tables and sentences.
+    /// The report: constants, undetermined combinations, residuals and the verdict, as tables and sentences.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.lines(&self.obstacles);
-        self.say_constants(&mut findings);
+        self.add_constants(&mut findings);
         for Undetermined { text, cure, .. } in &self.undetermined {
             findings.gap().line(text).line(format!("  advice: {cure}"));
         }
         if let Some(text) = self.bodies.as_ref().and_then(Bodies::text) {
             findings.gap().line(text);
         }
-        self.say_correlations(&mut findings);
+        self.add_correlations(&mut findings);
         let what = if self.segments == 0 { "force on" } else { "coordinate" };
         let headers = [what, "residual", "noise", "spread", "autocorrelation", ""];
         findings.gap().table(&headers, self.residuals.iter().map(Residual::row)).line(self.verdict.to_string());
@@ -28,15 +28,16 @@ impl Identified {
             ));
         }
         findings.line(self.extent());
-        self.say_outliers(&mut findings);
+        self.add_outliers(&mut findings);
         if let Some(by_trajectory) = &self.by_trajectory {
-            by_trajectory.say(&mut findings);
+            by_trajectory.report(&mut findings);
         }
         findings
     }
 
-    fn say_constants(&self, findings: &mut Findings) {
-        // Where sums are determined, constants that are known only within sums have no row of their own.
+    /// Tables of the constants and of the determined combinations.
+    fn add_constants(&self, findings: &mut Findings) {
+        // If sums are determined, constants that are known only within sums have no row of their own.
         let alone = |c: &&Constant| self.combinations.is_empty() || c.standard_error.is_some();
         let constants = self.constants.iter().filter(alone).map(Constant::row);
         let headers = ["constant", "value", "standard error", "unit", "start"];
@@ -53,7 +54,8 @@ impl Identified {
         }
     }
 
-    fn say_correlations(&self, findings: &mut Findings) {
+    /// The strongest correlations of errors.
+    fn add_correlations(&self, findings: &mut Findings) {
         let (names, matrix) = (&self.correlations.names, &self.correlations.matrix);
         let below = (0..names.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
         let mut pairs: Vec<(usize, usize, f64)> =
@@ -67,7 +69,7 @@ impl Identified {
         }
     }
 
-    /// How much motion was used, and how forces were interpolated.
+    /// The amount of motion that was used, the interpolation of forces, and their noise.
     fn extent(&self) -> String {
         let mut text = pluralize(self.samples, "sample", "samples");
         if self.segments > 0 {
@@ -75,8 +77,8 @@ impl Identified {
             text += &format!(" in {segments} of {} s", number(self.segment_seconds));
         }
         if let Some(between) = self.between {
-            let way = between.name();
-            text += &format!(", forces {way} between the samples (roll-outs: --between {way})");
+            let name = between.name();
+            text += &format!(", forces {name} between the samples (for roll-outs: --between {name})");
         }
         if !self.force_noise.is_empty() {
             let sizes: Vec<String> = self.force_noise.iter().map(|size| rounded(*size, 2)).collect();
@@ -85,7 +87,8 @@ impl Identified {
         text
     }
 
-    fn say_outliers(&self, findings: &mut Findings) {
+    /// The largest outliers.
+    fn add_outliers(&self, findings: &mut Findings) {
         if self.outlier_count == 0 {
             return;
         }
@@ -140,19 +143,19 @@ impl Outlier {
 }
 
 impl Bodies {
-    /// How the inertias of links were made physical; nothing if they already were.
+    /// Whether the inertias of links were changed to physical ones; `None` if they already were physical.
     fn text(&self) -> Option<String> {
         let Self { moved, largest_change, exist } = self;
         let links = moved.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
         let change = rounded(*largest_change, 2);
         match (moved.is_empty(), exist) {
             (true, true) => None,
-            (true, false) => Some("no physical bodies have the given constants".to_string()),
+            (true, false) => Some("no rigid bodies can have the given constants".to_string()),
             (false, false) => Some(format!(
-                "no physical bodies have these combinations within their errors: the nearest ones differ by {change} standard errors; is the model complete?"
+                "no rigid bodies match these combinations within their errors: the closest ones differ by {change} standard errors; check that the model is complete"
             )),
             (false, true) => Some(format!(
-                "the constants of links {links} are the physically possible ones nearest to the start; determined combinations change by at most {change} standard errors"
+                "the constants of links {links} were moved to the closest ones that rigid bodies can have; this changes determined combinations by at most {change} standard errors"
             )),
         }
     }
