@@ -49,9 +49,10 @@ impl Sums {
 
 /// Weighted means of equations over neighbouring states of every trajectory.
 ///
-/// The true constants satisfy averages of equations, forces included, as they satisfy each equation. Averaging removes the noise of the accelerations
-/// from the regressors before these are squared, so that it hardly biases least squares, and the smoothing polynomials can have a higher degree.
-/// Robots are identified this way ("parallel filtering", Gautier, IEEE ICRA 1997). Sums are taken twice, so that the weights form a triangle.
+/// The true constants satisfy averages of equations, forces included, as they satisfy each equation. Averaging removes the noise of the
+/// accelerations from the regressors before these are squared, so that it hardly biases least squares, and the smoothing polynomials can have a
+/// higher degree. Robots are identified this way ("parallel filtering", Gautier, IEEE ICRA 1997). Sums are taken twice, so that the weights form a
+/// triangle.
 pub(super) struct Averages<'a> {
     states: &'a States,
     /// Number of equations of a state.

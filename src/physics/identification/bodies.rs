@@ -1,5 +1,5 @@
-//! Physical inertias for a chain of links. Often only sums of the constants of links are determined. Among all constants with these sums, this module
-//! chooses ones that rigid bodies can have.
+//! Physical inertias for a chain of links. Often only sums of the constants of links are determined. Among all constants with these sums, this
+//! module chooses ones that rigid bodies can have.
 //!
 //! A rigid body of mass `m`, first moments `h` and inertia `I` about the origin has a positive definite pseudo-inertia
 //! `P = [[tr(I)/2 E - I, h], [h', m]]` (Wensing, Kim and Slotine, 2018), and a chain of bodies a positive definite mass matrix at every pose.
@@ -65,8 +65,8 @@ impl Link {
         done.is_ok() && values.iter().all(|value| *value > LEAST_INERTIA)
     }
 
-    /// Writes a rigid body to `x`: its current constants if they are physical, otherwise ones close to its moments. `false` if given constants prevent
-    /// this.
+    /// Writes a rigid body to `x`: its current constants if they are physical, otherwise ones close to its moments. `false` if given constants
+    /// prevent this.
     fn place_body(&self, x: &mut [f64]) -> bool {
         if !self.is_body(x) {
             let [mass, hx, hy, hz, ..] = self.constants(x);

@@ -1,10 +1,10 @@
 //! Standard errors of constants that are fitted to forces, by a parametric bootstrap.
 //!
-//! Neighbouring smoothed accelerations have correlated errors and are regressors themselves, so that the standard errors of least squares are several
-//! times too small, and some bias remains. The recording is therefore simulated. Polynomials of a higher degree give the true motion, and the fitted
-//! constants the true forces along it. New noise of encoders and forces is drawn, and every copy is smoothed and fitted again. The mean change of the
-//! constants is their bias, which is subtracted; their scatter is the standard error (Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
-//! sections 6.5 and 10.2). The residuals of the copies show how large the residuals of a right model are at every sample.
+//! Neighbouring smoothed accelerations have correlated errors and are regressors themselves, so that the standard errors of least squares are
+//! several times too small, and some bias remains. The recording is therefore simulated. Polynomials of a higher degree give the true motion, and
+//! the fitted constants the true forces along it. New noise of encoders and forces is drawn, and every copy is smoothed and fitted again. The mean
+//! change of the constants is their bias, which is subtracted; their scatter is the standard error (Efron and Tibshirani, An Introduction to the
+//! Bootstrap, 1993, sections 6.5 and 10.2). The residuals of the copies show how large the residuals of a right model are at every sample.
 
 use super::covariance::Root;
 use super::follow::Follower;
@@ -101,9 +101,9 @@ pub(super) fn copies(
     (constants.len() == COPIES).then_some(Copies { constants, residuals })
 }
 
-/// Replaces velocities and positions by integrals of the accelerations, which are interpolated linearly between the samples. Without this they would
-/// not be consistent, because derivatives by local polynomials are not the derivatives of the smoothed positions. The initial state is the one that fits
-/// the positions best. A coordinate whose integral drifts too far stays unchanged.
+/// Replaces velocities and positions by integrals of the accelerations, which are interpolated linearly between the samples. Without this they
+/// would not be consistent, because derivatives by local polynomials are not the derivatives of the smoothed positions. The initial state is the
+/// one that fits the positions best. A coordinate whose integral drifts too far stays unchanged.
 fn integrate(motion: &mut Smoothed, n: usize) {
     let count = motion.times.len();
     for i in 0..n {

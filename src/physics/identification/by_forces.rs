@@ -290,12 +290,7 @@ impl ForceResiduals {
     /// Outliers, the farthest first, and their number; the states of all trajectories follow one another.
     fn outliers(&self, recording: &Recording, places: &[(usize, usize)]) -> (Vec<Outlier>, usize) {
         let whole = Segment { track: 0, first: 0, samples: places.len(), start: Vec::new() };
-        let describe = |_, state: usize, i: usize, size: f64| {
-            let (track, sample) = places[state];
-            let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
-            Outlier { track, sample, trajectory: String::new(), row: 0, time, coordinate, size }
-        };
-        outliers((&[whole], std::slice::from_ref(&self.scaled)), recording.n(), describe)
+        outliers(recording, (&[whole], std::slice::from_ref(&self.scaled)), |_, state| places[state])
     }
 }
 

@@ -1,9 +1,9 @@
 //! Systems under constraints, such as closed chains: their accelerations, their consistent initial states, and the part of forces that constraint
 //! forces cannot balance.
 //!
-//! With multipliers `lambda` the equations are `M a - h - A^T lambda = Q`, `A a = -gamma`. Derivatives of the accelerations are solutions with the same
-//! matrix `[M A^T; A 0]`. Initial states move within the constraints: along their tangent directions, by the smallest possible change if a constant
-//! changes the constraints, and back onto the constraints by projection.
+//! With multipliers `lambda` the equations are `M a - h - A^T lambda = Q`, `A a = -gamma`. Derivatives of the accelerations are solutions with the
+//! same matrix `[M A^T; A 0]`. Initial states move within the constraints: along their tangent directions, by the smallest possible change if a
+//! constant changes the constraints, and back onto the constraints by projection.
 
 use super::IdentifyError;
 use super::follow::{Course, Segment};

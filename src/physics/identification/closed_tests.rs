@@ -1,13 +1,13 @@
-//! Constants of closed chains: a slider-crank by points, a four-bar linkage by points, a five-bar linkage by angles.
+//! Tests on closed chains: a slider-crank and a four-bar linkage described by points, a five-bar linkage described by angles.
 
 use super::follow::Follower;
 use super::tests::{described, noise};
 use super::*;
-use crate::lagrangian::{Equations, EulerLagrange, SystemInstance, configure, project};
+use crate::lagrangian::{Equations, EulerLagrange, RowEquations, SystemInstance, configure, project};
 use crate::recording::{RecordedTrajectory, Recording, Targets};
 use crate::rollout::{Driven, RolloutOptions};
 
-/// A mechanism with the constants of its motion and of its forces.
+/// A mechanism, with the constants that are fitted to its motion and to its forces.
 struct Mechanism {
     text: &'static str,
     truth: &'static [(&'static str, f64)],
@@ -16,7 +16,7 @@ struct Mechanism {
     starts: &'static [&'static [f64]],
     /// The coordinate on which a known force acts, and the size of the force.
     driven: (usize, f64),
-    /// A part of the form and what takes its place in one that is wrong.
+    /// A part of the description, and its replacement in a wrong model.
     wrong: [&'static str; 2],
 }
 
@@ -93,7 +93,7 @@ impl Mechanism {
         described(&self.text.replace(self.wrong[0], self.wrong[1]), pairs)
     }
 
-    /// Values of the constants that are in the constraints.
+    /// Values of the constants in the constraints.
     fn lengths(&self) -> Vec<(&'static str, f64)> {
         self.truth.iter().copied().filter(|(name, _)| !self.of_forces.contains(name)).collect()
     }
@@ -123,7 +123,7 @@ impl Mechanism {
             tracks: self.starts.iter().map(track).collect(),
         };
         noise(&mut recording, &vec![NOISE; n], seed);
-        // Noise of the force, by the same means.
+        // Noise of the force, added in the same way.
         let mut of_force = recording.clone();
         for (track, own) in of_force.tracks.iter_mut().zip(&recording.tracks) {
             track.q.clone_from(&own.force);
@@ -134,17 +134,13 @@ impl Mechanism {
         recording
     }
 
-    /// Deviations of the constants from the truth in standard errors, of some recordings, and how many are explained.
+    /// Deviations of the constants from the truth in standard errors for several recordings, and the number of explained recordings.
     fn deviations(&self, targets: Targets, forced: bool) -> (Vec<f64>, usize) {
         let (mut all, mut explained) = (Vec::new(), 0);
         let constants = if targets == Targets::Forces { self.of_forces } else { self.of_motion };
         let lengths = if targets == Targets::Forces { self.lengths() } else { Vec::new() };
         for seed in 0..4 {
-            let options = IdentifyOptions {
-                constants: constants.iter().map(ToString::to_string).collect(),
-                targets: Some(targets),
-                ..Default::default()
-            };
+            let options = IdentifyOptions::new().constants(constants.iter().copied()).targets(targets);
             let found = identify(&self.form(&lengths), &self.recorded(forced, seed), &options).unwrap();
             let instance = self.form(self.truth);
             for constant in &found.constants {
@@ -197,11 +193,7 @@ fn a_wrong_form_of_a_closed_chain_is_not_explained() {
     for mechanism in [SLIDER, FOUR_BAR, FIVE_BAR] {
         for (targets, constants) in [(Targets::Motion, mechanism.of_motion), (Targets::Forces, mechanism.of_forces)] {
             let forces = targets == Targets::Forces;
-            let options = IdentifyOptions {
-                constants: constants.iter().map(ToString::to_string).collect(),
-                targets: Some(targets),
-                ..Default::default()
-            };
+            let options = IdentifyOptions::new().constants(constants.iter().copied()).targets(targets);
             let form = mechanism.wrong(&if forces { mechanism.lengths() } else { Vec::new() });
             let found = identify(&form, &mechanism.recorded(forces, 0), &options).unwrap();
             assert!(!found.explained, "{} {targets:?} {:?}", form.system.name, found.verdict);
@@ -212,19 +204,16 @@ fn a_wrong_form_of_a_closed_chain_is_not_explained() {
 #[test]
 fn positions_off_the_constraints_are_refused_or_named() {
     let recording = SLIDER.recorded(true, 0);
-    let options = |names: &[&str], targets: Targets| IdentifyOptions {
-        constants: names.iter().map(ToString::to_string).collect(),
-        targets: Some(targets),
-        ..Default::default()
-    };
-    // Rods of other lengths that are said to be known.
+    let options =
+        |names: &[&str], targets: Targets| IdentifyOptions::new().constants(names.iter().copied()).targets(targets);
+    // Rods whose given lengths are wrong.
     for targets in [Targets::Motion, Targets::Forces] {
         let form = SLIDER.form(&[("r", 1.0), ("l", 2.1)]);
         let error = identify(&form, &recording, &options(&["m2", "c", "k"], targets)).unwrap_err();
         let IdentifyError::OffConstraint { constraint, distance, .. } = &error else { panic!("{error}") };
         assert!(constraint == "rod" && (distance / 0.07 - 1.0).abs() < 0.4, "{error}");
     }
-    // No length makes a circle of an ellipse.
+    // No length turns an ellipse into a circle.
     let mut squeezed = recording.clone();
     for track in &mut squeezed.tracks {
         track.q.iter_mut().skip(1).step_by(3).for_each(|y| *y *= 0.8);
@@ -240,8 +229,7 @@ fn positions_off_the_constraints_are_refused_or_named() {
 
 #[test]
 fn free_motion_of_a_closed_chain_gives_ratios_of_masses() {
-    let options =
-        IdentifyOptions { constants: ["m1", "m2", "c", "k"].map(String::from).to_vec(), ..Default::default() };
+    let options = IdentifyOptions::new().constants(["m1", "m2", "c", "k"]);
     let form = SLIDER.form(&[("r", 1.0), ("l", 2.0)]);
     let found = identify(&form, &SLIDER.recorded(false, 0), &options).unwrap();
     let known: Vec<&str> = found.undetermined.iter().flat_map(|open| &open.known).map(|c| &*c.name).collect();
@@ -253,86 +241,107 @@ fn free_motion_of_a_closed_chain_gives_ratios_of_masses() {
     }
 }
 
-#[test]
-fn slopes_and_starts_under_constraints_are_those_of_differences() {
-    const H: f64 = 1e-5;
-    let rolling = configure::<f64>("rolling-disk", &[]).unwrap();
-    let starts: [&[f64]; 2] = [SLIDER.starts[1], &[0.3, -0.2, 0.7, 0.4, 0.1, 0.2, 1.1, 2.0]];
-    for (instance, start) in [SLIDER.form(SLIDER.truth), rolling].into_iter().zip(starts) {
-        let (n, count) = (instance.coordinates, instance.parameters.len());
-        let chosen: Vec<usize> = (0..count).collect();
+const H: f64 = 1e-5;
+
+/// A system under constraints with its recorded equations and a state on the constraints.
+struct Recorded {
+    instance: SystemInstance<f64>,
+    equations: Equations,
+    state: Vec<f64>,
+}
+
+impl Recorded {
+    fn of(instance: SystemInstance<f64>, start: &[f64]) -> Self {
+        let chosen: Vec<usize> = (0..instance.parameters.len()).collect();
         let acting = instance.acting_constraints().unwrap();
         let equations = Equations::record(&instance, &chosen, &acting).unwrap().unwrap();
-        let rows = equations.rows.as_ref().unwrap();
+        let (n, rows) = (instance.coordinates, equations.rows.as_ref().unwrap());
         assert!(rows.names.len() == 2 && rows.freedom() == 2 * n - 2 - rows.holonomic());
+        let mut recorded = Self { instance, equations, state: Vec::new() };
+        recorded.state = recorded.projected(&recorded.instance.parameters, start);
+        recorded
+    }
+
+    fn rows(&self) -> &RowEquations {
+        self.equations.rows.as_ref().unwrap()
+    }
+
+    /// The state, projected onto the constraints with these parameters.
+    fn projected(&self, p: &[f64], state: &[f64]) -> Vec<f64> {
+        let mut state = state.to_vec();
+        let (q, v) = state.split_at_mut(self.instance.coordinates);
+        project(&self.rows().manifold(p).unwrap(), q, v).unwrap();
+        state
+    }
+
+    /// Accelerations agree with those of the model, and their slopes with differences.
+    fn check_slopes(&self) {
+        let (n, count, p) = (self.instance.coordinates, self.instance.parameters.len(), &self.instance.parameters);
         let recording = Recording { coordinates: Vec::new(), periodic: Vec::new(), tracks: Vec::new() };
-        let (between, inputs) = (Between::Linear, Vec::new());
-        let (chosen, equations) = (count, &equations);
-        let course = Course { recording: &recording, equations, chosen, between, inputs, step: 1.0, substeps: 1 };
+        let (between, inputs, equations) = (Between::Linear, Vec::new(), &self.equations);
+        let course =
+            Course { recording: &recording, equations, chosen: count, between, inputs, step: 1.0, substeps: 1 };
         let mut follower = Follower::new(&course);
-        let on = |p: &[f64], start: &[f64]| {
-            let mut state = start.to_vec();
-            let (q, v) = state.split_at_mut(n);
-            project(&rows.manifold(p).unwrap(), q, v).unwrap();
-            state
-        };
-        let p = instance.parameters.clone();
-        let state = on(&p, start);
         let mut accelerations = |state: &[f64], p: &[f64]| {
             let mut a = vec![0.0; n];
             follower.accelerate(p, (&state[..n], &state[n..]), &[], &mut a);
             a
         };
-        let a = accelerations(&state, &p);
-        let model = instance.build().unwrap();
-        let expected = model.acceleration(&state[..n], &state[n..]).unwrap();
+        let a = accelerations(&self.state, p);
+        let expected = self.instance.build().unwrap().acceleration(&self.state[..n], &self.state[n..]).unwrap();
         assert!(a.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-10), "{a:?} {expected:?}");
-        let mut moved = |column: usize, h: f64| {
-            let (mut state, mut p) = (state.clone(), p.clone());
-            if column < 2 * n {
-                state[column] += h
-            } else {
-                p[column - 2 * n] += h
-            }
-            accelerations(&state, &p)
+        let mut shifted = |column: usize, h: f64| {
+            let mut all = [&self.state[..], p].concat();
+            all[column] += h;
+            accelerations(&all[..2 * n], &all[2 * n..])
         };
-        let differences: Vec<Vec<f64>> = (0..2 * n + count)
-            .map(|column| {
-                let (up, down) = (moved(column, H), moved(column, -H));
-                up.iter().zip(down).map(|(up, down)| (up - down) / (2.0 * H)).collect()
-            })
-            .collect();
-        accelerations(&state, &p);
-        let slopes = follower.slopes(&p, (&state[..n], &state[n..], &a));
+        let mut difference = |column: usize| {
+            let (up, down) = (shifted(column, H), shifted(column, -H));
+            up.iter().zip(down).map(|(up, down)| (up - down) / (2.0 * H)).collect::<Vec<f64>>()
+        };
+        let differences: Vec<Vec<f64>> = (0..2 * n + count).map(&mut difference).collect();
+        accelerations(&self.state, p);
+        let slopes = follower.slopes(p, (&self.state[..n], &self.state[n..], &a));
         for (column, difference) in differences.iter().enumerate() {
             for i in 0..n {
                 let slope = slopes[i * (2 * n + count) + column];
-                assert!(
-                    (slope - difference[i]).abs() < 1e-6 * (1.0 + slope.abs()),
-                    "{i} {column}: {slope} {difference:?}"
-                );
+                let off = (slope - difference[i]).abs();
+                assert!(off < 1e-6 * (1.0 + slope.abs()), "{i} {column}: {slope} {difference:?}");
             }
         }
-        // Starts: a free direction stays on the constraints to first order, and a constant moves a start as the projection does.
-        let tangent = rows.tangent(&rows.manifold(&p).unwrap(), &p, &state);
-        assert_eq!(tangent.free.len(), rows.freedom() * 2 * n);
-        let off = |p: &[f64], direction: &[f64], h: f64| {
-            let moved: Vec<f64> = state.iter().zip(direction).map(|(x, d)| x + h * d).collect();
-            let back = on(p, &moved);
-            moved.iter().zip(&back).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-        };
+    }
+
+    /// A free direction stays on the constraints to first order, and a constant moves an initial state as the projection does.
+    fn check_tangent(&self) {
+        let (n, p) = (self.instance.coordinates, &self.instance.parameters);
+        let tangent = self.rows().tangent(&self.rows().manifold(p).unwrap(), p, &self.state);
+        assert_eq!(tangent.free.len(), self.rows().freedom() * 2 * n);
         for direction in tangent.free.chunks_exact(2 * n) {
-            assert!(off(&p, direction, 1e-4) < 1e-7, "{direction:?}");
+            let moved: Vec<f64> = self.state.iter().zip(direction).map(|(x, d)| x + 1e-4 * d).collect();
+            let back = self.projected(p, &moved);
+            let off = moved.iter().zip(&back).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-7, "{direction:?}");
         }
         for (k, direction) in tangent.following.chunks_exact(2 * n).enumerate() {
             let at = |h: f64| {
                 let mut p = p.clone();
                 p[k] += h;
-                on(&p, &state)
+                self.projected(&p, &self.state)
             };
             for ((up, down), d) in at(H).iter().zip(at(-H)).zip(direction) {
                 assert!(((up - down) / (2.0 * H) - d).abs() < 1e-6, "{k} {direction:?}");
             }
         }
+    }
+}
+
+#[test]
+fn slopes_and_starts_under_constraints_are_those_of_differences() {
+    let rolling = configure::<f64>("rolling-disk", &[]).unwrap();
+    let starts: [&[f64]; 2] = [SLIDER.starts[1], &[0.3, -0.2, 0.7, 0.4, 0.1, 0.2, 1.1, 2.0]];
+    for (instance, start) in [SLIDER.form(SLIDER.truth), rolling].into_iter().zip(starts) {
+        let recorded = Recorded::of(instance, start);
+        recorded.check_slopes();
+        recorded.check_tangent();
     }
 }

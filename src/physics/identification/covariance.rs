@@ -1,17 +1,15 @@
 //! Covariance of the unknowns if residuals are correlated or weighted by their size.
 //!
 //! Let the score `u_t` be the contribution of a sample to the gradient of the sum of squares, with initial states eliminated. The covariance is
-//! `S^-1 B S^-1` with the normal matrix `S` and the long-run covariance `B` of the scores. `B` is the mean of the outer products of their sums over all
-//! windows of one length, which is Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
+//! `S^-1 B S^-1` with the normal matrix `S` and the long-run covariance `B` of the scores. `B` is the mean of the outer products of their sums over
+//! all windows of one length, which is Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
 use super::follow::Segment;
 use super::linear::times;
 use super::quality::tail;
-use super::solve::{Normal, Problem};
+use super::solve::{Normal, Problem, batches};
 use super::stages::{Fitted, choose_steps, joined};
-use super::thresholds::{
-    ELIMINATED_ROUNDING, HUBER, LANES, LEAST_SEGMENT_EIGENVALUE, MOST_START_DECREMENT, MOST_WINDOW,
-};
+use super::thresholds::{ELIMINATED_ROUNDING, HUBER, LEAST_SEGMENT_EIGENVALUE, MOST_START_DECREMENT, MOST_WINDOW};
 use crate::linalg::{Workspace, dot, eigh};
 
 /// Effect of weighting residuals by size. All numbers are means over residuals in units of the noise.
@@ -52,10 +50,7 @@ pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> 
     });
     let responses: Vec<Option<Vec<Vec<f64>>>> = responses.collect();
     let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![0.0; segment.samples * m]).collect();
-    let mut order: Vec<usize> = (0..segments.len()).collect();
-    order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-    for batch in order.chunks(LANES) {
-        let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
+    for (batch, lanes) in batches(segments) {
         problem.residuals(x, &lanes, true, |lane, sample, _, residual, row| {
             let Some(responses) = &responses[batch[lane]] else { return };
             let cut = if problem.robust { residual.clamp(-HUBER, HUBER) } else { residual };

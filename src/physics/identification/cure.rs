@@ -1,8 +1,8 @@
-//! Recommends motion that would determine the open directions. The equations are evaluated at other states: with larger positions, higher velocities,
-//! or forces.
+//! Recommends motion that would determine the open directions. The equations are evaluated at other states: with larger positions, higher
+//! velocities, or forces.
 //!
-//! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is specific only
-//! if it is the same at every point along the open directions where the search may have ended.
+//! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is specific
+//! only if it is the same at every point along the open directions where the search may have ended.
 
 use super::determined::{OpenDirection, echelon};
 use super::follow::{Follower, Segment};
@@ -314,8 +314,8 @@ impl Examiner<'_> {
     }
 }
 
-/// Effects of changes on the equations, a column each, and the root of the sum of squares of the separate effects of their unknowns, to which every row
-/// contributes at least `least`.
+/// Effects of changes on the equations, a column each, and the root of the sum of squares of the separate effects of their unknowns, to which every
+/// row contributes at least `least`.
 fn effects(
     (rows, least): (&[&[f64]], f64),
     changes: &[Vec<f64>],

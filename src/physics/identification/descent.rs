@@ -40,8 +40,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The unknowns after a change. Constants stay within their ranges; a positive constant keeps a share of its value, unless the normal equations do
-    /// not resolve the value itself.
+    /// The unknowns after a change. Constants stay within their ranges; a positive constant keeps a share of its value, unless the normal equations
+    /// do not resolve the value itself.
     pub(super) fn stepped(&self, x: &[f64], change: &[f64], normal: &Normal) -> Vec<f64> {
         let m = normal.right.len();
         let stepped = |(k, (&x, d)): (usize, (&f64, f64))| match k.checked_sub(self.chosen.len()) {
@@ -75,7 +75,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Marks the unknowns for which a change by their size, or by that of their starting value, has at most the given effect in the normal equations.
+    /// Marks the unknowns for which a change by their size, or by that of their starting value, has at most the given effect in the normal
+    /// equations.
     pub(super) fn too_weak(&self, x: &[f64], normal: &Normal, least: f64) -> Vec<bool> {
         let m = normal.right.len();
         let given = |k: usize| self.chosen.get(k).map_or(0.0, |&at| self.values[at].abs());

@@ -1,8 +1,8 @@
 //! What the motion determines: the directions of the unknowns without a visible effect, and the standard errors of everything else.
 //!
-//! Let `S` be the normal matrix of the unknowns in units of the noise, with initial states eliminated, and `D` the size of each unknown. The singular
-//! values of the Jacobian times `D` are the roots of the eigenvalues of `D S D`. A direction is *open* if its singular value is below 1, that
-//! is if the relative error along it is above 1, or if its effect is rounding.
+//! Let `S` be the normal matrix of the unknowns in units of the noise, with initial states eliminated, and `D` the size of each unknown. The
+//! singular values of the Jacobian times `D` are the roots of the eigenvalues of `D S D`. A direction is *open* if its singular value is below 1,
+//! that is if the relative error along it is above 1, or if its effect is rounding.
 
 use super::solve::{Normal, Problem};
 use super::thresholds::{
@@ -38,9 +38,9 @@ pub(super) struct OpenDirection {
 }
 
 impl Determined {
-    /// Analyses undamped normal equations at `x`, for a search that began at `start`; `variance` is that of the residuals. A direction is open if its
-    /// relative error exceeds `open`: 1, or [`NO_DEPENDENCE`] for equations that are linear in the unknowns, where a sum with a large error still counts
-    /// as determined.
+    /// Analyses undamped normal equations at `x`, for a search that began at `start`; `variance` is that of the residuals. A direction is open if
+    /// its relative error exceeds `open`: 1, or [`NO_DEPENDENCE`] for equations that are linear in the unknowns, where a sum with a large error
+    /// still counts as determined.
     pub fn new(
         problem: &Problem<'_>,
         (x, start): (&[f64], &[f64]),

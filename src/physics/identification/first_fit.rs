@@ -1,4 +1,5 @@
-//! The fit of the first segments. It starts from a fit to smoothed accelerations, or from a search of initial states if a coordinate was not measured.
+//! The fit of the first segments. It starts from a fit to smoothed accelerations, or from a search of initial states if a coordinate was not
+//! measured.
 
 use super::initial_states::Search;
 use super::pieces::Pieces;

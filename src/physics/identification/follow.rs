@@ -193,8 +193,8 @@ impl<'a> Follower<'a> {
         self.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len())
     }
 
-    /// Accelerations by a unit force on each coordinate at the states evaluated last, `(lanes, n, n)`; without constraints, the inverse of the mass matrix.
-    /// `NaN` if it is singular.
+    /// Accelerations by a unit force on each coordinate at the states evaluated last, `(lanes, n, n)`; without constraints, the inverse of the mass
+    /// matrix. `NaN` if it is singular.
     pub fn mobility(&self) -> Vec<f64> {
         if let Some(closed) = &self.closed {
             return closed.mobility();
@@ -402,8 +402,8 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Integrates the states of segments, with their derivatives, from a sample over a time that may be negative. The integration goes from sample to
-    /// sample, so that the known forces of each interval apply.
+    /// Integrates the states of segments, with their derivatives, from a sample over a time that may be negative. The integration goes from sample
+    /// to sample, so that the known forces of each interval apply.
     pub fn shifted(
         &mut self,
         values: &[f64],

@@ -50,11 +50,11 @@ impl SensorConstant {
 pub struct Undetermined {
     /// The constants.
     pub constants: Vec<String>,
-    /// Relative change of each constant along each direction that the motion leaves open, `(directions, constants)`; the largest is 1. Changes are relative
-    /// to the value or the start of a constant, whichever is larger.
+    /// Relative change of each constant along each direction that the motion leaves open, `(directions, constants)`; the largest is 1. Changes are
+    /// relative to the value or the start of a constant, whichever is larger.
     pub directions: Vec<Vec<f64>>,
-    /// Combinations that are determined nevertheless. Each is confirmed by moving the constants by a factor of two along every direction and fitting the
-    /// others again.
+    /// Combinations that are determined nevertheless. Each is confirmed by moving the constants by a factor of two along every direction and
+    /// fitting the others again.
     pub known: Vec<Combination>,
     /// Largest standard error along a direction, relative to the values; `None` if the motion does not depend on a direction at all.
     pub relative_error: Option<f64>,
@@ -124,8 +124,8 @@ pub struct Residual {
     pub noise: f64,
     /// Standard deviation of the fitted quantity: the positions or the forces.
     pub spread: f64,
-    /// Autocorrelation of the innovations at lag 1; that of white noise is 0. Innovations are residuals minus their prediction from earlier ones, so that
-    /// fitted initial states do not correlate them.
+    /// Autocorrelation of the innovations at lag 1; that of white noise is 0. Innovations are residuals minus their prediction from earlier ones,
+    /// so that fitted initial states do not correlate them.
     pub autocorrelation: f64,
     /// `true` if a joint test over 20 lags finds no autocorrelation at the level of 1 %.
     pub white: bool,

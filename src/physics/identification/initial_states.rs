@@ -1,6 +1,6 @@
-//! Searches initial states if some coordinates were not measured. Initial states are spread over the bounds of the system and fitted to the beginning of
-//! a trajectory, with the constants at their starting values. From the best of them, the constants are fitted too, to a part of the recording that
-//! doubles as long as the model fits. The rest of the recording is divided into segments that continue this motion.
+//! Searches initial states if some coordinates were not measured. Initial states are spread over the bounds of the system and fitted to the
+//! beginning of a trajectory, with the constants at their starting values. From the best of them, the constants are fitted too, to a part of the
+//! recording that doubles as long as the model fits. The rest of the recording is divided into segments that continue this motion.
 
 use super::cure::{POSITION, VELOCITY, spread};
 use super::follow::Segment;
@@ -115,8 +115,8 @@ impl Search<'_, '_> {
         ranked.into_iter().take(most).map(|(_, segment)| segment).collect()
     }
 
-    /// Fits constants and an initial state to the first `units` segments, and doubles their number as long as the model fits. Returns the fit, and the
-    /// number of segments that it covers.
+    /// Fits constants and an initial state to the first `units` segments, and doubles their number as long as the model fits. Returns the fit, and
+    /// the number of segments that it covers.
     fn fit_beginning(&mut self, given: &[f64], start: Segment, units: usize) -> Option<(Fitted, usize)> {
         let (mut fitted, mut reach) = (None, 0);
         let (mut x, mut segments, mut units) = (given.to_vec(), vec![start], units);

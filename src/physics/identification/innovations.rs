@@ -1,10 +1,11 @@
 //! A Kalman filter along each segment, which whitens the residuals.
 //!
 //! An error of a known force changes all later motion, so that the residuals of positions are correlated along the whole segment. In terms of the
-//! initial state of the segment the filter is simple: with `P = d(q, v)/d(start)` at a sample, an error `e` of the force over an interval
-//! `h` acts like the change `P^-1 (0, M^-1 e h)` of the initial state. The deviation of the initial state is thus a random walk, which every position
+//! initial state of the segment the filter is simple: with `P = d(q, v)/d(start)` at a sample, an error `e` of the force over an interval `h` acts
+//! like the change `P^-1 (0, M^-1 e h)` of the initial state. The deviation of the initial state is thus a random walk, which every position
 //! measures through its row of `P`. The filter passes the residuals and all their derivatives through the same linear map, which whitens them, so
-//! that least squares on its output are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 7.3).
+//! that least squares on its output are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989,
+//! sections 3.4 and 7.3).
 
 use super::covariance::Root;
 use super::follow::Segment;
@@ -21,9 +22,9 @@ use crate::recording::smooth::noise;
 pub(crate) struct Disturbances {
     /// Standard deviation of the noise of every known force; empty if the forces are exact.
     pub force: Vec<f64>,
-    /// Set if the filter treats the initial states as unknown: innovations of a right model are then independent, and those that mainly depend on the
-    /// initial state are `NaN`. The value is the number of standard deviations from which an innovation is an outlier, which is `NaN`, too, and does
-    /// not update the filter.
+    /// Set if the filter treats the initial states as unknown: innovations of a right model are then independent, and those that mainly depend on
+    /// the initial state are `NaN`. The value is the number of standard deviations from which an innovation is an outlier, which is `NaN`, too, and
+    /// does not update the filter.
     pub unknown_start: Option<f64>,
     /// Variances of unknown initial states by lane, `(2n, 2n)`; empty if positions were measured, which determine them.
     pub start_variances: Vec<Vec<f64>>,
@@ -77,11 +78,11 @@ impl Filter {
 }
 
 impl Problem<'_> {
-    /// Estimates the noise of the known forces by maximum likelihood of the innovations, bounded by the noise that neighbouring samples show; `true` if
-    /// the estimate changes.
+    /// Estimates the noise of the known forces by maximum likelihood of the innovations, bounded by the noise that neighbouring samples show;
+    /// `true` if the estimate changes.
     ///
-    /// The noise of the positions is a nuisance parameter, profiled out of the likelihood: its variance is the mean square innovation. Initial states
-    /// count as unknown, because fitted ones absorb much of the effect of the forces (Patterson and Thompson, Biometrika 58 (1971) 545).
+    /// The noise of the positions is a nuisance parameter, profiled out of the likelihood: its variance is the mean square innovation. Initial
+    /// states count as unknown, because fitted ones absorb much of the effect of the forces (Patterson and Thompson, Biometrika 58 (1971) 545).
     pub(super) fn estimate_force_noise(&mut self, x: &[f64], segments: &[Segment]) -> bool {
         let recording = self.course.recording;
         let forced = recording.tracks.iter().filter(|track| !track.force.is_empty());
@@ -159,8 +160,8 @@ impl Problem<'_> {
         (0..lanes).map(filter).collect()
     }
 
-    /// Covariances of unknown initial states of segments whose readings are not positions: the covariance that the readings of the segment give, scaled
-    /// up to that of a single reading and by [`UNKNOWN_START`].
+    /// Covariances of unknown initial states of segments whose readings are not positions: the covariance that the readings of the segment give,
+    /// scaled up to that of a single reading and by [`UNKNOWN_START`].
     pub(super) fn start_variances(&self, x: &[f64], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let (size, width) = (2 * self.n(), 2 * self.n() + self.unknowns());
         let of = |(linear, segment): (Option<Linear>, &&Segment)| {
@@ -178,8 +179,8 @@ impl Problem<'_> {
         self.batch(x, segments).into_iter().zip(segments).map(of).collect()
     }
 
-    /// Changes of the initial states that force errors over one interval are equivalent to, `(lanes, n, starts)`. `slopes` are the derivatives of states
-    /// by initial states, `(lanes, 2n, starts)`, `mobility` the accelerations by unit forces, `(lanes, n, n)`.
+    /// Changes of the initial states that force errors over one interval are equivalent to, `(lanes, n, starts)`. `slopes` are the derivatives of
+    /// states by initial states, `(lanes, 2n, starts)`, `mobility` the accelerations by unit forces, `(lanes, n, n)`.
     pub(super) fn impulses(&self, slopes: &[f64], mobility: &[f64], step: f64) -> Vec<f64> {
         let (n, force, starts) = (self.course.equations.n, &self.disturbances.force, self.course.starts());
         // Lanes that fail are NaN, and their segments fail.
@@ -201,8 +202,8 @@ impl Problem<'_> {
     }
 }
 
-/// Left inverses `(S' S)^-1 S'` of matrices `S`, `(batch, rows, columns)`, which map changes of states within the constraints to changes of the initial
-/// state.
+/// Left inverses `(S' S)^-1 S'` of matrices `S`, `(batch, rows, columns)`, which map changes of states within the constraints to changes of the
+/// initial state.
 fn left_inverses(columns: usize, matrices: &[f64], rows: usize) -> Vec<f64> {
     let size = rows * columns;
     let gram = |matrix: &[f64]| -> Vec<f64> {

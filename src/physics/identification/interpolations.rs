@@ -15,7 +15,7 @@ pub(super) struct Rivals {
 }
 
 impl Rivals {
-    /// All interpolations of forces, if the options leave the choice open.
+    /// All interpolations, if the options do not choose one.
     pub fn all(options: &IdentifyOptions, forced: bool) -> Self {
         let open = forced && options.between.is_none();
         Self { interpolations: if open { Between::ALL.to_vec() } else { Vec::new() }, largest_change: Vec::new() }

@@ -22,8 +22,8 @@ pub(crate) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f
     Some(inverse)
 }
 
-/// Inverses of a batch of matrices that need not be symmetric, `(batch, n, n)`: `[[0, A], [A', 0]]` is symmetric, and its inverse contains that of `A`
-/// as a block.
+/// Inverses of a batch of matrices that need not be symmetric, `(batch, n, n)`: `[[0, A], [A', 0]]` is symmetric, and its inverse contains that of
+/// `A` as a block.
 pub(super) fn inverses(n: usize, matrices: &[f64]) -> Vec<f64> {
     let batch = matrices.len() / (n * n);
     let mut symmetric = vec![0.0; 4 * matrices.len()];
@@ -53,8 +53,8 @@ pub(crate) fn part(n: usize, matrix: &[f64], indices: &[usize]) -> Vec<f64> {
     indices.iter().flat_map(|&i| indices.iter().map(move |&j| matrix[i * n + j])).collect()
 }
 
-/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate. A torque depends only on the links that its joint carries, so that a block
-/// has few columns other than 0.
+/// Sums of products of rows, `J^T J`, by blocks of rows of one coordinate. A torque depends only on the links that its joint carries, so that a
+/// block has few columns other than 0.
 pub(super) struct Products {
     m: usize,
     /// Rows of each coordinate, `(rows, m)`.

@@ -2,7 +2,7 @@
 
 use super::covariance::{Root, Weighting, agreement, continuation, long_run, scores};
 use super::follow::Segment;
-use super::found::{Identified, Outlier, Residual, ResidualPath};
+use super::found::{Identified, Residual, ResidualPath};
 use super::quality::{
     Correlation, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, typical_size,
 };
@@ -28,16 +28,8 @@ pub(super) fn result(
     let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
     let fit = FitResiduals::of(problem, fitted);
     let by_coordinate = fit.by_coordinate(problem, noise);
-    let describe = |track: usize, sample: usize, i: usize, size: f64| Outlier {
-        track,
-        sample,
-        trajectory: String::new(),
-        row: 0,
-        time: recording.tracks[track].times[sample],
-        coordinate: recording.coordinates[i].clone(),
-        size,
-    };
-    let (outliers, outlier_count) = outliers((&fitted.segments, &fit.residuals), problem.sigma.len(), describe);
+    let place = |track: usize, sample: usize| (track, sample);
+    let (outliers, outlier_count) = outliers(recording, (&fitted.segments, &fit.residuals), place);
     let verdict = fit.verdict(problem, fitted, (&by_coordinate, outlier_count));
     let (normal, inflation) = with_covariance(problem, fitted, (fit.weighting, fit.lags(&fitted.segments)), known);
     let forced = instance.has_inputs() || recording.tracks.iter().any(|track| !track.force.is_empty());

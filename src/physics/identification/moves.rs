@@ -160,8 +160,8 @@ impl<'a> Moves<'a> {
         near.map_or_else(|| x.to_vec(), |(x, _)| x)
     }
 
-    /// Moves along each direction, up and down, and along all together, with alternating signs, because an invariant of each single direction need not
-    /// be one of all. A pivot far below its size is first raised to it.
+    /// Moves along each direction, up and down, and along all together, with alternating signs, because an invariant of each single direction need
+    /// not be one of all. A pivot far below its size is first raised to it.
     fn moves_of<'c>(&self, x: &[f64], columns: &[&'c OpenDirection]) -> Vec<Vec<(&'c OpenDirection, f64)>> {
         let factors = |column: &'c OpenDirection| {
             let far = self.determined.size[column.pivot] / x[column.pivot].abs();

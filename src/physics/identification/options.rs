@@ -39,8 +39,8 @@ pub struct IdentifyOptions {
     /// Inputs of the system at the samples of every trajectory, `(samples, inputs)` each, in the order of their names.
     #[serde(default)]
     pub inputs: Vec<Vec<f64>>,
-    /// The quantity that is fitted, [`Targets::Motion`] or [`Targets::Forces`]. If `None`, the forces for a chain of links under known forces, otherwise
-    /// the motion.
+    /// The quantity that is fitted, [`Targets::Motion`] or [`Targets::Forces`]. If `None`, the forces for a chain of links under known forces,
+    /// otherwise the motion.
     pub targets: Option<Targets>,
     /// Interpolation of known forces and inputs between the samples; if `None`, the one that fits the motion best.
     pub between: Option<Between>,

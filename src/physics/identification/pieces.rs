@@ -283,7 +283,7 @@ fn nearby(track: &RecordedTrajectory, n: usize, sample: usize, piece: Range<usiz
             (0..n).for_each(|c| rights[c][i] += row[i] * track.q[k * n + c]);
         }
     }
-    // Fewer than three times leave the polynomial open: the smallest one is taken.
+    // Fewer than three times do not determine the polynomial: the ridge chooses the smallest one.
     (0..3).for_each(|i| matrix[4 * i] += POLYNOMIAL_RIDGE);
     let mut start = vec![0.0; 2 * n];
     for (i, right) in rights.iter().enumerate() {

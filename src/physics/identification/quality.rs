@@ -3,13 +3,13 @@
 use super::follow::Segment;
 use super::found::{Outlier, Residual};
 use super::innovations::Disturbances;
-use super::solve::Problem;
+use super::solve::{Problem, batches};
 use super::thresholds::{
-    COARSE_INTEGRATION, COARSE_OVER_NOISE, LANES, MOST_LISTED_OUTLIERS, MOST_NOISE_SHARE, MOST_OUTLIERS,
-    MOST_OVER_NOISE, OUTLIER, SEGMENT_SIGNIFICANCE, SIGNIFICANCE, UNCORRELATED, WHITENESS_LAGS,
+    COARSE_INTEGRATION, COARSE_OVER_NOISE, MOST_LISTED_OUTLIERS, MOST_NOISE_SHARE, MOST_OUTLIERS, MOST_OVER_NOISE,
+    OUTLIER, SEGMENT_SIGNIFICANCE, SIGNIFICANCE, UNCORRELATED, WHITENESS_LAGS,
 };
 use super::verdict::Verdict;
-use crate::recording::robust_deviation;
+use crate::recording::{Recording, robust_deviation};
 use crate::scalar::Real;
 
 /// Upper tail of the F distribution with the given degrees of freedom: Paulson's normal approximation of its cube root
@@ -68,10 +68,7 @@ pub(super) fn innovations(problem: &Problem<'_>, x: &[f64], segments: &[Segment]
     open.disturbances = Disturbances { unknown_start: Some(OUTLIER), ..problem.disturbances.clone() };
     let runs = || segments.iter().map(|segment| vec![f64::NAN; segment.samples]).collect::<Vec<_>>();
     let mut found: Vec<Vec<Vec<f64>>> = (0..n).map(|_| runs()).collect();
-    let mut order: Vec<usize> = (0..segments.len()).collect();
-    order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-    for batch in order.chunks(LANES) {
-        let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
+    for (batch, lanes) in batches(segments) {
         if problem.measured.is_some() {
             open.disturbances.start_variances = problem.start_variances(x, &lanes);
         }
@@ -87,13 +84,13 @@ pub(super) fn typical_size(residuals: &[Vec<f64>], n: usize, coordinate: usize) 
     if sizes.is_empty() { 0.0 } else { robust_deviation(&mut sizes) }
 }
 
-/// Outliers, the largest first, and their number.
+/// Outliers, the largest first, and their number; `place` gives the trajectory and the sample.
 pub(super) fn outliers(
+    recording: &Recording,
     (segments, residuals): (&[Segment], &[Vec<f64>]),
-    n: usize,
-    describe: impl Fn(usize, usize, usize, f64) -> Outlier,
+    place: impl Fn(usize, usize) -> (usize, usize),
 ) -> (Vec<Outlier>, usize) {
-    let mut found = Vec::new();
+    let (n, mut found) = (recording.n(), Vec::new());
     for i in 0..n {
         let of = |segment: &Vec<f64>| segment.iter().skip(i).step_by(n).copied().collect::<Vec<_>>();
         let typical = typical_size(residuals, n, i);
@@ -105,14 +102,12 @@ pub(super) fn outliers(
     }
     found.sort_by(|a, b| b.3.abs().total_cmp(&a.3.abs()));
     let count = found.len();
-    (
-        found
-            .into_iter()
-            .take(MOST_LISTED_OUTLIERS)
-            .map(|(track, sample, i, size)| describe(track, sample, i, size))
-            .collect(),
-        count,
-    )
+    let describe = |(track, sample, i, size): (usize, usize, usize, f64)| {
+        let (track, sample) = place(track, sample);
+        let (time, coordinate) = (recording.tracks[track].times[sample], recording.coordinates[i].clone());
+        Outlier { track, sample, trajectory: String::new(), row: 0, time, coordinate, size }
+    };
+    (found.into_iter().take(MOST_LISTED_OUTLIERS).map(describe).collect(), count)
 }
 
 /// Root mean square of the residuals over the noise, all coordinates together.

@@ -1,4 +1,4 @@
-//! The search: that it arrives or says so, from far starts, across gaps, with repeated and weighed measurements.
+//! Tests of the search: it converges or reports that it does not, from distant starts, across gaps, with repeated and weighted measurements.
 
 use super::tests::{described, noise, recorded};
 use super::*;
@@ -40,14 +40,14 @@ fn wiggler(field: f64, wave_number: f64) -> SystemInstance<f64> {
 
 #[test]
 fn a_wave_number_is_found_although_smoothing_leaves_out_the_ends() {
-    // The noise of z asks for wide windows of smoothing: little is left over which the derivative by k could grow.
+    // The noise of z requires wide smoothing windows, which leave little time for the derivative by k to grow.
     for (seed, wave_number) in [(0, 1.7), (1, 2.3), (2, 1.8), (3, 2.4)] {
         let recording = recorded(&wiggler(1.2, 2.0), &[&[0.1, 0.0, 0.0, 1.0]], (25.0, 0.05), &[2e-3, 6.5e-2], seed);
-        let options = IdentifyOptions { constants: ["B", "k"].map(String::from).to_vec(), ..Default::default() };
+        let options = IdentifyOptions::new().constants(["B", "k"]);
         let found = identify(&wiggler(1.4, wave_number), &recording, &options).unwrap();
         let off = off(&found, &[("B", 1.2), ("k", 2.0)]);
         assert!(found.converged && off.iter().all(|off| off.abs() < 4.5), "{seed}: {found:?}");
-        // A wave number that lies beyond what is searched is not found, and the motion is not explained.
+        // A wave number outside the searched range is not found, and the motion is not explained.
         let far = identify(&wiggler(1.4, 0.7), &recording, &options).unwrap();
         assert!(!far.explained, "{seed}: {far:?}");
     }
@@ -92,7 +92,7 @@ fn a_constant_at_its_bound_is_called_that() {
 }
 
 #[test]
-fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
+fn a_search_that_is_cut_short_does_not_report_convergence() {
     let form = damped(40.0, 0.05);
     let recording = recorded(&damped(2.0, 8.0), &[&[1.3, 0.2]], (4.0, 0.02), &[1e-3], 1);
     let equations = crate::lagrangian::Equations::record(&form, &[1, 2], &[]).unwrap().unwrap();
@@ -129,13 +129,13 @@ fn a_search_that_is_cut_short_does_not_claim_to_have_arrived() {
     assert!(!short.converged && short.decrement > 1.0, "{short:?}");
     let whole = problem.fit(&mut start.clone(), &mut segments(), 100);
     assert!(whole.converged && whole.decrement < 1e-6, "{whole:?}");
-    // From where an earlier step went astray a search arrives, or says that it does not.
+    // From a point that an earlier step had reached by mistake, a search converges or reports that it does not.
     let mut x = vec![1e-12; 2];
     let back = problem.fit(&mut x, &mut segments(), 100);
     assert!(!back.converged || (back.square / whole.square - 1.0).abs() < 1e-6, "{x:?} {back:?}");
 }
 
-/// Some of the samples of a trajectory.
+/// The given samples of a trajectory.
 fn sampled(track: &RecordedTrajectory, n: usize, kept: &[usize]) -> RecordedTrajectory {
     let q = kept.iter().flat_map(|&k| track.q[k * n..(k + 1) * n].to_vec()).collect();
     RecordedTrajectory { times: kept.iter().map(|&k| track.times[k]).collect(), q, ..track.clone() }
@@ -152,7 +152,7 @@ fn orbit(mu: f64) -> SystemInstance<f64> {
 #[test]
 fn motion_is_followed_across_gaps_of_any_length() {
     for seed in 0..3 {
-        // Six stretches of fourteen nights each, a night now and then.
+        // Six periods of fourteen nights each, with some days between the nights.
         let mut recording = recorded(&orbit(39.478), &[&[-4.6, -0.4, 1.2, -2.3]], (6.0, 0.005), &[5e-3; 2], seed);
         let night = |k: usize| (k / 14) * 200 + (k % 14) * 5 + k % 3;
         let kept: Vec<usize> = (0..84).map(night).collect();
@@ -166,13 +166,13 @@ fn motion_is_followed_across_gaps_of_any_length() {
 
 #[test]
 fn angles_turn_within_gaps() {
-    // Turning motion of which nothing is seen for several turns.
+    // Rotation with a gap of several turns.
     let mut recording = recorded(&pendulum(&[("w", 8.0)]), &[&[0.3, 9.0]], (8.0, 0.02), &[1e-3], 2);
     let kept: Vec<usize> = (0..401).filter(|k| k % 200 < 60).collect();
     let mut track = sampled(&recording.tracks[0], 1, &kept);
     track.q.iter_mut().skip(60).for_each(|q| *q -= 6.0 * std::f64::consts::TAU);
     recording.tracks[0] = track;
-    let options = IdentifyOptions { segment: Some(8.0), ..Default::default() };
+    let options = IdentifyOptions::new().segment(8.0);
     let found = identify(&pendulum(&[]), &recording, &options).unwrap();
     assert!(found.converged && off(&found, &[("w", 8.0)])[0].abs() < 4.5, "{found:?}");
     assert!((found.over_noise - 1.0).abs() < 0.2 && found.segments == 1, "{found:?}");
@@ -217,14 +217,14 @@ fn errors_of_rows_weigh_them() {
     for ((q, drawn), error) in recording.tracks[0].q.iter_mut().zip(&drawn.tracks[0].q).zip(&errors) {
         *q += (drawn - *q) * error;
     }
-    let weighed = IdentifyOptions { errors: vec![errors.clone()], ..Default::default() };
+    let weighed = IdentifyOptions::new().errors(vec![errors.clone()]);
     let found = identify(&pendulum(&[]), &recording, &weighed).unwrap();
     let plain = identify(&pendulum(&[]), &recording, &IdentifyOptions::default()).unwrap();
     let error = |found: &Identified| found.constants[0].standard_error.unwrap();
     assert!(found.converged && error(&found) < error(&plain) / 5.0, "{found:?} {plain:?}");
     assert!(off(&found, &[("w", 8.0)])[0].abs() < 4.5 && (found.over_noise - 1.0).abs() < 0.15, "{found:?}");
     for wrong in [vec![vec![1e-3; 3]], vec![errors.iter().map(|x| -x).collect()], vec![vec![f64::NAN; errors.len()]]] {
-        let refused = identify(&pendulum(&[]), &recording, &IdentifyOptions { errors: wrong, ..Default::default() });
+        let refused = identify(&pendulum(&[]), &recording, &IdentifyOptions::new().errors(wrong));
         assert!(matches!(refused, Err(IdentifyError::Errors { .. })));
     }
 }
@@ -284,9 +284,9 @@ fn a_delay_beside_a_force_is_found() {
         let track = RecordedTrajectory { name: "run".into(), times, q, v: vec![], a: vec![], force };
         let mut recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         noise(&mut recording, &[1e-3], seed);
-        let options = IdentifyOptions { delays: vec!["x".into()], between: Some(Between::Cubic), ..Default::default() };
+        let options = IdentifyOptions::new().delays(["x"]).between(Between::Cubic);
         let found = identify(&form(&[]), &recording, &options).unwrap();
-        // A force that is held is late by half a sample, which is a delay as well.
+        // A force that is held lags by half a sample, which is equivalent to a delay.
         let any = identify(&form(&[]), &recording, &IdentifyOptions { between: None, ..options }).unwrap();
         for (found, most) in [(found, 1e-3), (any, 0.02)] {
             let delay = &found.sensors[0];

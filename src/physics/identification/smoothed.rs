@@ -89,7 +89,8 @@ impl States {
         (track, problem.course.recording.tracks[track].times[sample])
     }
 
-    /// Calls `visit` with every batch of states: the evaluated equations, the range of the batch in the arrays, and its accelerations for constants `x`.
+    /// Calls `visit` with every batch of states: the evaluated equations, the range of the batch in the arrays, and its accelerations for constants
+    /// `x`.
     pub fn batches(
         &self,
         problem: &Problem<'_>,
@@ -358,9 +359,9 @@ impl States {
         times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)])
     }
 
-    /// Largest change of a constant, among the searched range and its halves, that leaves the derivatives of the accelerations by the constant almost
-    /// parallel. `None` if the whole range does: the constant, such as a stiffness, is not part of a phase. Growth of the derivatives is not tested,
-    /// because smoothing omits the beginning of a recording.
+    /// Largest change of a constant, among the searched range and its halves, that leaves the derivatives of the accelerations by the constant
+    /// almost parallel. `None` if the whole range does: the constant, such as a stiffness, is not part of a phase. Growth of the derivatives is not
+    /// tested, because smoothing omits the beginning of a recording.
     fn phase_step(&self, problem: &Problem<'_>, (x, k): (&[f64], usize)) -> Option<f64> {
         let m = problem.chosen.len();
         let derivatives = |change: f64| {

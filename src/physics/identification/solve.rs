@@ -125,6 +125,17 @@ impl Normal {
     }
 }
 
+/// Indices of segments, and the segments.
+type Batch<'a> = (Vec<usize>, Vec<&'a Segment>);
+
+/// Segments in batches that are integrated side by side, the longest first.
+pub(super) fn batches(segments: &[Segment]) -> Vec<Batch<'_>> {
+    let mut order: Vec<usize> = (0..segments.len()).collect();
+    order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
+    let batch = |batch: &[usize]| (batch.to_vec(), batch.iter().map(|&k| &segments[k]).collect());
+    order.chunks(LANES).map(batch).collect()
+}
+
 /// Compares the integrated motion of segments with the readings.
 struct Comparison<'a> {
     problem: &'a Problem<'a>,
@@ -279,14 +290,14 @@ impl Problem<'_> {
         segments.iter().map(of).sum::<usize>() as f64
     }
 
-    /// `true` for a sample of a segment that follows a long gap.
+    /// `true` if a long gap lies between the start of a segment and the sample.
     fn is_beyond_gap(&self, segment: &Segment, sample: usize) -> bool {
         let next = |gaps: &Vec<usize>| gaps.get(gaps.partition_point(|gap| *gap <= segment.first)).copied();
         self.gaps.get(segment.track).and_then(next).is_some_and(|gap| gap <= sample)
     }
 
-    /// Integrates segments and calls `visit(segment, sample, reading, residual, row)` for every reading. Residuals are in units of the noise; the row
-    /// holds their derivatives by initial state, constants and sensor constants, if requested. With disturbances, `visit` receives innovations
+    /// Integrates segments and calls `visit(segment, sample, reading, residual, row)` for every reading. Residuals are in units of the noise; the
+    /// row holds their derivatives by initial state, constants and sensor constants, if requested. With disturbances, `visit` receives innovations
     /// instead. Returns the sum of the logarithms of the innovations' variances, in units of the noise.
     pub(super) fn residuals(
         &self,
@@ -357,14 +368,9 @@ impl Problem<'_> {
 
     /// Normal equations of all segments in order.
     pub fn all(&self, x: &[f64], segments: &[Segment]) -> Vec<Option<Linear>> {
-        let mut order: Vec<usize> = (0..segments.len()).collect();
-        order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-        let batches: Vec<&[usize]> = order.chunks(LANES).collect();
-        let work = |batches: &[&[usize]]| {
-            let of = |batch: &&[usize]| {
-                let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
-                batch.iter().copied().zip(self.batch(x, &lanes)).collect::<Vec<_>>()
-            };
+        let batches = batches(segments);
+        let work = |batches: &[Batch<'_>]| {
+            let of = |(batch, lanes): &Batch<'_>| batch.iter().copied().zip(self.batch(x, lanes)).collect::<Vec<_>>();
             batches.iter().take_while(|_| self.cancellation.go_on()).flat_map(of).collect::<Vec<_>>()
         };
         let share = batches.len().div_ceil(self.threads.max(1)).max(1);
@@ -385,10 +391,7 @@ impl Problem<'_> {
     pub fn all_residuals(&self, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
         let n = self.width();
         let mut found: Vec<Vec<f64>> = segments.iter().map(|segment| vec![f64::NAN; segment.samples * n]).collect();
-        let mut order: Vec<usize> = (0..segments.len()).collect();
-        order.sort_by_key(|&k| std::cmp::Reverse(segments[k].samples));
-        for batch in order.chunks(LANES).take_while(|_| self.cancellation.go_on()) {
-            let lanes: Vec<&Segment> = batch.iter().map(|&k| &segments[k]).collect();
+        for (batch, lanes) in batches(segments).into_iter().take_while(|_| self.cancellation.go_on()) {
             let put = |lane: usize, sample: usize, i: usize, r: f64, _: &[f64]| found[batch[lane]][sample * n + i] = r;
             self.residuals(x, &lanes, false, put);
         }

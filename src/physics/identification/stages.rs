@@ -277,7 +277,7 @@ impl<'a> Setup<'a> {
         let mut found = result(self.instance, &problem, &fitted, start, self.knows_noise());
         stop.check()?;
         if self.pieces.still.len() == self.recording.n() {
-            // Coordinates that all stand still cannot confirm a model.
+            // Motionless coordinates cannot confirm a model.
             let coordinate = self.recording.coordinates[0].clone();
             (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
         }
@@ -553,7 +553,7 @@ fn update_noise(problem: &mut Problem<'_>, fitted: &Fitted) {
             let values = &own[track * n + i];
             let count = independent_samples(values);
             of[i] = if values.len() < LEAST_OWN_NOISE_SAMPLES { whole } else { size(values.clone()) };
-            // The log of a standard deviation has a standard error of one over the root of twice the count.
+            // The standard error of the logarithm of a standard deviation is one over the square root of twice the count.
             differ |=
                 noisy && (of[i] / whole).ln().abs() > OWN_NOISE_RATIO.max(OWN_NOISE_ERRORS / (2.0 * count).sqrt());
         }

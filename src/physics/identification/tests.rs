@@ -1,4 +1,4 @@
-//! Constants of simulated motion, of which the truth is known.
+//! Tests on simulated motion, whose true constants are known.
 
 use super::*;
 use crate::lagrangian::{Description, SystemInstance, configure, configure_system};
@@ -15,7 +15,7 @@ fn given(pairs: &Pairs<'_>) -> Vec<(String, String)> {
     pairs.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect()
 }
 
-/// Motion of a model from some starts, `(2, n)` each, with noise of every coordinate.
+/// Motion of a model from several initial states, `(2, n)` each, with noise on every coordinate.
 pub(super) fn recorded(
     instance: &SystemInstance<f64>,
     starts: &[&[f64]],
@@ -61,7 +61,7 @@ fn constants_of_a_double_pendulum_lie_within_their_errors() {
     let truth = [("m2", 0.6), ("l1", 0.8), ("l2", 1.3)];
     let instance = configure::<f64>("double-pendulum", &given(&truth)).unwrap();
     let form = configure::<f64>("double-pendulum", &[]).unwrap();
-    let options = IdentifyOptions { constants: ["m2", "l1", "l2"].map(String::from).to_vec(), ..Default::default() };
+    let options = IdentifyOptions::new().constants(["m2", "l1", "l2"]);
     let mut squares = Vec::new();
     for seed in 0..4 {
         let recording = recorded(&instance, &STARTS, (3.0, 0.02), &[2e-3, 3e-3], seed);
@@ -92,7 +92,7 @@ fn readings_may_be_missing() {
     let (mut squares, mut explained) = (Vec::new(), 0);
     for seed in 0..4 {
         let recording = recorded(&instance, &STARTS, (3.0, 0.02), &[2e-3, 3e-3], seed);
-        // Of the second angle two of three are missing, of the first one of five; what stands in their place says nothing.
+        // Two of three readings of the second angle are missing, and one of five of the first. The numbers in their place carry no information.
         let mut rng = RngStream::Region.generator(seed);
         let mut lossy = recording.clone();
         let mut missing = Vec::new();
@@ -102,13 +102,12 @@ fn readings_may_be_missing() {
             assert_eq!(track.fill_missing(2).as_ref(), Ok(&lost));
             missing.push(lost);
         }
-        let full =
-            identify(&form, &recording, &IdentifyOptions { constants: constants(), ..Default::default() }).unwrap();
-        let options = IdentifyOptions { constants: constants(), missing, ..Default::default() };
+        let full = identify(&form, &recording, &IdentifyOptions::new().constants(constants())).unwrap();
+        let options = IdentifyOptions::new().constants(constants()).missing(missing);
         let found = identify(&form, &lossy, &options).unwrap();
-        // A wrong form, l2 = 1 m, does not fit what is left.
+        // A wrong model, l2 = 1 m, does not fit the remaining readings.
         if seed == 0 {
-            let few = IdentifyOptions { constants: constants()[..2].to_vec(), ..options };
+            let few = options.constants(constants()[..2].to_vec());
             assert!(!identify(&form, &lossy, &few).unwrap().explained);
         }
         explained += usize::from(found.explained);
@@ -127,13 +126,13 @@ fn readings_may_be_missing() {
         explained >= 3 && (0.2..2.2).contains(&mean) && squares.iter().all(|s| *s < 16.0),
         "{explained} {squares:?}"
     );
-    let wrong = IdentifyOptions { missing: vec![vec![true; 3]], ..Default::default() };
+    let wrong = IdentifyOptions::new().missing(vec![vec![true; 3]]);
     let recording = recorded(&instance, &STARTS, (3.0, 0.02), &[2e-3, 3e-3], 0);
     assert!(matches!(identify(&form, &recording, &wrong), Err(IdentifyError::Missing { found: 3, .. })));
 }
 
 #[test]
-fn what_free_motion_leaves_open_is_named_with_its_cure() {
+fn what_free_motion_leaves_open_is_named_with_advice() {
     let pendulum = |pairs: &Pairs<'_>| {
         let text = r#"{"name": "swing", "lagrangian": "m*l^2*a_dot^2/2 + m*g*l*cos(a)",
             "coordinates": [{"name": "a", "periodic": true, "velocity_bounds": [-3, 3]}],
@@ -153,17 +152,17 @@ fn what_free_motion_leaves_open_is_named_with_its_cure() {
     let known = &pair.known[0];
     assert_eq!((known.name.as_str(), known.product, known.terms.len()), ("g/l", true, 2));
     assert!((known.value - 9.8).abs() < 4.0 * known.standard_error && known.standard_error < 1e-2, "{pair:?}");
-    // The mass stays where it started.
+    // The mass keeps its starting value.
     assert_eq!(found.constants.iter().find(|c| c.symbol == "m").unwrap().value, 2.0);
-    // With one of them known the other is determined.
-    let options = IdentifyOptions { constants: vec!["g".into()], ..Default::default() };
+    // If one of them is given, the other is determined.
+    let options = IdentifyOptions::new().constants(["g"]);
     let found = identify(&pendulum(&[]), &recording, &options).unwrap();
     let g = &found.constants[0];
     assert!(found.undetermined.is_empty() && (g.value - 9.8).abs() < 4.0 * g.standard_error.unwrap(), "{g:?}");
 }
 
 #[test]
-fn what_a_larger_motion_would_tell_is_said() {
+fn the_advice_names_the_larger_motion_that_is_needed() {
     let spring = |pairs: &Pairs<'_>| {
         let text = r#"{"name": "spring", "lagrangian": "x_dot^2/2 - k*x^2/2 - c*x^4/4",
             "coordinates": [{"name": "x", "bounds": [-1, 1], "velocity_bounds": [-2, 2]}],
@@ -175,7 +174,7 @@ fn what_a_larger_motion_would_tell_is_said() {
     let open = &found.undetermined[0];
     assert!(open.constants.contains(&"c".to_string()) && open.relative_error.is_some(), "{open:?}");
     assert!(open.cure.contains("larger range of x"), "{open:?}");
-    // What is known is the stiffness at the size of the motion.
+    // The determined combination is the stiffness at the amplitude of the motion.
     let [known] = &open.known[..] else { panic!("{open:?}") };
     let factor = |name: &str| known.terms.iter().find(|(known, _)| known == name).map_or(0.0, |(_, factor)| *factor);
     let exact = factor("k") + 0.5 * factor("c");
@@ -185,9 +184,9 @@ fn what_a_larger_motion_would_tell_is_said() {
     assert!(found.undetermined.is_empty(), "{found:?}");
 }
 
-/// What is known is `offset + gain r`, which is neither a sum nor a product.
+/// The determined combination is `offset + gain r`, which is neither a sum nor a product.
 #[test]
-fn what_has_no_name_is_told_in_numbers() {
+fn combinations_without_a_formula_are_described_by_numbers() {
     let spring = |pairs: &Pairs<'_>| {
         let text = r#"{"name": "spring", "lagrangian": "x_dot^2/2 - k*(x - r)^2/2",
             "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-4, 4]}],
@@ -196,20 +195,20 @@ fn what_has_no_name_is_told_in_numbers() {
     };
     let recording = recorded(&spring(&[("k", 4.0), ("r", 0.35)]), &[&[1.0, 0.0]], (8.0, 0.02), &[1e-3], 4);
     let x = || vec!["x".to_string()];
-    let options = IdentifyOptions { offsets: x(), gains: x(), ..Default::default() };
+    let options = IdentifyOptions::new().offsets(x()).gains(x());
     let found = identify(&spring(&[]), &recording, &options).unwrap();
     let [open] = &found.undetermined[..] else { panic!("{:?}", found.undetermined) };
     assert!(open.known.is_empty() && open.constants.len() == 3 && open.directions.len() == 2, "{open:?}");
     let k = &found.constants[0];
     assert!((k.value - 4.0).abs() < 4.0 * k.standard_error.unwrap(), "{k:?}");
-    // With one sensor constant there is a name.
-    let found = identify(&spring(&[]), &recording, &IdentifyOptions { offsets: x(), ..Default::default() }).unwrap();
+    // With one sensor constant, the combination is a sum.
+    let found = identify(&spring(&[]), &recording, &IdentifyOptions::new().offsets(x())).unwrap();
     let known = &found.undetermined[0].known[0];
     assert!(!known.product && (known.value - 0.35).abs() < 4.0 * known.standard_error, "{known:?}");
 }
 
 #[test]
-fn a_wrong_form_leaves_what_is_no_noise() {
+fn a_wrong_model_is_not_explained() {
     let form = |friction: &str| {
         let text = format!(
             r#"{{"name": "swing", "lagrangian": "a_dot^2/2 + w*cos(a)", {friction}
@@ -220,7 +219,7 @@ fn a_wrong_form_leaves_what_is_no_noise() {
     };
     let damped = form(r#""dissipation": "c*a_dot^2/2","#);
     let recording = recorded(&damped, &[&[1.5, 0.0], &[2.5, 0.0]], (6.0, 0.02), &[1e-3], 3);
-    let options = IdentifyOptions { constants: vec!["w".into()], ..Default::default() };
+    let options = IdentifyOptions::new().constants(["w"]);
     let wrong = identify(&form(""), &recording, &options).unwrap();
     assert!(!wrong.explained, "{wrong:?}");
     let right = identify(&damped, &recording, &IdentifyOptions::default()).unwrap();
@@ -228,8 +227,8 @@ fn a_wrong_form_leaves_what_is_no_noise() {
     for (constant, truth) in right.constants.iter().zip([0.1, 9.0]) {
         assert!((constant.value - truth).abs() < 4.0 * constant.standard_error.unwrap(), "{constant:?}");
     }
-    // Short segments hide most of what is wrong; one second shows it.
-    let long = identify(&form(""), &recording, &IdentifyOptions { segment: Some(1.0), ..options }).unwrap();
+    // Short segments hide most of the error of the model; segments of one second show it.
+    let long = identify(&form(""), &recording, &options.segment(1.0)).unwrap();
     assert!(long.over_noise > 1.5 * right.over_noise, "{} {}", long.over_noise, right.over_noise);
 }
 
@@ -240,7 +239,7 @@ fn outliers_are_named_and_a_robust_fit_is_not_moved() {
     let wrong = [37, 120, 200];
     wrong.iter().for_each(|&at| recording.tracks[0].q[at] += 0.1);
     let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
-    let options = IdentifyOptions { constants: vec!["l".into()], robust: true, ..Default::default() };
+    let options = IdentifyOptions::new().constants(["l"]).robust(true);
     let found = identify(&form, &recording, &options).unwrap();
     let mut samples: Vec<usize> = found.outliers.iter().map(|o| o.sample).collect();
     samples.sort_unstable();
@@ -248,7 +247,7 @@ fn outliers_are_named_and_a_robust_fit_is_not_moved() {
     assert_eq!(found.outliers[0].time, recording.tracks[0].times[found.outliers[0].sample]);
     let l = &found.constants[0];
     assert!((l.value - 0.7).abs() < 4.0 * l.standard_error.unwrap() && l.standard_error.unwrap() < 1e-3, "{l:?}");
-    let plain = identify(&form, &recording, &IdentifyOptions { robust: false, ..options }).unwrap();
+    let plain = identify(&form, &recording, &options.robust(false)).unwrap();
     assert!(plain.outlier_count >= 3 && plain.constants[0].standard_error > l.standard_error, "{plain:?}");
 }
 
@@ -263,8 +262,7 @@ fn sensors_have_constants_too() {
     }
     let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
     let theta = || vec![recording.coordinates[0].clone()];
-    let options =
-        IdentifyOptions { constants: vec!["l".into()], offsets: theta(), gains: theta(), ..Default::default() };
+    let options = IdentifyOptions::new().constants(["l"]).offsets(theta()).gains(theta());
     let found = identify(&form, &recording, &options).unwrap();
     assert!(found.explained, "{found:?}");
     assert_eq!(found.sensors.iter().map(|s| s.kind).collect::<Vec<_>>(), ["offset", "gain"]);
@@ -273,8 +271,8 @@ fn sensors_have_constants_too() {
     }
     let l = &found.constants[0];
     assert!((l.value - 0.7).abs() < 4.0 * l.standard_error.unwrap(), "{l:?}");
-    // A late sensor of motion without forces sees another start: nothing tells it.
-    let late = IdentifyOptions { delays: theta(), gains: vec![], ..options };
+    // Without forces, the delay of a sensor is equivalent to another initial state, and is not determined.
+    let late = options.delays(theta()).gains(Vec::<String>::new());
     let late = identify(&form, &recording, &late).unwrap();
     assert!(late.undetermined.iter().any(|u| u.constants.iter().any(|c| c.starts_with("delay"))), "{late:?}");
 }
@@ -322,19 +320,13 @@ fn what_does_not_fit_together_is_refused() {
     let recording = recorded(&form, &[&[1.0, 0.0]], (1.0, 0.02), &[1e-3], 8);
     let refused = |options: IdentifyOptions| identify(&form, &recording, &options).unwrap_err();
     let names = |name: &str| vec![name.to_string()];
-    let error = refused(IdentifyOptions { constants: names("mass"), ..Default::default() });
+    let error = refused(IdentifyOptions::new().constants(names("mass")));
     assert!(matches!(error, IdentifyError::Constant { .. }));
     let twice = vec!["l".to_string(), "l".to_string()];
-    assert!(matches!(
-        refused(IdentifyOptions { constants: twice, ..Default::default() }),
-        IdentifyError::Repeated { .. }
-    ));
-    let error = refused(IdentifyOptions { gains: names("phi"), ..Default::default() });
+    assert!(matches!(refused(IdentifyOptions::new().constants(twice)), IdentifyError::Repeated { .. }));
+    let error = refused(IdentifyOptions::new().gains(names("phi")));
     assert!(matches!(error, IdentifyError::Sensor { what: "gains", .. }));
-    assert!(matches!(
-        refused(IdentifyOptions { segment: Some(f64::NAN), ..Default::default() }),
-        IdentifyError::Option { what: "segment", .. }
-    ));
+    assert!(matches!(refused(IdentifyOptions::new().segment(f64::NAN)), IdentifyError::Option { what: "segment", .. }));
     let short = recorded(&form, &[&[1.0, 0.0]], (0.1, 0.02), &[1e-3], 8);
     assert!(matches!(identify(&form, &short, &Default::default()), Err(IdentifyError::Short { found: 6, .. })));
     let double = configure::<f64>("double-pendulum", &[]).unwrap();
@@ -350,12 +342,12 @@ fn what_does_not_fit_together_is_refused() {
         }],
     };
     // The axes of the ellipse are given.
-    let options = IdentifyOptions { constants: vec!["g".into()], ..Default::default() };
+    let options = IdentifyOptions::new().constants(["g"]);
     let error = identify(&constrained, &plane, &options).unwrap_err();
     assert!(matches!(error, IdentifyError::OffConstraint { .. }), "{error}");
 }
 
-/// An oscillator under a force of which eight samples a period are known: curves between them leave less than straight lines do.
+/// An oscillator under a force with eight samples per period: a smooth interpolation leaves smaller residuals than straight lines.
 #[test]
 fn a_smooth_force_is_seen_between_coarse_samples() {
     let oscillator = |pairs: &Pairs<'_>| {
@@ -378,7 +370,7 @@ fn a_smooth_force_is_seen_between_coarse_samples() {
     let track = RecordedTrajectory { name: "run".into(), times: motion.t, q, v: vec![], a: vec![], force };
     let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
     let off = |between: Option<Between>| {
-        let options = IdentifyOptions { between, ..IdentifyOptions::default() };
+        let options = IdentifyOptions::new().between(between);
         let found = identify(&oscillator(&[]), &recording, &options).unwrap();
         let truth = |symbol: &str| if symbol == "m" { 1.0 } else { 1.2 };
         let off = found.constants.iter().map(|c| (c.value - truth(&c.symbol)).abs()).sum::<f64>();
@@ -387,7 +379,7 @@ fn a_smooth_force_is_seen_between_coarse_samples() {
     let (lines, curves) = (off(Some(Between::Linear)).1, off(Some(Between::Cubic)).1);
     assert!(curves < lines / 5.0, "{curves} {lines}");
     assert_ne!(off(None).0, Between::Held);
-    // Of two samples and of one the curve is a line and a level.
+    // Through two samples the curve is a line, through one it is constant.
     let mut found = [0.0];
     for (samples, expected) in [(2, 0.25), (1, 0.0)] {
         let force: Vec<f64> = (0..samples).map(f64::from).collect();
@@ -397,7 +389,7 @@ fn a_smooth_force_is_seen_between_coarse_samples() {
     }
 }
 
-/// A driven oscillator whose force is measured with noise, 20 a second over 40 s.
+/// A driven oscillator whose force is measured with noise, at 20 Hz for 40 s.
 fn pushed(noise_of_force: f64, seed: u64) -> (SystemInstance<f64>, Recording) {
     let text = r#"{"name": "cart", "lagrangian": "m*x_dot^2/2 - k*x^2/2", "dissipation": "c*x_dot^2/2",
         "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-2, 2]}],
@@ -437,7 +429,7 @@ fn noise_of_a_known_force_is_seen_in_the_motion() {
 fn errors_under_correlated_noise_are_those_of_the_scatter() {
     let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
     let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
-    let options = IdentifyOptions { constants: vec!["l".into()], ..Default::default() };
+    let options = IdentifyOptions::new().constants(["l"]);
     let of = |memory: f64, seed: u64| {
         let mut recording = recorded(&instance, &[&[1.0, 0.0]], (12.0, 0.02), &[0.0], seed);
         let (mut rng, mut last) = (RngStream::Region.generator(seed), 0.0);
@@ -456,7 +448,7 @@ fn errors_under_correlated_noise_are_those_of_the_scatter() {
         ((found.constants[0].value - 0.7) / found.constants[0].standard_error.unwrap()).powi(2)
     };
     let mean = (0..12).map(off).sum::<f64>() / 12.0;
-    // Errors are 1.5 times too small under noise this slow (2.22 measured over these seeds); 1 would be right.
+    // The standard errors are 1.5 times too small for noise this slow: the mean is 2.22 for these seeds, and 1 would be right.
     assert!((0.3..2.5).contains(&mean), "{mean}");
 }
 
@@ -464,7 +456,7 @@ fn errors_under_correlated_noise_are_those_of_the_scatter() {
 fn a_verdict_says_why() {
     let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
     let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
-    let options = IdentifyOptions { constants: vec!["l".into()], ..Default::default() };
+    let options = IdentifyOptions::new().constants(["l"]);
     let verdict = |noise: f64, spoil: &dyn Fn(&mut f64, f64)| {
         let mut recording = recorded(&instance, &[&[1.0, 0.0], &[0.5, 1.0]], (6.0, 0.02), &[noise], 3);
         let mut rng = RngStream::Region.generator(3);
@@ -493,8 +485,8 @@ fn a_slow_term_that_is_missing_shows_where_segments_meet() {
         );
         described(&text, &[])
     };
-    // Each segment alone can be met without friction.
-    let options = IdentifyOptions { segment: Some(0.5), ..Default::default() };
+    // Each segment alone can be fitted without friction.
+    let options = IdentifyOptions::new().segment(0.5);
     let verdicts = (0..4).map(|seed| {
         let recording = recorded(&swing(true), &[&[1.0, 0.0]], (20.0, 0.02), &[1e-3], seed);
         let right = identify(&swing(true), &recording, &options).unwrap();

@@ -114,8 +114,8 @@ pub(super) const MOST_PROBED_STATES: usize = 256;
 
 // ---- Standard errors (checked by the rows "90 % range holds" of `lnn-studies rates --part identify`) ----
 
-/// Residuals beyond so many standard deviations count linearly in robust fits. Of normal noise three in a thousand lie there, so that a fit
-/// without outliers loses less than 1 % of its accuracy.
+/// Residuals beyond this many standard deviations count linearly in robust fits and in fits to smoothed motion. Of normal noise three in a thousand
+/// lie there, so that a fit without outliers loses less than 1 % of its accuracy.
 pub(super) const HUBER: f64 = 3.0;
 /// Largest window of correlated residuals, as a share of the samples: a longer one leaves too few independent sums.
 pub(super) const MOST_WINDOW: f64 = 0.25;
@@ -131,8 +131,7 @@ pub(super) const RIVAL_INCREASE: f64 = 9.0;
 pub(super) const RIVAL_DIFFERENCE: f64 = 1.7;
 /// Simulated copies of a recording. A standard deviation of 20 numbers has an error of 16 %, and each copy costs a fit.
 pub(super) const COPIES: usize = 20;
-/// Additional degree of the polynomials that give the true motion of the copies. Windows for this degree are wider
-/// than those used for smoothing.
+/// Additional degree of the polynomials that give the true motion of the copies. Windows for this degree are wider than those used for smoothing.
 pub(super) const MORE_DEGREES: usize = 2;
 /// Largest distance of integrated accelerations from the positions, as a share of the spread of a coordinate, at which the copies use them.
 pub(super) const MOST_DRIFT: f64 = 0.1;

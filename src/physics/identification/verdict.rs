@@ -6,9 +6,9 @@ use std::fmt::{Display, Formatter, Result};
 
 /// Whether the model fits the recording, and if not, why.
 ///
-/// A model fits a recording if all of the following conditions hold. The verdict names the first one that fails: the search has converged; residuals
-/// are below half of the spread and consistent with the noise; at most one sample in a hundred is an outlier; residuals are not correlated over time;
-/// segments agree about the constants; and every second segment can start where the previous one ends.
+/// A model fits a recording if all of the following conditions hold. The verdict names the first one that fails: the search has converged;
+/// residuals are below half of the spread and consistent with the noise; at most one sample in a hundred is an outlier; residuals are not
+/// correlated over time; segments agree about the constants; and every second segment can start where the previous one ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
