@@ -287,7 +287,7 @@ impl ForceResiduals {
         Self { raw, averages, errors, scaled }
     }
 
-    /// Outliers, the farthest first, and their number; the states of all trajectories follow one another.
+    /// Outliers, the largest first, and their number.
     fn outliers(&self, recording: &Recording, places: &[(usize, usize)]) -> (Vec<Outlier>, usize) {
         let whole = Segment { track: 0, first: 0, samples: places.len(), start: Vec::new() };
         outliers(recording, (&[whole], std::slice::from_ref(&self.scaled)), |_, state| places[state])

@@ -165,12 +165,12 @@ mod tests {
             let options = IdentifyOptions::new().by_trajectory(true);
             identify(&oscillator(3.5), &recording, &options).unwrap().by_trajectory.unwrap()
         };
-        let (alike, unlike) = (each(4.0), each(4.04));
-        assert!(!alike.scatter[0].differs && alike.scatter[0].ratio < 2.0, "{alike:?}");
-        assert!(unlike.scatter[0].differs && unlike.scatter[0].ratio > 3.0, "{unlike:?}");
-        let constants = unlike.trajectories.iter().map(|alone| &alone.constants[0]);
+        let (equal, different) = (each(4.0), each(4.04));
+        assert!(!equal.scatter[0].differs && equal.scatter[0].ratio < 2.0, "{equal:?}");
+        assert!(different.scatter[0].differs && different.scatter[0].ratio > 3.0, "{different:?}");
+        let constants = different.trajectories.iter().map(|alone| &alone.constants[0]);
         for (constant, k) in constants.zip([4.0, 4.0, 4.0, 4.04]) {
-            assert!((constant.value - k).abs() < 4.0 * constant.standard_error.unwrap(), "{unlike:?}");
+            assert!((constant.value - k).abs() < 4.0 * constant.standard_error.unwrap(), "{different:?}");
         }
     }
 }

@@ -208,12 +208,12 @@ impl Examiner<'_> {
     fn cure_at(&self, point: &Point<'_>) -> String {
         let (count, recorded) = (point.changes.len(), self.recorded(point.x));
         let sizes = self.sizes(point.x, &recorded);
-        let (free, apart) = self.effects(point, &self.wide_probe(&recorded), &sizes);
-        let unit = |columns: Vec<Vec<f64>>| scaled(columns, &apart);
+        let (free, separate) = self.effects(point, &self.wide_probe(&recorded), &sizes);
+        let unit = |columns: Vec<Vec<f64>>| scaled(columns, &separate);
         let free = unit(free);
-        let (under, under_apart) = self.effects(point, &self.forced_probe(point.x, (&recorded, &sizes)), &sizes);
+        let (under, under_separate) = self.effects(point, &self.forced_probe(point.x, (&recorded, &sizes)), &sizes);
         let both: Vec<Vec<f64>> =
-            free.iter().zip(scaled(under, &under_apart)).map(|(a, b)| [&a[..], &b[..]].concat()).collect();
+            free.iter().zip(scaled(under, &under_separate)).map(|(a, b)| [&a[..], &b[..]].concat()).collect();
         let (by_motion, _) = split(&free);
         let (by_either, _) = split(&both);
         let never = count - by_either.len();
@@ -287,10 +287,11 @@ impl Examiner<'_> {
         let mut follower = Follower::new(&self.problem.course);
         let slopes = follower.force_slopes(&self.problem.parameters(x), (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
-        let (columns, apart) = effects((&rows, 0.0), changes, |_| 1.0);
-        let (visible, invisible) = split(&scaled(columns, &apart));
+        let (columns, separate) = effects((&rows, 0.0), changes, |_| 1.0);
+        let (visible, invisible) = split(&scaled(columns, &separate));
         let basis = |rows: &[Vec<f64>]| {
-            let own = if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &apart), rows) };
+            let own =
+                if changes.is_empty() { Vec::new() } else { combined(&scaled(changes.to_vec(), &separate), rows) };
             let exact = |(x, size): (f64, &f64)| if (x / size).abs() > SINGULAR_ROUNDING { x } else { 0.0 };
             let of = |column: OpenDirection| column.change.into_iter().zip(size).map(exact).collect::<Vec<f64>>();
             echelon(own, size).into_iter().map(of).collect::<Vec<_>>()
@@ -323,14 +324,14 @@ fn effects(
 ) -> (Vec<Vec<f64>>, Vec<f64>) {
     let finite = |row: &&[f64]| row.iter().all(|x| x.is_finite());
     let of = |change: &Vec<f64>| {
-        let (mut column, mut apart) = (Vec::with_capacity(rows.len()), 0.0);
+        let (mut column, mut separate) = (Vec::with_capacity(rows.len()), 0.0);
         for (at, row) in rows.iter().enumerate().filter(|(_, row)| finite(row)) {
             let parts = || row.iter().zip(change).map(|(slope, change)| slope * change / size(at));
             column.push(parts().sum::<f64>());
-            apart += parts().map(f64::abs).sum::<f64>().powi(2);
+            separate += parts().map(f64::abs).sum::<f64>().powi(2);
         }
         let least = least * (column.len() as f64).sqrt();
-        (column, apart.sqrt().max(least))
+        (column, separate.sqrt().max(least))
     };
     changes.iter().map(of).unzip()
 }

@@ -50,8 +50,8 @@ impl Problem<'_> {
             }
             Some(_) => x + d,
             None if self.ranges[self.chosen[k]] == Range::Positive => {
-                let unseen = normal.matrix[k * m + k] * x * x < 1.0;
-                (x + d).max(if unseen { 0.0 } else { LEAST_SHARE_LEFT * x }).max(self.bound(k))
+                let unresolved = normal.matrix[k * m + k] * x * x < 1.0;
+                (x + d).max(if unresolved { 0.0 } else { LEAST_SHARE_LEFT * x }).max(self.bound(k))
             }
             None => (x + d).max(self.bound(k)),
         };
@@ -183,8 +183,8 @@ impl Problem<'_> {
             return own;
         }
         let coupled = |i: usize| dot(&linear.matrix[i * width + starts..(i + 1) * width], change);
-        let followed = times(starts, &self.start_inverse(linear, 0.0), &(0..starts).map(coupled).collect::<Vec<_>>());
-        own.iter().zip(followed).map(|(own, followed)| own - followed).collect()
+        let response = times(starts, &self.start_inverse(linear, 0.0), &(0..starts).map(coupled).collect::<Vec<_>>());
+        own.iter().zip(response).map(|(own, response)| own - response).collect()
     }
 
     /// Fits only the initial states, each segment separately; `false` if the sum of squares still decreases.

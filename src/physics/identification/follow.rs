@@ -423,15 +423,16 @@ impl<'a> Follower<'a> {
             false => (track.times[segment.first], 0.0),
         };
         let mut places: Vec<(f64, f64)> = segments.iter().zip(&tracks).map(of).collect();
-        while places.iter().any(|(_, left)| left.abs() > 0.0) {
+        while places.iter().any(|(_, remaining)| remaining.abs() > 0.0) {
             // For each lane the end of its interval, the time to integrate, and the time that is reached.
-            let interval = |((now, left), track): (&(f64, f64), &&RecordedTrajectory)| {
+            let interval = |((now, remaining), track): (&(f64, f64), &&RecordedTrajectory)| {
                 let (times, last) = (&track.times, track.len() - 1);
-                let end = times.partition_point(|t| if *left < 0.0 { t < now } else { t <= now }).clamp(1, last.max(1));
-                let border = times[if *left < 0.0 { end - 1 } else { end.min(last) }];
-                let outside = if *left < 0.0 { end == 1 } else { end >= last };
-                let whole = outside || left.abs() <= (border - now).abs();
-                (end, if whole { *left } else { border - now }, if whole { now + left } else { border })
+                let end =
+                    times.partition_point(|t| if *remaining < 0.0 { t < now } else { t <= now }).clamp(1, last.max(1));
+                let bound = times[if *remaining < 0.0 { end - 1 } else { end.min(last) }];
+                let outside = if *remaining < 0.0 { end == 1 } else { end >= last };
+                let whole = outside || remaining.abs() <= (bound - now).abs();
+                (end, if whole { *remaining } else { bound - now }, if whole { now + remaining } else { bound })
             };
             let intervals: Vec<(usize, f64, f64)> = places.iter().zip(&tracks).map(interval).collect();
             let most = intervals.iter().fold(0.0, |most: f64, interval| most.max(interval.1.abs()));
@@ -453,8 +454,8 @@ impl<'a> Follower<'a> {
                     }
                 });
             }
-            for (place, (_, gone, now)) in places.iter_mut().zip(intervals) {
-                *place = (now, if gone == place.1 { 0.0 } else { place.1 - gone });
+            for (place, (_, elapsed, now)) in places.iter_mut().zip(intervals) {
+                *place = (now, if elapsed == place.1 { 0.0 } else { place.1 - elapsed });
             }
         }
     }

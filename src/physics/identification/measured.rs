@@ -240,7 +240,7 @@ mod tests {
         "measured": {"b": "b", "pull": "m*a_ddot*cos(b) + s*sin(t) + b_ddot*a_dot", "far": {"formula": "sqrt((s - a)^2 + b^2*k)"}}}"#;
 
     /// Readings at the last of a few samples, and their slopes by initial state and parameters 3, 0, 1.
-    fn seen(start: &[f64], change: (usize, f64)) -> (Vec<f64>, Vec<f64>) {
+    fn readings_at_end(start: &[f64], change: (usize, f64)) -> (Vec<f64>, Vec<f64>) {
         let description: Description = serde_json::from_str(FORM).unwrap();
         let mut instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         instance.parameters[change.0] += change.1;
@@ -274,14 +274,14 @@ mod tests {
     fn slopes_of_readings_are_those_of_differences() {
         const H: f64 = 1e-5;
         let start = [0.3, 1.1, 0.7, -0.4];
-        let (_, slopes) = seen(&start, (0, 0.0));
+        let (_, slopes) = readings_at_end(&start, (0, 0.0));
         for column in 0..7 {
             let at = |h: f64| {
                 let mut start = start;
                 if column < 4 {
                     start[column] += h;
                 }
-                seen(&start, ([3, 0, 1][column.max(4) - 4], if column < 4 { 0.0 } else { h })).0
+                readings_at_end(&start, ([3, 0, 1][column.max(4) - 4], if column < 4 { 0.0 } else { h })).0
             };
             let (up, down) = (at(H), at(-H));
             for i in 0..3 {

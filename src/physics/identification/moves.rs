@@ -145,19 +145,19 @@ impl<'a> Moves<'a> {
         if self.determined.without_effect.is_empty() && self.determined.open.is_empty() {
             return x.to_vec();
         }
-        let mut near = x.to_vec();
-        self.determined.without_effect.iter().for_each(|&k| near[k] = start[k]);
+        let mut closest = x.to_vec();
+        self.determined.without_effect.iter().for_each(|&k| closest[k] = start[k]);
         for group in groups.iter().filter(|group| group.is_complete()) {
             match group.kind {
-                Kind::Product => nearest_product(&mut near, start, group),
+                Kind::Product => nearest_product(&mut closest, start, group),
                 Kind::Sum => {
                     let columns: Vec<&[f64]> = group.columns.iter().map(|column| &column.change[..]).collect();
-                    nearest(&mut near, start, &columns, &self.determined.size);
+                    nearest(&mut closest, start, &columns, &self.determined.size);
                 }
             }
         }
-        let near = Some(near).filter(|near| self.is_in_range(near)).and_then(|near| self.refit(near));
-        near.map_or_else(|| x.to_vec(), |(x, _)| x)
+        let closest = Some(closest).filter(|closest| self.is_in_range(closest)).and_then(|closest| self.refit(closest));
+        closest.map_or_else(|| x.to_vec(), |(x, _)| x)
     }
 
     /// Moves along each direction, up and down, and along all together, with alternating signs, because an invariant of each single direction need

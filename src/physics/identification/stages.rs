@@ -426,8 +426,8 @@ fn fit_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) 
     problem.course.substeps = 1;
     problem.project_starts(&x, &mut segments);
     choose_steps(problem, &x, &segments);
-    let followed = problem.all(&x, &segments);
-    let mut kept = followed.iter().map(Option::is_some);
+    let integrated = problem.all(&x, &segments);
+    let mut kept = integrated.iter().map(Option::is_some);
     segments.retain(|_| kept.next().unwrap_or(false));
     if segments.is_empty() {
         return None;

@@ -181,7 +181,7 @@ pub(super) const FIRST_SEGMENT: f64 = 2.5;
 pub(super) const USUAL_FIRST_SAMPLES: f64 = 20.0;
 /// Largest number of samples in a first segment.
 pub(super) const MOST_FIRST_SAMPLES: f64 = 400.0;
-/// Largest number of samples that are followed.
+/// Largest number of samples that are fitted.
 pub(super) const MOST_SAMPLES: usize = 60_000;
 /// Number of consecutive segments that are kept or left out together, so that they can be joined four times.
 pub(super) const SEGMENTS_OF_RUN: usize = 16;
@@ -225,9 +225,9 @@ pub(super) const CONTINUED_STARTS: usize = 5;
 pub(super) const EQUAL_STARTS: f64 = 1e-4;
 /// Largest mean square at which a motion is continued: residuals of twice the noise.
 pub(super) const MOST_CONTINUED_SQUARE: f64 = 4.0;
-/// Segments that an initial state must follow before the constants are fitted too.
+/// Number of segments to which the constants are fitted first.
 pub(super) const SEGMENTS_BEFORE_CONSTANTS: usize = 4;
-/// Segments that a motion must follow so that no other initial state is tried.
+/// Number of segments that the model must fit so that no other initial state is tried.
 pub(super) const ENOUGH_SEGMENTS: usize = 16;
 
 // ---- Limits of work (no verdict on a recording within them depends on them) ----
@@ -283,7 +283,7 @@ pub(super) const FIRST_DAMPING: f64 = 1e-4;
 pub(super) const LEAST_DAMPING: f64 = 1e-10;
 /// Damping beyond which no step improves the fit.
 pub(super) const MOST_DAMPING: f64 = 1e8;
-/// Sum of squares per residual that is assumed for a segment that cannot be followed: larger than any that can be.
+/// Sum of squares per residual that is assumed for a segment that cannot be integrated: larger than that of any other.
 pub(super) const FAILED_SQUARE: f64 = 1e8;
 /// The same for an equation of smoothed motion that is not finite.
 pub(super) const FAILED_EQUATION: f64 = 1e6;

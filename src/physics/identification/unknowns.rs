@@ -258,12 +258,12 @@ fn base_parameters(determined: &Determined, names: &Names<'_>, x: &[f64]) -> Vec
         }
         done.push((k, row));
     }
-    let kept = (0..m).filter(|k| done.iter().all(|(gone, _)| gone != k));
+    let kept = (0..m).filter(|k| done.iter().all(|(removed, _)| removed != k));
     let sum = |k: usize| {
         let mut factors = vec![0.0; m];
         factors[k] = 1.0;
-        for (gone, row) in done.iter().filter(|(gone, row)| size(row, k) > SUM_ROUNDING * size(row, *gone)) {
-            factors[*gone] = -row[k];
+        for (removed, row) in done.iter().filter(|(removed, row)| size(row, k) > SUM_ROUNDING * size(row, *removed)) {
+            factors[*removed] = -row[k];
         }
         let mut found = names.combination(determined, &Invariant { kind: Kind::Sum, factors }, x);
         // Its unknown comes first.
