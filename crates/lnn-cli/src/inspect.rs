@@ -89,9 +89,8 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let Some(file) = &args.states else { return structure(args, &source) };
     let format = args.format.unwrap_or(Format::Json);
-    let more = args.inverse || args.linearize || args.least_norm || args.canonical.is_some();
-    if source.model.is_timed() && (more || args.constraints.is_some()) {
-        return Err(CliError::usage("the system depends on the time: only the terms of its states can be printed"));
+    if source.model.is_timed() && (args.linearize || args.canonical.is_some()) {
+        return Err(CliError::usage("--linearize and --canonical need a system that does not depend on the time"));
     }
     if args.inverse {
         return inverse(file, format, &source, &args.drives);

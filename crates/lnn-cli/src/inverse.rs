@@ -23,8 +23,9 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drive
     let refused = |e: &dyn std::fmt::Display| CliError::file(path, e);
     let bytes = input::read(path, MAX_STATES_BYTES)?;
     let header = column_names(&bytes).map_err(|e| refused(&e))?;
-    // The time of a row is passed on, unless t is a coordinate.
-    let timed = format == Format::Csv && !columns.iter().any(|name| name == "t") && header.iter().any(|c| c == "t");
+    // The time of a row is printed with its forces, unless t is a coordinate; a system may depend on it.
+    let has_time = !columns.iter().any(|name| name == "t") && header.iter().any(|c| c == "t");
+    let timed = source.model.is_timed() || (format == Format::Csv && has_time);
     if timed {
         columns.push("t".to_string());
     }
@@ -44,13 +45,13 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drive
         let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
         let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
         let (forces, failed) =
-            inverse_dynamics_by_rows(source.model.as_ref(), &drives, [&q, &v, &a]).map_err(|e| match e {
+            inverse_dynamics_by_rows(source.model.as_ref(), &drives, [&q, &v, &a], &times).map_err(|e| match e {
                 MechanicsError::Drives { .. } => CliError::usage(format_args!("--{e}")),
                 e => refused(&e),
             })?;
         let parts = match format {
             Format::Csv => None,
-            _ => Some(force_parts_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| refused(&e))?.0),
+            _ => Some(force_parts_by_rows(source.model.as_ref(), [&q, &v, &a], &times).map_err(|e| refused(&e))?.0),
         };
         let mut failed = failed.into_iter().peekable();
         let mut text = String::new();

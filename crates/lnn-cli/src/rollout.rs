@@ -236,7 +236,7 @@ fn integrate(
     model: &dyn EulerLagrange<f64>,
     force: Option<&KnownForce>,
     (q, v): (&[f64], &[f64]),
-    options: &Options<f64>,
+    options: &RolloutOptions<f64>,
     samples: &mut Samples<'_>,
 ) -> Result<Ending<f64>, CliError> {
     let (stop, mut failed) = (interrupt::flag()?, None);
