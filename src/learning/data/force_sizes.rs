@@ -2,7 +2,7 @@
 
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::network::Sizes;
-use crate::recording::INERTIAL;
+use crate::recording::INERTIAL_SHARE;
 use crate::scalar::Scalar;
 
 /// Share of the spread of a force that is added to its error besides noise: no model is more accurate than that.
@@ -28,7 +28,7 @@ fn inertias<S: Scalar>(data: &Dataset<S>) -> Vec<f64> {
     let n = data.coordinates();
     let one = |(i, spread): (usize, f64)| {
         let acceleration = moments(data.a(), n, i)[1];
-        if acceleration > 0.0 && spread > 0.0 { INERTIAL * spread / acceleration } else { 1.0 }
+        if acceleration > 0.0 && spread > 0.0 { INERTIAL_SHARE * spread / acceleration } else { 1.0 }
     };
     force_spreads(data).into_iter().enumerate().map(one).collect()
 }

@@ -1,12 +1,10 @@
 //! Times of a trajectory's samples: the usual step, gaps, windows around a sample.
 
+use super::thresholds::{
+    BRIDGED_STEPS, EVEN_ROUNDINGS, EXAMINED_STEPS, GAP_DEVIATIONS, GAP_QUANTILE, GAP_STEPS, TYPICAL_SPAN,
+};
 use crate::recording::statistics::{median, quantile, robust_deviation};
 use std::ops::Range;
-
-/// Steps that are examined of one trajectory for their quantiles.
-const MOST: usize = 1 << 17;
-/// Gaps of more usual steps than this cut a trajectory; half a step is for rounding and jitter.
-const REACH: f64 = 10.5;
 
 /// Steps of increasing times, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,15 +26,15 @@ impl Clock {
     /// standard deviations, and than one and a half times the 90 % quantile.
     pub fn of(times: &[f64]) -> Self {
         let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
-        let stride = (times.len() / MOST).max(1);
+        let stride = (times.len() / EXAMINED_STEPS).max(1);
         let mut some: Vec<f64> = steps().step_by(stride).collect();
-        let most = quantile(&mut some, 0.9);
+        let most = quantile(&mut some, GAP_QUANTILE);
         let middle = median(&mut some);
         for step in &mut some {
             *step -= middle;
         }
         let robust = robust_deviation(&mut some);
-        let longest = (middle + (0.5 * middle).max(6.0 * robust)).max(1.5 * most);
+        let longest = (middle + ((GAP_STEPS - 1.0) * middle).max(GAP_DEVIATIONS * robust)).max(GAP_STEPS * most);
         if is_even(times) {
             return Self { step: middle, spread: robust, longest, even: true };
         }
@@ -62,13 +60,14 @@ impl Clock {
 
     /// `true` if a trajectory continues across a gap of this length.
     pub fn reaches_across(&self, seconds: f64) -> bool {
-        seconds <= (REACH * self.step).max(self.longest)
+        seconds <= (BRIDGED_STEPS * self.step).max(self.longest)
     }
 
     /// `true` if the steps of these times are all the usual one.
     pub fn is_even_over(&self, times: &[f64]) -> bool {
         let seconds = times.len().saturating_sub(1) as f64 * self.step;
-        let usual = || times.last().zip(times.first()).is_some_and(|(b, a)| (b - a - seconds).abs() < 1e-6 * self.step);
+        let usual =
+            || times.last().zip(times.first()).is_some_and(|(b, a)| (b - a - seconds).abs() < TYPICAL_SPAN * self.step);
         self.even || (usual() && is_even(times))
     }
 
@@ -119,7 +118,7 @@ impl Clock {
 fn is_even(times: &[f64]) -> bool {
     let [first, .., last] = times else { return true };
     let step = (last - first) / (times.len() - 1) as f64;
-    let tolerance = 8.0 * f64::EPSILON * first.abs().max(last.abs());
+    let tolerance = EVEN_ROUNDINGS * f64::EPSILON * first.abs().max(last.abs());
     times.iter().enumerate().all(|(k, t)| (t - (first + k as f64 * step)).abs() <= tolerance)
 }
 

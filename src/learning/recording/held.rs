@@ -3,27 +3,11 @@
 //! A driver that misses a new reading repeats the previous one, digit by digit. Such a reading is late by a step, an error of the motion's
 //! velocity times the step, which no average takes out. It is taken for missing and filled in from the readings around it.
 
+use super::thresholds::{
+    EXAMINED_MARKS, FINE_STEPS, FRESH_NEIGHBOURS, LEAST_MARKED_CHANGES, MANY_REPETITIONS, MOST_REPETITIONS,
+    MOVING_STEPS, RESTING_CHANGE, RESTING_REPETITIONS, WHOLE_MARKS, WHOLE_SHARE,
+};
 use super::{Recording, quantile};
-
-/// Repetitions in a row at and above which a motion may rest, and at most.
-const MANY: usize = 4;
-const MOST_HELD: usize = 12;
-/// Change after many repetitions, over that of a continuing motion, below which the motion rests.
-const GOES_ON: f64 = 0.5;
-/// Change of a reading, in units of the smallest change of its sensor, at and above which a reading in between cannot repeat.
-const MOVING: f64 = 3.0;
-/// Typical change, in units of the smallest one, at and above which readings hardly ever repeat by chance, and the share of repetitions
-/// that is too large for chance.
-const FINE: f64 = 20.0;
-const OFTEN: f64 = 0.01;
-/// Largest change that is examined, in marks; its largest distance from a whole number; smallest number of such changes; and share of whole
-/// ones: the others are readings that were filled in.
-const FEW_MARKS: f64 = 8.0;
-const WHOLE: f64 = 0.05;
-const ENOUGH: usize = 20;
-const MOSTLY: f64 = 0.7;
-/// Fresh readings on either side that a polynomial goes through.
-const AROUND: usize = 2;
 
 /// A recording without held readings.
 pub(crate) struct Filled {
@@ -88,9 +72,9 @@ impl Scale {
             values().zip(values().skip(1)).map(|(a, b)| (b - a).abs())
         });
         let (repeated, mut changes): (Vec<f64>, Vec<f64>) = changes.partition(|change| *change == 0.0);
-        let often = repeated.len() as f64 > OFTEN * changes.len() as f64;
+        let often = repeated.len() as f64 > MANY_REPETITIONS * changes.len() as f64;
         let smallest = changes.iter().copied().fold(f64::INFINITY, f64::min);
-        Self { smallest, holds: often && quantile(&mut changes, 0.5) > FINE * smallest }
+        Self { smallest, holds: often && quantile(&mut changes, 0.5) > FINE_STEPS * smallest }
     }
 
     /// `false` for held readings.
@@ -99,20 +83,20 @@ impl Scale {
         if times.windows(2).any(|pair| pair[1] <= pair[0]) {
             return fresh;
         }
-        let least = MOVING * self.smallest;
+        let least = MOVING_STEPS * self.smallest;
         let mut last = 0;
         for next in (1..values.len()).filter(|&k| values[k] != values[k - 1]) {
             // `last` begins the run that ends before `next`.
             let (first, held) = (last, next - last - 1);
             last = next;
-            if held == 0 || held > MOST_HELD || first == 0 {
+            if held == 0 || held > MOST_REPETITIONS || first == 0 {
                 continue;
             }
             let (before, after) = (values[first] - values[first - 1], values[next] - values[first]);
             let steps = (held + 1) as f64;
             let goes_on = before * after > 0.0 && before.abs() >= least && after.abs() >= least * steps;
-            let rests = held >= MANY && after.abs() < GOES_ON * steps * before.abs();
-            if goes_on && !rests || self.holds && held < MANY {
+            let rests = held >= RESTING_REPETITIONS && after.abs() < RESTING_CHANGE * steps * before.abs();
+            if goes_on && !rests || self.holds && held < RESTING_REPETITIONS {
                 fresh[first + 1..next].fill(false);
             }
         }
@@ -128,15 +112,15 @@ pub(crate) fn marks(recording: &Recording, i: usize) -> Option<f64> {
         let values = || track.q.iter().skip(i).step_by(n);
         values().zip(values().skip(1)).map(|(a, b)| ((b - a) / smallest).abs())
     });
-    let small: Vec<f64> = changes.filter(|marks| *marks > 0.5 && *marks < FEW_MARKS).collect();
-    let whole = small.iter().filter(|marks| (*marks - marks.round()).abs() < WHOLE).count();
-    (small.len() >= ENOUGH && whole as f64 > MOSTLY * small.len() as f64).then_some(smallest)
+    let small: Vec<f64> = changes.filter(|marks| *marks > 0.5 && *marks < EXAMINED_MARKS).collect();
+    let whole = small.iter().filter(|marks| (*marks - marks.round()).abs() < WHOLE_MARKS).count();
+    (small.len() >= LEAST_MARKED_CHANGES && whole as f64 > WHOLE_SHARE * small.len() as f64).then_some(smallest)
 }
 
 /// Value at a held reading of the polynomial through the fresh ones around it.
 fn between(times: &[f64], values: &[f64], fresh: &[bool], sample: usize) -> f64 {
-    let before = (0..sample).rev().filter(|&k| fresh[k]).take(AROUND);
-    let after = (sample + 1..values.len()).filter(|&k| fresh[k]).take(AROUND);
+    let before = (0..sample).rev().filter(|&k| fresh[k]).take(FRESH_NEIGHBOURS);
+    let after = (sample + 1..values.len()).filter(|&k| fresh[k]).take(FRESH_NEIGHBOURS);
     let around: Vec<usize> = before.chain(after).collect();
     let weight = |k: usize| {
         let others = around.iter().filter(|&&other| other != k);

@@ -27,6 +27,7 @@ mod reading;
 pub(crate) mod smooth;
 mod statistics;
 pub(crate) mod survey;
+mod thresholds;
 mod track;
 mod units;
 
@@ -38,9 +39,9 @@ pub(crate) use hold_out::HeldOut;
 pub use hold_out::HoldOutError;
 pub use read::{DataError, Problem, read_recording};
 pub use reading::{Bridged, Cut, Dropped, LoadedRecording, Rows, Targets};
-pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};
+pub(crate) use thresholds::{INERTIAL_SHARE, LARGE_ACCELERATION_ERROR};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub use units::factor;
 

@@ -1,5 +1,6 @@
 //! The files and rows that recorded samples come from, and the rows that were left out.
 
+use super::thresholds::{INERTIAL_SHARE, LARGE_ACCELERATION_ERROR};
 use crate::recording::read::FileFacts;
 use crate::recording::smooth::{Chosen, Smoothing, noise};
 use crate::recording::statistics::deviation;
@@ -153,12 +154,6 @@ impl From<Recording> for LoadedRecording {
     }
 }
 
-/// Relative error of accelerations by smoothing above which a fit should learn from the motion itself.
-pub const LARGE_ERROR: f64 = 0.1;
-
-/// Share of the spread of a known force that is assumed to accelerate when the size of an inertia is sought.
-pub(crate) const INERTIAL: f64 = 0.5;
-
 /// Quantity that a network learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -181,13 +176,13 @@ impl Targets {
     }
 
     /// The way that suits the data: measured accelerations if there are any; known forces if they are noisier than the accelerations;
-    /// smoothed accelerations if they are accurate to `LARGE_ERROR`; otherwise the motion itself.
+    /// smoothed accelerations if they are accurate to `LARGE_ACCELERATION_ERROR`; otherwise the motion itself.
     pub(crate) fn advised(recording: &Recording, smoothing: &Smoothing) -> Self {
         if recording.has_accelerations() {
             Self::Measured
         } else if recording.is_driven() && forces_are_noisier(recording, smoothing) {
             Self::Forces
-        } else if smoothing.acceleration_error() <= LARGE_ERROR {
+        } else if smoothing.acceleration_error() <= LARGE_ACCELERATION_ERROR {
             Self::Smoothed
         } else {
             Self::Motion
@@ -202,7 +197,7 @@ fn forces_are_noisier(recording: &Recording, smoothing: &Smoothing) -> bool {
     let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
     let noisier = |(i, chosen): (usize, &Chosen)| {
         let spread = deviation(recording.tracks.iter().flat_map(|track| track.force.iter().skip(i).step_by(n)));
-        noise(tracks(), n, i).sigma > INERTIAL * chosen.quality.relative() * spread
+        noise(tracks(), n, i).sigma > INERTIAL_SHARE * chosen.quality.relative() * spread
     };
     smoothing.coordinates.iter().enumerate().any(noisier)
 }

@@ -1,12 +1,8 @@
 //! Which coordinates are angles, and in which unit.
 
 use super::names::{in_degrees, is_angle};
+use super::thresholds::{MOST_TURNS_IN_RADIANS, SAMPLES_PER_JUMP, TURN_TOLERANCE, WRAPPED_RANGE};
 use std::f64::consts::TAU;
-
-/// Largest deviation of a jump from a full turn, as a share of it: the motion of one step.
-const NEAR: f64 = 0.25;
-/// Share of a turn by which noise may take the range beyond it.
-const BEYOND: f64 = 1.05;
 
 /// An angle.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,12 +24,12 @@ impl Angle {
 pub fn angle(name: &str, values: &[f64], restarts: &[usize]) -> Option<Angle> {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let steps = || (1..values.len()).filter(|k| !restarts.contains(k)).map(|k| (values[k] - values[k - 1]).abs());
-    let jumps = |turn: f64| match high - low <= BEYOND * turn && high - low > (1.0 - NEAR) * turn {
-        true => steps().filter(|step| (step / turn - 1.0).abs() < NEAR).count(),
+    let jumps = |turn: f64| match high - low <= WRAPPED_RANGE * turn && high - low > (1.0 - TURN_TOLERANCE) * turn {
+        true => steps().filter(|step| (step / turn - 1.0).abs() < TURN_TOLERANCE).count(),
         false => 0,
     };
     // A few long steps among many short ones.
-    let few = |count: usize| count > 0 && count * 4 <= values.len();
+    let few = |count: usize| count > 0 && count * SAMPLES_PER_JUMP <= values.len();
     if few(jumps(TAU)) {
         return Some(Angle::radians("it jumps by a full turn"));
     }
@@ -47,7 +43,7 @@ pub fn angle(name: &str, values: &[f64], restarts: &[usize]) -> Option<Angle> {
         return None;
     }
     // Beyond a turn to either side, and within one in degrees.
-    let degrees = low.abs().max(high.abs()) > 2.0 * TAU && low >= -360.0 && high <= 360.0;
+    let degrees = low.abs().max(high.abs()) > MOST_TURNS_IN_RADIANS * TAU && low >= -360.0 && high <= 360.0;
     let because = if degrees {
         format!("its name; in degrees, because it reaches {:.0}", low.abs().max(high.abs()))
     } else {

@@ -5,6 +5,7 @@
 mod angles;
 mod names;
 mod roles;
+mod thresholds;
 mod time;
 
 use crate::recording::read::RawTable;

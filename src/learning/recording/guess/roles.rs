@@ -2,6 +2,11 @@
 
 use super::angles::{Angle, angle};
 use super::names::{is_acceleration, is_force, is_index, is_position, is_torque, is_trajectory, is_velocity};
+use super::thresholds::{
+    COMPARED_SAMPLES, COPY_ROUNDING, DIFFERENCE_REACHES, EQUAL_CORRELATION, FIXED_OF_DISTANCE, FIXED_RANGE,
+    FURTHER_CORRELATION, FURTHER_DIFFERENCE, MUTUAL_DIFFERENCE, NAMED_CORRELATION, ROWS_PER_LABEL, UNNAMED_CORRELATION,
+    UNNAMED_DIFFERENCE,
+};
 use super::time::{self, Time, counts};
 use super::{ColumnGuess, Guess};
 use crate::lagrangian::NamedFormula;
@@ -9,26 +14,6 @@ use crate::recording::columns::{TIME, formula_in};
 use crate::recording::read::{RawTable, read_recording};
 use crate::recording::{Columns, DataError, Problem};
 use std::path::Path;
-
-/// Samples at which derivatives are compared.
-const SAMPLES: usize = 4000;
-/// Rows between the samples of a difference; of noisy positions longer ones show more.
-const REACHES: [usize; 5] = [1, 2, 4, 8, 16];
-/// Difference of correlations that is negligible.
-const EQUAL: f64 = 1e-3;
-/// Smallest correlation with the derivative of a position, for a column whose name says velocity and for any other.
-const NAMED: f64 = 0.8;
-const UNNAMED: f64 = 0.995;
-/// Largest relative difference from that derivative, for a column whose name says nothing.
-const LIKE: f64 = 0.03;
-
-/// Largest range of a fixed point, over the widest range of a coordinate and over its own distance from 0.
-const FIXED: f64 = 0.03;
-const OF_DISTANCE: f64 = 0.05;
-
-/// The same limits once another velocity was found.
-const BESIDE: f64 = 0.9;
-const BESIDE_LIKE: f64 = 0.2;
 
 /// The role of a column.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,7 +158,7 @@ impl Roles<'_> {
         let mut distinct: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
         distinct.sort_unstable();
         distinct.dedup();
-        distinct.len() > 1 && distinct.len() * 16 <= values.len() && values.iter().all(|x| x.fract() == 0.0)
+        distinct.len() > 1 && distinct.len() * ROWS_PER_LABEL <= values.len() && values.iter().all(|x| x.fract() == 0.0)
     }
 
     /// `true` if the rows of every trajectory that a column distinguishes are in the order of time.
@@ -204,9 +189,13 @@ impl Roles<'_> {
     /// Finds velocities and accelerations among the remaining columns.
     fn find_derivatives(&mut self) {
         // Once one velocity was found, the others are probably present, possibly with more noise.
-        for (order, [least, like]) in [(2, [UNNAMED, LIKE]), (1, [UNNAMED, LIKE]), (1, [BESIDE, BESIDE_LIKE])] {
+        for (order, [least, like]) in [
+            (2, [UNNAMED_CORRELATION, UNNAMED_DIFFERENCE]),
+            (1, [UNNAMED_CORRELATION, UNNAMED_DIFFERENCE]),
+            (1, [FURTHER_CORRELATION, FURTHER_DIFFERENCE]),
+        ] {
             let found = |(role, _): &(Role, String)| matches!(role, Role::Derivative(1, _));
-            if least == BESIDE && !self.roles.iter().flatten().any(found) {
+            if least == FURTHER_CORRELATION && !self.roles.iter().flatten().any(found) {
                 continue;
             }
             let says = if order == 1 { is_velocity } else { is_acceleration };
@@ -223,11 +212,11 @@ impl Roles<'_> {
                 });
                 let of = |j: usize| {
                     let (correlation, factor) = self.derivative(j, k, order)?;
-                    let back = self
-                        .derivative(k, j, 1)
-                        .is_some_and(|(c, f)| c.abs() > UNNAMED && (f.abs() - 1.0).abs() < 3.0 * LIKE);
+                    let back = self.derivative(k, j, 1).is_some_and(|(c, f)| {
+                        c.abs() > UNNAMED_CORRELATION && (f.abs() - 1.0).abs() < MUTUAL_DIFFERENCE * UNNAMED_DIFFERENCE
+                    });
                     let alike = correlation > least && (factor - 1.0).abs() < like && !back;
-                    ((named && correlation > NAMED) || alike).then_some((j, correlation))
+                    ((named && correlation > NAMED_CORRELATION) || alike).then_some((j, correlation))
                 };
                 // On a circle each coordinate is nearly the derivative of the other, so matching names decide.
                 let together =
@@ -261,7 +250,7 @@ impl Roles<'_> {
             .map_or(1.0, |unit| crate::recording::factor(unit).unwrap_or(1.0));
         let step = 1.0 / self.given.rate.unwrap_or(1.0);
         let time = |row: usize| times.map_or(row as f64 * step, |times| times[row] * scale);
-        let stride = (x.len() / SAMPLES).max(1);
+        let stride = (x.len() / COMPARED_SAMPLES).max(1);
         let compared = |reach: usize| {
             let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
             for at in (reach..x.len().saturating_sub(reach)).step_by(stride) {
@@ -275,10 +264,10 @@ impl Roles<'_> {
             }
             (xx > 0.0 && yy > 0.0).then(|| (xy / (xx * yy).sqrt(), xy / xx))
         };
-        let found: Vec<(f64, f64)> = REACHES.iter().filter_map(|&reach| compared(reach)).collect();
+        let found: Vec<(f64, f64)> = DIFFERENCE_REACHES.iter().filter_map(|&reach| compared(reach)).collect();
         let most = found.iter().map(|(correlation, _)| *correlation).fold(f64::NEG_INFINITY, f64::max);
         // Among equally good differences, the shortest, which is closest to the derivative.
-        found.into_iter().find(|(correlation, _)| *correlation >= most - EQUAL)
+        found.into_iter().find(|(correlation, _)| *correlation >= most - EQUAL_CORRELATION)
     }
 
     /// Takes the remaining columns as coordinates; if velocities were measured, only columns named as positions.
@@ -338,8 +327,8 @@ impl Roles<'_> {
                 (0..self.roles.len()).any(|j| matches!(&self.roles[j], Some((Role::Derivative(_, of), _)) if of == k));
             !measured
                 && !is_position(&self.table.names[*k])
-                && spread < FIXED * extent(widest).0
-                && spread < OF_DISTANCE * distance
+                && spread < FIXED_RANGE * extent(widest).0
+                && spread < FIXED_OF_DISTANCE * distance
         };
         let fixed: Vec<usize> = coordinates.into_iter().filter(fixed).collect();
         for k in fixed {
@@ -446,5 +435,5 @@ fn copies(values: &[f64], other: &[f64]) -> bool {
     let factor = (values[high] - values[low]) / spread;
     let size = (values[high] - values[low]).abs();
     let off = |k: usize| (values[k] - values[low] - factor * (other[k] - other[low])).abs();
-    size > 0.0 && (0..values.len()).all(|k| off(k) <= 1e-6 * size)
+    size > 0.0 && (0..values.len()).all(|k| off(k) <= COPY_ROUNDING * size)
 }

@@ -1,13 +1,9 @@
 //! Which column is the time, and where it restarts.
 
 use super::names::{is_index, is_time, unit_of_time};
+use super::thresholds::{EVEN_STEP, ROWS_PER_RESTART, STEPS_PER_UNEVEN_ONE, SUSPICIOUS_STEP};
 use crate::names::number;
 use crate::recording::statistics::median;
-
-/// Smallest average number of rows between two restarts of a time.
-const RUN: usize = 16;
-/// Largest relative deviation from the median step, for nine steps of ten, of a time that is not recognised by its name.
-const EVEN: f64 = 0.5;
 
 /// A column that can be the time.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +23,8 @@ pub fn restarts(values: &[f64]) -> Option<Vec<usize>> {
     let falls: Vec<usize> = (1..values.len()).filter(|&k| values[k] < values[k - 1]).collect();
     let still = values.windows(2).filter(|pair| pair[0] == pair[1]).count();
     // Repeated rows are left out on reading.
-    (values.len() > 1 && falls.len() * RUN <= values.len() && still * RUN <= values.len()).then_some(falls)
+    (values.len() > 1 && falls.len() * ROWS_PER_RESTART <= values.len() && still * ROWS_PER_RESTART <= values.len())
+        .then_some(falls)
 }
 
 /// `true` for 0, 1, 2, .. or 1, 2, 3, .., possibly with restarts.
@@ -40,8 +37,8 @@ pub fn counts(values: &[f64]) -> bool {
 fn even(values: &[f64]) -> bool {
     let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     let middle = median(&mut steps);
-    let far = steps.iter().filter(|step| (**step - middle).abs() > EVEN * middle).count();
-    far * 10 <= steps.len()
+    let far = steps.iter().filter(|step| (**step - middle).abs() > EVEN_STEP * middle).count();
+    far * STEPS_PER_UNEVEN_ONE <= steps.len()
 }
 
 /// The time among columns: by its name, or as the only one that increases by nearly equal steps and does not count rows.
@@ -80,7 +77,7 @@ fn unit(name: &str, values: &[f64]) -> (Option<&'static str>, String) {
             let mut steps: Vec<f64> =
                 values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
             let step = median(&mut steps);
-            let coarse = step >= 5.0 && values.iter().all(|x| x.fract() == 0.0);
+            let coarse = step >= SUSPICIOUS_STEP && values.iter().all(|x| x.fract() == 0.0);
             let hint = format!("steps of {} s: if they are milliseconds, add --units {name}=ms", number(step));
             (None, if coarse { hint } else { String::new() })
         }

@@ -2,19 +2,16 @@
 
 use super::Problem;
 use super::shared::Shared;
+use super::thresholds::{MOST_EXPANSION, UNPACKED_ANYWAY};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
 /// First bytes of an archive, and of one without a single entry.
 pub const MAGIC: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
-/// Largest ratio of unpacked to packed bytes of the used arrays, and bytes that are allowed in any case. Measured numbers shrink to a tenth
-/// at most; data that shrinks to a hundredth contains hardly any number.
-const EXPANSION: u64 = 100;
-const ANYWAY: u64 = 1 << 26;
 
 /// Largest number of bytes that `packed` bytes may unpack to.
 pub fn most_unpacked(packed: u64) -> u64 {
-    ANYWAY.max(packed.saturating_mul(EXPANSION))
+    UNPACKED_ANYWAY.max(packed.saturating_mul(MOST_EXPANSION))
 }
 
 /// An archive that cannot be read.
@@ -46,7 +43,7 @@ pub fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = 
     }
     if size > most_unpacked(compressed) {
         return Err(Problem::Array(format!(
-            "the archive promises {size} bytes from {compressed}, more than {EXPANSION} times as many: save it \
+            "the archive promises {size} bytes from {compressed}, more than {MOST_EXPANSION} times as many: save it \
              without compression"
         )));
     }

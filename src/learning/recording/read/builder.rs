@@ -2,13 +2,11 @@
 
 use super::Problem;
 use super::select::Selection;
+use super::thresholds::MOST_TRAJECTORIES;
 use crate::recording::reading::Rows;
 use crate::recording::{Columns, RecordedTrajectory};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
-
-/// Most trajectories of one file.
-const MOST: usize = 100_000;
 
 /// A trajectory while its rows come in.
 pub struct TrackBuilder {
@@ -186,9 +184,9 @@ impl<'a> Builder<'a> {
             self.current = *known;
             return Ok(());
         }
-        if self.tracks.len() == MOST {
+        if self.tracks.len() == MOST_TRAJECTORIES {
             let column = self.columns.trajectory.clone().unwrap_or_default();
-            return Err(Problem::Trajectories { row, column, most: MOST });
+            return Err(Problem::Trajectories { row, column, most: MOST_TRAJECTORIES });
         }
         self.current = self.tracks.len();
         if let Some(label) = label {

@@ -7,12 +7,10 @@ use super::error::Faults;
 use super::number::Numbers;
 use super::select::Selection;
 use super::text::{Separator, comment, line_end, names_in, split, unquoted, with_point};
+use super::thresholds::LONGEST_LINE;
 use super::wide::Lane;
 use crate::recording::Columns;
 use std::io::{BufRead, Read};
-
-/// Longest line in bytes.
-const LONGEST: u64 = 1 << 20;
 
 /// The trajectories of a text while its lines are read, and the recognised format.
 pub struct Text<'a> {
@@ -50,12 +48,12 @@ pub fn read<'a>(
     let end = line_end(input.fill_buf()?);
     loop {
         line.clear();
-        if input.by_ref().take(LONGEST).read_until(end, &mut line)? == 0 {
+        if input.by_ref().take(LONGEST_LINE).read_until(end, &mut line)? == 0 {
             break;
         }
         row += 1;
-        if line.len() as u64 == LONGEST {
-            return Err(Problem::LongLine { row, limit: LONGEST });
+        if line.len() as u64 == LONGEST_LINE {
+            return Err(Problem::LongLine { row, limit: LONGEST_LINE });
         }
         let mut whole = line.as_slice();
         if row == 1 {

@@ -1,5 +1,6 @@
 //! Mistakes in files of recorded motion.
 
+use super::thresholds::{LISTED_COLUMNS, LISTED_PROBLEMS};
 use crate::names::{one_line, pluralize};
 use crate::recording::ColumnsError;
 use crate::storage::ReadError;
@@ -242,12 +243,9 @@ pub(super) struct Faults {
 }
 
 impl Faults {
-    /// Largest number of problems that are reported for one file.
-    const SHOWN: usize = 5;
-
     /// Notes a problem.
     pub(super) fn add(&mut self, problem: Problem) {
-        if self.first.len() < Self::SHOWN { self.first.push(problem) } else { self.more += 1 }
+        if self.first.len() < LISTED_PROBLEMS { self.first.push(problem) } else { self.more += 1 }
     }
 
     /// `true` if there are none.
@@ -281,11 +279,10 @@ fn joined(first: &[Problem], more: usize) -> String {
 
 /// The first few names of columns, such as ` (there are s, x, y)`; nothing if there are none.
 fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 8;
-    let first = names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    let first = names.iter().take(LISTED_COLUMNS).cloned().collect::<Vec<_>>().join(", ");
     match names.len() {
         0 => String::new(),
-        more if more > SHOWN => format!(" (there are {first} and {} more)", more - SHOWN),
+        more if more > LISTED_COLUMNS => format!(" (there are {first} and {} more)", more - LISTED_COLUMNS),
         _ => format!(" (there are {first})"),
     }
 }

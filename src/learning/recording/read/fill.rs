@@ -4,10 +4,8 @@ use super::Problem;
 use super::builder::Builder;
 use super::element::Element;
 use super::error::Faults;
+use super::thresholds::ROWS_AT_ONCE;
 use std::io::Read;
-
-/// Rows read at a time.
-const ROWS: usize = 1024;
 
 /// Elements that come row by row.
 pub struct Source<'a> {
@@ -36,7 +34,7 @@ pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>
     let mut values = vec![0.0; all];
     let (mut done, mut faults) = (0, Faults::default());
     while done < rows {
-        let now = ROWS.min(rows - done);
+        let now = ROWS_AT_ONCE.min(rows - done);
         for (source, buffer) in sources.iter_mut().zip(&mut buffers) {
             buffer.resize(now * source.width * source.element.size(), 0);
             source.input.read_exact(buffer).map_err(|error| source.broken(error))?;

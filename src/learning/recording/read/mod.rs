@@ -19,6 +19,7 @@ mod select;
 mod shared;
 mod table;
 mod text;
+mod thresholds;
 mod wide;
 mod workbook;
 mod xml;
@@ -26,10 +27,11 @@ mod xml;
 pub use encoding::Encoding;
 pub use error::{DataError, Problem};
 pub use facts::{FileFacts, FileKind};
-pub(crate) use pieces::LEAST;
 pub use table::RawTable;
 pub use text::Separator;
 pub use text::{comment, line_end, names_in, split};
+use thresholds::LARGEST_FILE;
+pub(crate) use thresholds::LEAST_SAMPLES;
 
 use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, Recording};
@@ -41,9 +43,6 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
-
-/// Largest file in bytes.
-const MAX_BYTES: u64 = 1 << 36;
 
 /// Reads recorded trajectories.
 ///
@@ -85,7 +84,7 @@ pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<
 
 /// Adds the trajectories of one file.
 fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Result<(), Problem> {
-    let (file, size) = open_regular(path, MAX_BYTES)?;
+    let (file, size) = open_regular(path, LARGEST_FILE)?;
     let (facts, builders) = parse(file, size, columns)?;
     let name = path.display().to_string();
     let mut most = None;
@@ -118,7 +117,11 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
     }
     reading.formats.push(FileFacts { file: name, units, ..facts });
     let most = most.ok_or(Problem::NoRows)?;
-    if most < LEAST && !columns.whole { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
+    if most < LEAST_SAMPLES && !columns.whole {
+        Err(Problem::TooFew { least: LEAST_SAMPLES, found: most })
+    } else {
+        Ok(())
+    }
 }
 
 /// Recognises the format and reads the rows.

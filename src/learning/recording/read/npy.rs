@@ -6,14 +6,13 @@ use super::element::Element;
 use super::fill::{Source, fill};
 use super::select::Selection;
 use super::shared::Shared;
+use super::thresholds::LONGEST_HEADER;
 use crate::names::pluralize;
 use crate::recording::Columns;
 use std::io::{BufReader, Read};
 
 /// First bytes of such a file.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
-/// Longest header in bytes; by default NumPy itself accepts no longer one.
-const LONGEST: usize = 10_000;
 
 /// An array before its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,9 +54,9 @@ impl Header {
             }
             other => return Err(Problem::Array(format!("version {other} of NPY, expected 1, 2 or 3"))),
         };
-        if length > LONGEST {
+        if length > LONGEST_HEADER {
             return Err(Problem::Array(format!(
-                "the header of the array has {length} bytes, expected at most {LONGEST}"
+                "the header of the array has {length} bytes, expected at most {LONGEST_HEADER}"
             )));
         }
         let mut text = vec![0; length];

@@ -7,12 +7,10 @@ use super::fill::{Source, fill};
 use super::npy::{self, Header};
 use super::select::{Selection, Used};
 use super::shared::Shared;
+use super::thresholds::MOST_ARRAYS;
 use crate::recording::Columns;
 use std::io::{BufReader, Read};
 use zip::ZipArchive;
-
-/// Most arrays of an archive.
-const MOST: usize = 10_000;
 
 /// Reads vectors of equal length, each a column by its name, or a single table.
 ///
@@ -22,8 +20,8 @@ pub fn read(mut archive: ZipArchive<Shared>, columns: &Columns) -> Result<Vec<Bu
     if archive.is_empty() {
         return Err(Problem::Array("the archive holds no arrays".to_string()));
     }
-    if archive.len() > MOST {
-        return Err(Problem::Array(format!("{} arrays, expected at most {MOST}", archive.len())));
+    if archive.len() > MOST_ARRAYS {
+        return Err(Problem::Array(format!("{} arrays, expected at most {MOST_ARRAYS}", archive.len())));
     }
     if archive.len() == 1 {
         bounded(&mut archive, [0])?;

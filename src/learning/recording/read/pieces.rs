@@ -1,15 +1,11 @@
 //! Trajectories between gaps in time.
 
 use super::builder::{TrackBuilder, empty};
+use super::thresholds::{AMBIGUOUS_TURN, LEAST_SAMPLES};
 use crate::recording::RecordedTrajectory;
 use crate::recording::clock::Clock;
 use crate::recording::reading::{Cut, Dropped, LoadedRecording};
 use std::f64::consts::TAU;
-
-/// Fewest samples of a trajectory.
-pub const LEAST: usize = 16;
-/// Difference in rad of two guesses of the way of an angle across a gap at and above which neither is believed.
-const UNSURE: f64 = 1.5;
 
 /// Adds the stretches of a trajectory between long gaps, except those of few samples; returns the samples of the longest.
 ///
@@ -52,7 +48,7 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
         let (start, end) = (pair[0], pair[1]);
         let (samples, first, last) = (end - start, rows.row(start), rows.row(end.saturating_sub(1)));
         most = most.max(samples);
-        if samples < LEAST && !whole {
+        if samples < LEAST_SAMPLES && !whole {
             reading.dropped.push(Dropped { file: file.to_string(), first, last, samples });
             continue;
         }
@@ -104,7 +100,7 @@ fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize)
             return Some(0.0);
         }
         let way = match (pace(i, k.checked_sub(1)), pace(i, Some(k + 1))) {
-            (Some(a), Some(b)) if (a - b).abs() * gap > UNSURE => return None,
+            (Some(a), Some(b)) if (a - b).abs() * gap > AMBIGUOUS_TURN => return None,
             (Some(a), Some(b)) => 0.5 * (a + b) * gap,
             (a, b) => a.or(b)? * gap,
         };

@@ -1,12 +1,10 @@
 //! All columns of a file, whatever they mean.
 
-use super::{MAX_BYTES, Problem, parse};
+use super::thresholds::{LARGEST_FILE, MOST_SEPARATE_COLUMNS};
+use super::{Problem, parse};
 use crate::recording::{Columns, DataError};
 use crate::storage::open_regular;
 use std::path::Path;
-
-/// Largest number of columns that are read one by one if some contain no numbers.
-const MOST: usize = 256;
 
 /// The columns of a file in its order.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +51,7 @@ impl RawTable {
         let names = if twice { (1..=names.len()).map(|k| k.to_string()).collect() } else { names };
         let numbers: Vec<Result<Vec<f64>, String>> = match rows(path, &asked(&names)) {
             Ok(rows) => columns(&rows, names.len()).into_iter().map(Ok).collect(),
-            Err(problem) if names.len() > MOST => return Err(problem),
+            Err(problem) if names.len() > MOST_SEPARATE_COLUMNS => return Err(problem),
             Err(_) => names
                 .iter()
                 .map(|name| rows(path, &asked(std::slice::from_ref(name))).map_err(|problem| problem.to_string()))
@@ -74,7 +72,7 @@ impl RawTable {
 
 /// The rows of a file, `(rows, columns)`.
 fn rows(path: &Path, columns: &Columns) -> Result<Vec<f64>, Problem> {
-    let (file, size) = open_regular(path, MAX_BYTES)?;
+    let (file, size) = open_regular(path, LARGEST_FILE)?;
     let tracks = parse(file, size, columns)?.1.into_iter().flat_map(|builder| builder.tracks);
     Ok(tracks.flat_map(|track| track.track.q).collect())
 }

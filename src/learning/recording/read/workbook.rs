@@ -3,17 +3,13 @@
 use super::Problem;
 use super::archive::{bounded, broken};
 use super::shared::Shared;
+use super::thresholds::{SHEET_BYTES, SHEET_COLUMNS, SHEET_ROWS};
 use super::xml::{Tag, damaged, next};
 use std::io::BufReader;
 use zip::ZipArchive;
 
 /// The entry that makes an archive a workbook.
 pub const MARK: &str = "xl/workbook.xml";
-/// Most rows and columns of a sheet, which are Excel's own.
-const ROWS: usize = 1 << 20;
-const COLUMNS: usize = 1 << 14;
-/// Largest size in bytes of the text that it is converted to.
-const BYTES: usize = 1 << 28;
 
 /// The cells of the first sheet, separated by tabs, every row on the line of its number.
 pub fn text(mut archive: ZipArchive<Shared>) -> Result<String, Problem> {
@@ -104,14 +100,14 @@ impl Cells {
         match (tag.name.as_str(), tag.start, tag.end) {
             ("row", true, _) => {
                 let row = tag.attribute("r").map_or(Some(self.row + 1), |text| text.parse().ok());
-                let row = row.filter(|row| *row > self.row && *row <= ROWS).ok_or_else(damaged)?;
+                let row = row.filter(|row| *row > self.row && *row <= SHEET_ROWS).ok_or_else(damaged)?;
                 // Missing rows become blank lines.
                 self.lines.extend(std::iter::repeat_n('\n', row - self.row - 1));
                 self.row = row;
             }
             ("c", true, end) => {
                 let place = tag.attribute("r").map_or(Some(self.fields.len()), |text| column(&text));
-                self.column = place.filter(|at| *at < COLUMNS && *at >= self.fields.len()).ok_or_else(damaged)?;
+                self.column = place.filter(|at| *at < SHEET_COLUMNS && *at >= self.fields.len()).ok_or_else(damaged)?;
                 self.kind = tag.attribute("t").unwrap_or_default();
                 if end {
                     self.end_cell()?;
@@ -143,7 +139,7 @@ impl Cells {
             value = format!("\"{}\"", value.chars().map(plain).collect::<String>());
         }
         self.size += value.len();
-        if self.size + self.lines.len() > BYTES {
+        if self.size + self.lines.len() > SHEET_BYTES {
             return Err(Problem::Array("a workbook of more than 256 MB of text: save the sheet as CSV".to_string()));
         }
         self.fields.resize(self.column, String::new());

@@ -1,10 +1,8 @@
 //! The little of XML that a workbook needs: tags, their attributes, and the text before them.
 
 use super::Problem;
+use super::thresholds::LONGEST_TAG;
 use std::io::{BufRead, Read};
-
-/// Longest text or tag in bytes.
-const LONGEST: u64 = 1 << 20;
 
 /// A tag and the text before it.
 #[derive(Debug, Default)]
@@ -41,8 +39,8 @@ impl Tag {
 pub fn next(input: &mut impl BufRead) -> Result<Option<Tag>, Problem> {
     let mut part = |mark: u8| -> Result<Option<String>, Problem> {
         let mut bytes = Vec::new();
-        input.by_ref().take(LONGEST).read_until(mark, &mut bytes)?;
-        let long = bytes.len() as u64 == LONGEST;
+        input.by_ref().take(LONGEST_TAG).read_until(mark, &mut bytes)?;
+        let long = bytes.len() as u64 == LONGEST_TAG;
         match bytes.pop() {
             Some(last) if last == mark => {}
             _ if long => return Err(damaged()),

@@ -5,6 +5,7 @@
 //! derivative of the same polynomial), weighted by the ratio of the noises. The least-squares problem is solved by
 //! orthogonalisation (Gram-Schmidt, twice), with times scaled to `[-1, 1]`.
 
+use super::thresholds::LARGEST_DEGREE;
 use crate::linalg::dot;
 
 /// Weights of one window for one degree `d`, and their change with two more degrees.
@@ -98,7 +99,7 @@ impl LocalFit {
         }
         (self.variance[k], self.change_variance[k]) = (0.0, 0.0);
         // Solved downwards; entries before `k` are 0. `y` replaces the last used triangle column by column.
-        let mut y = [0.0; MOST_DEGREE + 3];
+        let mut y = [0.0; LARGEST_DEGREE + 3];
         for i in k..p {
             let right = if i == k { factor } else { 0.0 };
             let known: f64 = (k..i).map(|j| self.triangle[j * p + i] * y[j]).sum();
@@ -129,9 +130,6 @@ impl LocalFit {
         estimate
     }
 }
-
-/// Largest degree of the polynomials.
-pub const MOST_DEGREE: usize = 10;
 
 #[cfg(test)]
 mod tests {

@@ -4,11 +4,12 @@ mod local_fit;
 mod noise;
 mod pace;
 mod signal;
+mod thresholds;
 mod window;
 
-pub(crate) use local_fit::MOST_DEGREE;
 pub use noise::Noise;
 pub(crate) use noise::{contrast_weights, noise};
+use thresholds::{LARGEST_DEGREE, MOST_GAP_STRETCH, MOST_GAP_VARIANCE, NOISE_RATIOS};
 pub use window::Quality;
 
 use crate::names::pluralize;
@@ -326,14 +327,10 @@ impl Smoothing {
 
 /// Noise of positions over noise of velocities in s, within the range that the time step can resolve.
 fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
-    let ratio = (position.sigma / velocity.sigma).clamp(1e-6 * step, 1e6 * step);
+    let [least, most] = NOISE_RATIOS.map(|steps| steps * step);
+    let ratio = (position.sigma / velocity.sigma).clamp(least, most);
     ratio.is_finite().then_some(ratio)
 }
-
-/// Largest variance of an acceleration near a gap, over that of a full window of equal steps, for the sample to be used for learning.
-const LACKING: f64 = 4.0;
-/// Largest time span of a window near a gap, over its length, for its sample to be used for learning.
-const STRETCHED: f64 = 1.5;
 
 /// Fills column `signal.i` of all arrays by a window of its own around every sample.
 fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoothed: &mut Smoothed) {
@@ -349,8 +346,9 @@ fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoot
         let usual = (full[at] && !clock.even).then(|| signal.even_variance(&mut fits, 0, window));
         let fit = signal.fit(&mut fits, 0, range.clone(), (at, window));
         if let Some(usual) = usual {
-            let stretched = times[range.end - 1] - times[range.start] > STRETCHED * (window - 1) as f64 * clock.step;
-            if stretched || fit.variance[2] > LACKING * usual {
+            let stretched =
+                times[range.end - 1] - times[range.start] > MOST_GAP_STRETCH * (window - 1) as f64 * clock.step;
+            if stretched || fit.variance[2] > MOST_GAP_VARIANCE * usual {
                 smoothed.lacking.push(at);
             }
         }
@@ -392,7 +390,7 @@ impl Smoothed {
 /// Checks options for `n` coordinates.
 fn check(options: &SmoothOptions, n: usize) -> Result<(), SmoothError> {
     let wrong = |what, expected: String, found: String| Err(SmoothError::Option { what, expected, found });
-    let most = MOST_DEGREE - 2;
+    let most = LARGEST_DEGREE - 2;
     if !(2..=most).contains(&options.degree) {
         return wrong("degree", format!("2 to {most}"), options.degree.to_string());
     }

@@ -1,13 +1,11 @@
 //! Noise of a measured signal from the signal alone.
 
+use super::thresholds::{
+    CONTRAST_ORDERS, LEAST_LOCAL_NOISE, LOCAL_CONTRASTS, MOST_CONTRASTS, ORDER_AGREEMENT, OUTLYING_CONTRAST,
+    ROUNDING_NOISE, SAME_NOISE, STILL_FALLING,
+};
 use crate::recording::statistics::{rms, robust_deviation};
 use serde::Serialize;
-
-/// Most contrasts that are examined for one estimate.
-const MOST: usize = 1 << 16;
-
-/// Orders of differences that are tried.
-const ORDERS: [usize; 5] = [2, 4, 6, 8, 10];
 
 /// Estimated measurement noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -30,12 +28,12 @@ pub struct Noise {
 /// the scatter of such estimates. Never below the rounding of the numbers themselves.
 pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, n: usize, i: usize) -> Noise {
     let total: usize = signals.clone().map(|(times, _)| times.len()).sum();
-    let stride = (total / MOST).max(1);
+    let stride = (total / MOST_CONTRASTS).max(1);
     let largest =
         signals.clone().flat_map(|(_, x)| x.iter().skip(i).step_by(n * stride)).fold(0.0, |m: f64, x| m.max(x.abs()));
-    let mut found: Vec<(usize, f64, f64)> = Vec::with_capacity(ORDERS.len());
-    let (mut contrasts, mut weights) = (Vec::new(), [0.0; ORDERS[ORDERS.len() - 1] + 1]);
-    for order in ORDERS {
+    let mut found: Vec<(usize, f64, f64)> = Vec::with_capacity(CONTRAST_ORDERS.len());
+    let (mut contrasts, mut weights) = (Vec::new(), [0.0; CONTRAST_ORDERS[CONTRAST_ORDERS.len() - 1] + 1]);
+    for order in CONTRAST_ORDERS {
         contrasts.clear();
         for (times, x) in signals.clone().filter(|(times, _)| times.len() > order) {
             let starts = (0..times.len() - order).step_by(stride);
@@ -49,7 +47,7 @@ pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, 
             break;
         }
         let middle = robust_deviation(&mut contrasts);
-        let near = contrasts.iter().copied().filter(|c| *c <= 4.0 * middle);
+        let near = contrasts.iter().copied().filter(|c| *c <= OUTLYING_CONTRAST * middle);
         let sigma = if middle > 0.0 { rms(near) } else { rms(contrasts.iter().copied()) };
         // Neighbouring contrasts are correlated: about sqrt(pi k / 2) of them count as one.
         let scatter = ((1.0 + (1.6 * order as f64).sqrt()) / (2.0 * contrasts.len() as f64)).sqrt();
@@ -57,23 +55,20 @@ pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, 
     }
     let floor = f64::EPSILON * largest;
     let least = found.iter().map(|(_, sigma, _)| *sigma).fold(f64::INFINITY, f64::min);
-    match found.iter().find(|(_, sigma, scatter)| *sigma <= least * (1.0 + 2.0 * scatter)) {
+    match found.iter().find(|(_, sigma, scatter)| *sigma <= least * (1.0 + ORDER_AGREEMENT * scatter)) {
         Some(&(order, sigma, _)) => {
             // Still falling at the last order: what remains may be motion.
             let resolved = match found.as_slice() {
-                [.., (_, before, _), (_, last, _)] => order < found[found.len() - 1].0 || *last > 0.8 * before,
+                [.., (_, before, _), (_, last, _)] => {
+                    order < found[found.len() - 1].0 || *last > STILL_FALLING * before
+                }
                 _ => false,
             };
-            Noise { sigma: sigma.max(floor), order, resolved: resolved || sigma <= 16.0 * floor }
+            Noise { sigma: sigma.max(floor), order, resolved: resolved || sigma <= ROUNDING_NOISE * floor }
         }
         None => Noise { sigma: floor, order: 0, resolved: false },
     }
 }
-
-/// Number of contrasts on either side that determine the noise at a sample.
-const NEAR: usize = 64;
-/// Ratio of the noise at a sample to that of the recording, or its inverse, up to which they count as equal.
-const SAME: f64 = 2.0;
 
 /// Noise at every sample of column `i` of a trajectory: from the nearby contrasts if these clearly differ from the noise of the recording.
 ///
@@ -81,10 +76,10 @@ const SAME: f64 = 2.0;
 pub(super) fn along((times, x): (&[f64], &[f64]), regular: bool, (n, i): (usize, usize), noise: Noise) -> Vec<f64> {
     let Noise { sigma, order, resolved } = noise;
     let count = times.len().saturating_sub(order);
-    if order == 0 || !resolved || count < NEAR || sigma <= 0.0 {
+    if order == 0 || !resolved || count < LOCAL_CONTRASTS || sigma <= 0.0 {
         return vec![sigma; times.len()];
     }
-    let mut weights = [0.0; ORDERS[ORDERS.len() - 1] + 1];
+    let mut weights = [0.0; CONTRAST_ORDERS[CONTRAST_ORDERS.len() - 1] + 1];
     // Sums of squares up to each contrast, in units of the noise of the recording.
     let mut sums = vec![0.0; count + 1];
     for start in 0..count {
@@ -93,13 +88,16 @@ pub(super) fn along((times, x): (&[f64], &[f64]), regular: bool, (n, i): (usize,
         }
         let relative = |j: usize| (x[(start + j) * n + i] - x[start * n + i]) / sigma;
         let contrast = weights[..=order].iter().enumerate().map(|(j, weight)| weight * relative(j)).sum::<f64>();
-        sums[start + 1] = sums[start] + contrast.abs().min(4.0).powi(2);
+        sums[start + 1] = sums[start] + contrast.abs().min(OUTLYING_CONTRAST).powi(2);
     }
     let at = |sample: usize| {
         let middle = sample.saturating_sub(order / 2);
-        let (first, end) = (middle.saturating_sub(NEAR).min(count - NEAR), (middle + NEAR + 1).min(count));
+        let (first, end) = (
+            middle.saturating_sub(LOCAL_CONTRASTS).min(count - LOCAL_CONTRASTS),
+            (middle + LOCAL_CONTRASTS + 1).min(count),
+        );
         let ratio = ((sums[end] - sums[first]) / (end - first) as f64).sqrt();
-        if ratio * SAME < 1.0 || ratio > SAME { sigma * ratio.max(1e-3) } else { sigma }
+        if ratio * SAME_NOISE < 1.0 || ratio > SAME_NOISE { sigma * ratio.max(LEAST_LOCAL_NOISE) } else { sigma }
     };
     (0..times.len()).map(at).collect()
 }

@@ -1,17 +1,10 @@
 //! Windows that vary along a trajectory: shorter where the motion is fast, longer where it is slow.
 
+use super::thresholds::{
+    HOPELESS_SQUARED_ERROR, INDEPENDENT_PLACES, KEPT_SQUARED_ERROR, PLACES_PER_WINDOW, WINDOW_FACTORS,
+};
 use crate::recording::smooth::signal::{Fits, Signal};
 use crate::recording::smooth::window::Missed;
-
-/// Factors of a coordinate's usual window that are tried: `2^(k/3)`.
-const LEAST: i32 = -12;
-const MOST: i32 = 9;
-/// Places per window at which it is tried.
-const PLACES: usize = 8;
-/// Typical windows are kept up to this squared error, relative to the smallest.
-const TOLERATED: f64 = 2.0;
-/// Squared error over the least at which longer windows are no longer tried.
-const HOPELESS: f64 = 4.0;
 
 /// A coordinate of one trajectory with its usual window in samples.
 pub struct Typical<'a> {
@@ -38,9 +31,6 @@ struct Tried {
     squares: Vec<[f64; 3]>,
 }
 
-/// Independent places within a window to either side.
-const INDEPENDENT: f64 = 4.0;
-
 impl Tried {
     /// Tries a window at evenly spaced samples; none if it is longer than half the trajectory, or too short for the polynomials.
     fn new(Typical { signal, sigmas, .. }: &Typical<'_>, window: usize) -> Option<Self> {
@@ -48,7 +38,7 @@ impl Tried {
         if window > track.len() / 2 || window < signal.degree + 3 {
             return None;
         }
-        let (half, stride) = (window / 2, (window / PLACES).max(1));
+        let (half, stride) = (window / 2, (window / PLACES_PER_WINDOW).max(1));
         let mut fits = Fits::default();
         let (mut excess, mut variance) = (Vec::new(), Vec::new());
         for at in (half..track.len() - half).step_by(stride) {
@@ -89,7 +79,7 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
     let most = (length - (length + 1) % 2).max(least);
     let of = |u: &Typical<'_>, k: f64| scaled(u.window, k).clamp(least, most);
     let told: Vec<&Typical<'_>> = usual.iter().filter(|u| u.error > 0.0).collect();
-    let tried: Vec<(i32, Vec<Tried>)> = (LEAST..=MOST)
+    let tried: Vec<(i32, Vec<Tried>)> = (WINDOW_FACTORS[0]..=WINDOW_FACTORS[1])
         .filter_map(|k| {
             // Windows are clamped to the smallest one; factors for which all would be below it are skipped.
             let shortest = told.iter().any(|u| scaled(u.window, f64::from(k)) >= least);
@@ -97,7 +87,7 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
             (shortest && !all.is_empty()).then_some((k, all))
         })
         .collect();
-    let grid = (first.window / (4 * PLACES)).max(1);
+    let grid = (first.window / (4 * PLACES_PER_WINDOW)).max(1);
     let chosen: Vec<i32> = (0..length.div_ceil(grid)).map(|place| choose(&tried, &told, place * grid)).collect();
     let factors: Vec<i32> = (0..length)
         .map(|sample| {
@@ -119,17 +109,17 @@ fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Typical<'_>], sample: usize) -> 
     for (k, all) in tried {
         let errors = all.iter().zip(told).zip(&mut missed).map(|((tried, usual), missed)| {
             let [variance, bias, change] = tried.at(sample);
-            (variance + missed.bias([variance, bias], change, INDEPENDENT)) / (usual.error * usual.error)
+            (variance + missed.bias([variance, bias], change, INDEPENDENT_PLACES)) / (usual.error * usual.error)
         });
         let square: f64 = errors.sum();
-        if square > HOPELESS * best {
+        if square > HOPELESS_SQUARED_ERROR * best {
             break;
         }
         best = best.min(square);
         squares.push((*k, square));
     }
     let of = |wanted: i32| squares.iter().find(|(k, _)| *k == wanted).map(|(_, square)| *square);
-    if of(0).is_some_and(|square| square <= TOLERATED * best) {
+    if of(0).is_some_and(|square| square <= KEPT_SQUARED_ERROR * best) {
         return 0;
     }
     squares.iter().find(|(_, square)| *square == best).map_or(0, |(k, _)| *k)

@@ -1,13 +1,11 @@
 //! One coordinate of recorded trajectories, and its local polynomials.
 
+use super::thresholds::TRIED_PLACES;
 use crate::recording::RecordedTrajectory;
 use crate::recording::clock::Clock;
 use crate::recording::smooth::local_fit::{Estimate, LocalFit};
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// Places at which windows are tried.
-const CENTRES: usize = 2048;
 
 /// One coordinate of the trajectories with its noise.
 #[derive(Clone, Copy)]
@@ -104,7 +102,7 @@ impl Signal<'_> {
         mut visit: impl FnMut(&LocalFit, Range<usize>, usize, usize),
     ) -> f64 {
         let total: usize = self.tracks.iter().map(RecordedTrajectory::len).sum();
-        let centres = CENTRES.min(total);
+        let centres = TRIED_PLACES.min(total);
         let mut fits = Fits::default();
         let (mut number, mut start, mut visited) = (0, 0, 0);
         for c in 0..centres {

@@ -1,22 +1,17 @@
 //! Length of the window: as long as noise demands, as short as the motion allows.
 
+use super::thresholds::{
+    BIAS_SIGNIFICANCE, HOPELESS_SQUARED_ERROR, KEPT_SQUARED_ERROR, LEAST_COVERED, LONGEST_WINDOW, RISEN_SQUARED_ERROR,
+};
 use crate::recording::RecordedTrajectory;
 use crate::recording::smooth::signal::Signal;
 use serde::Serialize;
 
-/// Longest window that is tried, in samples.
-const LONGEST: usize = 2001;
-/// Standard deviations by which an estimated squared bias must exceed 0 to be more than noise.
-const SURE: f64 = 3.0;
-
 /// The significant part of an estimated squared bias: `square` is the mean, over `independent` samples, of the square of a number less its
 /// noise variance.
 fn sure(square: f64, variance: f64, independent: f64) -> f64 {
-    (square - SURE * variance * (2.0 / independent.max(1.0)).sqrt()).max(0.0)
+    (square - BIAS_SIGNIFICANCE * variance * (2.0 / independent.max(1.0)).sqrt()).max(0.0)
 }
-
-/// Largest squared error of the typical window, over the smallest, at which a trajectory keeps it.
-const TOLERATED: f64 = 2.0;
 
 /// Errors of one coordinate's derivatives, on average over the recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -62,9 +57,6 @@ pub struct Missed {
     risen: bool,
 }
 
-/// Squared error, over the smallest, that is clearly a rise.
-const RISEN: f64 = 1.5;
-
 impl Default for Missed {
     fn default() -> Self {
         Self { square: 0.0, least: f64::INFINITY, risen: false }
@@ -75,7 +67,7 @@ impl Missed {
     /// Squared bias of the next longer window, whose variance and squared bias by the change are `error`, see [`sure`].
     pub fn bias(&mut self, error: [f64; 2], variance: f64, independent: f64) -> f64 {
         let [own, square] = error;
-        self.risen |= own + square > RISEN * self.least;
+        self.risen |= own + square > RISEN_SQUARED_ERROR * self.least;
         if self.falls(own + square) {
             *self = Self { square: 0.0, least: own + square, risen: false };
         }
@@ -139,9 +131,6 @@ struct Course {
     missed: Missed,
 }
 
-/// Squared error over the least at which longer windows are no longer tried.
-const PAST: f64 = 4.0;
-
 impl Course {
     /// Adds the accelerations by the next longer window, their squared bias estimated by the change of degree, and the variance of that change.
     fn push(&mut self, found: Accelerations, square: f64, change: f64) {
@@ -153,7 +142,7 @@ impl Course {
         self.squares.push(variance + self.missed.bias([variance, square], change, independent));
         self.sure.push(variance + self.missed.square);
         let (last, least) = (self.squares[self.squares.len() - 1], self.squares[self.best]);
-        self.past |= last > PAST * least;
+        self.past |= last > HOPELESS_SQUARED_ERROR * least;
         if !self.past && last <= least {
             (self.best, self.finest) = (self.squares.len() - 1, found);
         }
@@ -167,7 +156,7 @@ impl Course {
     /// Number of its own window, given the typical one.
     fn own(&self, usual: usize) -> usize {
         match (self.squares.get(self.best), self.sure.get(usual).or(self.sure.last())) {
-            (Some(least), Some(kept)) if *kept > TOLERATED * least => self.best,
+            (Some(least), Some(kept)) if *kept > KEPT_SQUARED_ERROR * least => self.best,
             _ => usual,
         }
     }
@@ -186,7 +175,7 @@ struct Sums {
 /// Lengths of windows that are tried, in steps of about a tenth.
 fn lengths(least: usize, longest: usize) -> impl Iterator<Item = usize> {
     let next = |window: usize| (window + 2).max((window + window / 10) | 1);
-    let most = LONGEST.min(longest / 2).max(least);
+    let most = LONGEST_WINDOW.min(longest / 2).max(least);
     std::iter::successors(Some(least), move |window| Some(next(*window))).take_while(move |window| *window <= most)
 }
 
@@ -206,7 +195,7 @@ impl Signal<'_> {
             let [_, v, a] = estimate.values;
             (mean_v, square_v, square_a, count) = (mean_v + v, square_v + v * v, square_a + a * a, count + 1.0);
         });
-        if share < 0.5 {
+        if share < LEAST_COVERED {
             return None;
         }
         let root = |sum: f64| (sum / count).max(0.0).sqrt();
@@ -260,7 +249,7 @@ impl<'a> Search<'a> {
                 }
             },
         );
-        if share < 0.5 {
+        if share < LEAST_COVERED {
             return false;
         }
         for (search, (signal, sums)) in alike.iter_mut().zip(sums) {
@@ -290,7 +279,7 @@ impl<'a> Search<'a> {
     /// Compares window number `k`, the last one tried, with those before.
     fn compare(&mut self, k: usize) {
         let mean = self.mean(k);
-        self.past |= self.best.is_some_and(|(_, least)| mean > least + PAST.ln());
+        self.past |= self.best.is_some_and(|(_, least)| mean > least + HOPELESS_SQUARED_ERROR.ln());
         if !self.past && self.best.is_none_or(|(_, least)| mean < least) {
             self.best = Some((k, mean));
         }

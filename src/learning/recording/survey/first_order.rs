@@ -1,34 +1,14 @@
 //! Whether velocities are functions of positions and other measured quantities, as for tanks and circuits: such motion is of first order,
 //! and no Lagrangian with a kinetic energy describes it.
 
+use super::thresholds::{
+    ACCEPTED_RESIDUAL, FIRST_ORDER_DEGREE, FIRST_ORDER_RIDGE, FIRST_ORDER_TERMS, GAIN_BY_OTHERS, LEAST_WINDOWS,
+    MOST_WINDOWS, REFUSED_RESIDUAL, RESIDUAL_OVER_ERROR, SAME_QUANTITY, WINDOW_BLOCK, WINDOW_OVERLAP, WINDOWS_PER_TERM,
+};
 use crate::linalg::{Workspace, dot, solve_symmetric};
 use crate::names::percent;
 use crate::recording::{LoadedRecording, RecordedTrajectory, Smoothing, deviation, rms};
 use serde::Serialize;
-
-/// Largest degree of the polynomials, and of the number of their terms.
-const DEGREE: usize = 3;
-const TERMS: usize = 84;
-/// Windows for each term, at least.
-const WINDOWS_PER_TERM: usize = 8;
-/// Largest residual of a velocity over its error; residual, over its spread, that is always accepted, and the one from which on the fit
-/// says nothing; and the smallest factor by which, for one velocity, the residual grows without the other quantities. Chosen by
-/// `lnn-studies rates --part check`.
-const AT_ERROR: f64 = 2.5;
-const MISSED: f64 = 0.03;
-const OF_SPREAD: f64 = 0.35;
-const WITHOUT: f64 = 2.0;
-/// Correlation with a velocity from which another quantity is taken for a measurement of it.
-const MEASURED: f64 = 0.995;
-/// Windows in half the width of one, and their largest number.
-const OVERLAP: f64 = 8.0;
-const MOST_WINDOWS: f64 = 4000.0;
-/// Number of windows in a block, where every other block is fitted, and the smallest number of windows, which leaves half a block to test
-/// the fit.
-const BLOCK: usize = 64;
-const LEAST_WINDOWS: usize = BLOCK + BLOCK / 2;
-/// Ridge, over the largest entry of the normal matrix.
-const RIDGE: f64 = 1e-10;
 
 /// Weights of the samples about a time, `w(s) = (1 - s^2)^3` over their sum, with which
 ///
@@ -60,7 +40,7 @@ impl<'a> Equation<'a> {
         let (recording, n, chosen) = (&reading.recording, reading.recording.n(), &smoothing.coordinates[i]);
         let half = chosen.seconds / 2.0;
         let all: f64 = recording.tracks.iter().map(RecordedTrajectory::span).sum();
-        let step = (half / OVERLAP).max(all / MOST_WINDOWS);
+        let step = (half / WINDOW_OVERLAP).max(all / MOST_WINDOWS);
         let (mut windows, mut velocities, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for (at, track) in recording.tracks.iter().enumerate() {
             let RecordedTrajectory { times, q, .. } = track;
@@ -110,15 +90,16 @@ impl<'a> Equation<'a> {
         let column: Vec<f64> = self.windows.iter().map(|window| self.mean(window, &[k], &alone)[1]).collect();
         let (mean, spread) = (column.iter().sum::<f64>() / column.len() as f64, deviation(column.iter()));
         let centred: Vec<f64> = column.iter().map(|x| x - mean).collect();
-        spread > 0.0 && dot(&centred, &self.velocities).abs() < MEASURED * column.len() as f64 * spread * self.spread()
+        spread > 0.0
+            && dot(&centred, &self.velocities).abs() < SAME_QUANTITY * column.len() as f64 * spread * self.spread()
     }
 
     /// Root mean square residual of the velocity on the odd blocks, for a polynomial of some of the known columns fitted to the even
     /// blocks; the best degree counts. `None` for too few windows.
     fn residual(&self, of: &[usize]) -> Option<f64> {
         let least = |count: usize| (WINDOWS_PER_TERM * count).max(LEAST_WINDOWS);
-        let enough = |count: usize| count <= TERMS && self.windows.len() >= least(count);
-        let degrees = || (1..=DEGREE).filter(|&degree| enough(terms(of.len(), degree)));
+        let enough = |count: usize| count <= FIRST_ORDER_TERMS && self.windows.len() >= least(count);
+        let degrees = || (1..=FIRST_ORDER_DEGREE).filter(|&degree| enough(terms(of.len(), degree)));
         let monomials = Monomials::new(of.len(), degrees().next_back()?);
         let rows: Vec<Vec<f64>> = self.windows.iter().map(|window| self.mean(window, of, &monomials)).collect();
         degrees().filter_map(|degree| self.residual_of(&rows, terms(of.len(), degree))).min_by(f64::total_cmp)
@@ -127,7 +108,7 @@ impl<'a> Equation<'a> {
     /// The same residual with the first `count` functions of every row.
     fn residual_of(&self, rows: &[Vec<f64>], count: usize) -> Option<f64> {
         let rows = || rows.iter().map(|row| &row[..count]).zip(&self.velocities).enumerate();
-        let block = |odd: usize| rows().filter(move |(at, _)| at / BLOCK % 2 == odd).map(|(_, row)| row);
+        let block = |odd: usize| rows().filter(move |(at, _)| at / WINDOW_BLOCK % 2 == odd).map(|(_, row)| row);
         let (mut matrix, mut right) = (vec![0.0; count * count], vec![0.0; count]);
         for (row, velocity) in block(0) {
             for (i, x) in row.iter().enumerate() {
@@ -136,7 +117,7 @@ impl<'a> Equation<'a> {
             }
         }
         let largest = (0..count).map(|i| matrix[i * count + i]).fold(0.0, f64::max);
-        (0..count).for_each(|i| matrix[i * count + i] += RIDGE * largest);
+        (0..count).for_each(|i| matrix[i * count + i] += FIRST_ORDER_RIDGE * largest);
         let mut solution = vec![0.0; count];
         solve_symmetric(count, &matrix, &right, &mut solution, &mut Workspace::new()).ok()?;
         Some(rms(block(1).map(|(row, velocity)| velocity - dot(row, &solution))))
@@ -234,10 +215,15 @@ impl FirstOrder {
             let spread = equation.spread();
             let (with, without) = (equation.residual(&all)?, equation.residual(&positions)?);
             // A window without samples has no mean.
-            if with.is_nan() || with > (AT_ERROR * equation.error).max(MISSED * spread).min(OF_SPREAD * spread) {
+            if with.is_nan()
+                || with
+                    > (RESIDUAL_OVER_ERROR * equation.error)
+                        .max(ACCEPTED_RESIDUAL * spread)
+                        .min(REFUSED_RESIDUAL * spread)
+            {
                 return None;
             }
-            matter |= without > WITHOUT * with;
+            matter |= without > GAIN_BY_OTHERS * with;
             residual = residual.max(with / spread);
         }
         let from = others.iter().map(|k| inputs[k - n].clone()).collect();

@@ -5,11 +5,13 @@ mod first_order;
 mod motionless;
 mod says;
 mod suspicious;
+mod thresholds;
 mod warnings;
 
 pub(crate) use coordinate::CoordinateSurvey;
 pub(crate) use motionless::{Stillness, is_uniform, stillness};
 pub(crate) use suspicious::{Kind, Warning, find as find_suspicious};
+use thresholds::{AMBIGUOUS_STEP, LEAST_SAMPLES_PER_PERIOD};
 
 use crate::recording::clock::Clock;
 use crate::recording::read::FileFacts;
@@ -18,11 +20,6 @@ use crate::recording::{Bridged, Cut, Dropped, HeldOut, LoadedRecording, Recordin
 pub use first_order::FirstOrder;
 use serde::Serialize;
 use warnings::compare;
-
-/// Samples per period of the fast motion below which sampling is called coarse.
-pub(crate) const FEW_SAMPLES: f64 = 20.0;
-/// A step of an angle, in rad, at and above which unwrapping is a guess.
-const GUESS: f64 = 2.0;
 
 /// Settings of a survey.
 #[derive(Clone, Debug, PartialEq)]
@@ -202,7 +199,7 @@ fn guesses(reading: &LoadedRecording, i: usize, coordinate: &mut CoordinateSurve
     for (track, rows) in reading.recording.tracks.iter().zip(&reading.rows) {
         let clock = Clock::of(&track.times);
         for k in (1..track.len()).filter(|k| clock.missing(track.times[*k] - track.times[k - 1]) == 0) {
-            if (track.q[k * n + i] - track.q[(k - 1) * n + i]).abs() > GUESS {
+            if (track.q[k * n + i] - track.q[(k - 1) * n + i]).abs() > AMBIGUOUS_STEP {
                 coordinate.ambiguous_turns += 1;
                 coordinate.first_ambiguous.get_or_insert_with(|| (track.name.clone(), rows.row(k)));
             }

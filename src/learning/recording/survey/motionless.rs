@@ -1,11 +1,11 @@
 //! Coordinates that stand still, individually or relative to others, and those that move uniformly.
 
+use super::thresholds::{
+    COPY_SAMPLES, GRID_ROUNDING, MOST_DECIMAL_PLACES, MOVING_SCATTER, ROUNDING_REMAINDER, SHOWN_TERM,
+};
 use crate::names::number;
 use crate::recording::smooth::Smoothing;
 use crate::recording::{RecordedTrajectory, Recording};
-
-/// Smallest standard deviation of moving samples, in standard deviations of the noise.
-const MOVES: f64 = 1.2;
 
 /// How a coordinate stands still.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,11 +32,6 @@ impl std::fmt::Display for Stillness {
     }
 }
 
-/// About how many samples are examined for copies; more are thinned evenly.
-const SAMPLES: usize = 1 << 16;
-/// Part of a coordinate's motion below which the remainder after subtracting others is rounding.
-const ROUNDING: f64 = 1e-9;
-
 /// Coordinates that stand still, and copies of others, in order, each with the reason.
 pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let alone = |i: usize| standing(recording, i, smoothing);
@@ -60,7 +55,8 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
     }
     let noise = smoothing.coordinates.get(i)?.noise;
     // Numbers whose squares overflow cannot be compared.
-    let still = noise.resolved && noise.sigma.is_finite() && scatter(recording, i, false) <= MOVES * noise.sigma;
+    let still =
+        noise.resolved && noise.sigma.is_finite() && scatter(recording, i, false) <= MOVING_SCATTER * noise.sigma;
     still.then_some(Stillness::Noise(noise.sigma))
 }
 
@@ -70,14 +66,15 @@ pub fn is_uniform(recording: &Recording, i: usize, smoothing: &Smoothing) -> boo
     let noise = smoothing.coordinates[i].noise;
     let noise = if noise.resolved { noise.sigma.max(rounding(recording, i)) } else { rounding(recording, i) };
     let beside = scatter(recording, i, true);
-    beside <= MOVES * noise || beside <= ROUNDING * scatter(recording, i, false)
+    beside <= MOVING_SCATTER * noise || beside <= ROUNDING_REMAINDER * scatter(recording, i, false)
 }
 
 /// Standard deviation of the rounding of coordinate `i` to the digits after the point that all its values have; 0 of more than nine digits.
 fn rounding(recording: &Recording, i: usize) -> f64 {
     let values = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(recording.n()));
-    let is_whole = |scale: f64| values().all(|x| (x * scale - (x * scale).round()).abs() <= 1e-9 * (x * scale).abs());
-    let step = (0..=9).map(|digits| 10f64.powi(-digits)).find(|step| is_whole(step.recip()));
+    let is_whole =
+        |scale: f64| values().all(|x| (x * scale - (x * scale).round()).abs() <= GRID_ROUNDING * (x * scale).abs());
+    let step = (0..=MOST_DECIMAL_PLACES).map(|digits| 10f64.powi(-digits)).find(|step| is_whole(step.recip()));
     step.map_or(0.0, |step| step / 12f64.sqrt())
 }
 
@@ -106,7 +103,7 @@ fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
 /// modified Gram-Schmidt leaves nothing of them.
 fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let n = recording.n();
-    let stride = recording.samples().div_ceil(SAMPLES).max(1);
+    let stride = recording.samples().div_ceil(COPY_SAMPLES).max(1);
     let column = |i: usize| -> Vec<f64> {
         let centred = |track: &RecordedTrajectory| {
             let values: Vec<f64> = track.q.iter().skip(i).step_by(n * stride).copied().collect();
@@ -137,9 +134,10 @@ fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec
         let resolved = noises.clone().all(|(_, chosen)| chosen.noise.resolved);
         let noise = noises.map(|(c, chosen)| (c * chosen.noise.sigma).powi(2)).sum::<f64>().sqrt();
         let left = size(&rest);
-        if left <= ROUNDING * whole || (resolved && left <= MOVES * noise) {
-            let terms =
-                moving.iter().filter(|k| **k != i && (coefficients[**k] * size(&column(**k))).abs() > 1e-3 * whole);
+        if left <= ROUNDING_REMAINDER * whole || (resolved && left <= MOVING_SCATTER * noise) {
+            let terms = moving
+                .iter()
+                .filter(|k| **k != i && (coefficients[**k] * size(&column(**k))).abs() > SHOWN_TERM * whole);
             let terms: Vec<String> =
                 terms.map(|k| format!("{} {}", number(-coefficients[*k]), recording.coordinates[*k])).collect();
             found.push((i, Stillness::Copy(terms.join(" + "))));

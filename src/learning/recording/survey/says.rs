@@ -1,16 +1,12 @@
 //! Report of a survey.
 
 use super::suspicious::{Kind, Warning};
-use super::{CoordinateSurvey, FEW_SAMPLES, Survey, TrajectorySurvey};
+use super::thresholds::{LEAST_SAMPLES_PER_PERIOD, ROUNDING_JITTER, SHOWN_ROWS};
+use super::{CoordinateSurvey, Survey, TrajectorySurvey};
 use crate::findings::Findings;
 use crate::names::{percent, percentage, pluralize, rounded};
 use crate::recording::read::{Encoding, FileFacts, FileKind, Separator};
-use crate::recording::{LARGE_ERROR, Targets};
-
-/// Largest jitter that counts as rounding of the times.
-const ROUNDING: f64 = 1e-9;
-/// Rows of a table that can be long.
-const ROWS: usize = 20;
+use crate::recording::{LARGE_ACCELERATION_ERROR, Targets};
 
 /// A number with four digits.
 fn short(x: f64) -> String {
@@ -47,7 +43,7 @@ impl Survey {
         findings.gap().table(&headers, self.coordinates.iter().map(CoordinateSurvey::smoothing_row));
         if !self.suspicious.is_empty() {
             let headers = ["suspicious", "row", "coordinate", "value [its unit]", "what"];
-            findings.gap().table(&headers, self.suspicious.iter().take(ROWS).map(Warning::row));
+            findings.gap().table(&headers, self.suspicious.iter().take(SHOWN_ROWS).map(Warning::row));
             findings.lines(more(self.suspicious_count, ("place", "places")));
         }
         findings
@@ -76,7 +72,7 @@ impl Survey {
 
     /// Advice on the targets of a fit, the sampling and the held-out part.
     pub fn advice(&self) -> Findings {
-        let (worst, limit) = (percent(self.worst()), percent(LARGE_ERROR));
+        let (worst, limit) = (percent(self.worst()), percent(LARGE_ACCELERATION_ERROR));
         let mut findings = Findings::default();
         findings.line(match self.targets {
             Targets::Measured => {
@@ -95,9 +91,11 @@ impl Survey {
                  better than {limit}"
             ),
         });
-        let enough = self.coordinates.iter().all(|c| c.samples_per_period >= FEW_SAMPLES);
+        let enough = self.coordinates.iter().all(|c| c.samples_per_period >= LEAST_SAMPLES_PER_PERIOD);
         if enough && self.warnings.is_empty() {
-            findings.line(format!("sampling is fine: at least {FEW_SAMPLES} samples per period of the fast motion"));
+            findings.line(format!(
+                "sampling is fine: at least {LEAST_SAMPLES_PER_PERIOD} samples per period of the fast motion"
+            ));
         }
         if !self.held_out_text.is_empty() {
             findings.line(format!("held out for validation: {}", self.held_out_text));
@@ -122,9 +120,9 @@ impl Survey {
             pluralize(self.samples, "sample", "samples"),
         ];
         findings.line(format!("{files}, {tracks}, {samples}, {} s; {times}", short(seconds)));
-        findings.lines(self.formats.iter().filter_map(FileFacts::sentence).take(ROWS));
+        findings.lines(self.formats.iter().filter_map(FileFacts::sentence).take(SHOWN_ROWS));
         let headers = ["trajectory", "rows", "samples", "from [s]", "to [s]", "rate [Hz]", "jitter of a step [%]"];
-        findings.gap().table(&headers, self.tracks.iter().take(ROWS).map(TrajectorySurvey::row));
+        findings.gap().table(&headers, self.tracks.iter().take(SHOWN_ROWS).map(TrajectorySurvey::row));
         findings.lines(more(self.tracks.len(), ("trajectory", "trajectories")));
         self.say_what_is_missing(findings);
     }
@@ -145,12 +143,12 @@ impl Survey {
             let most = self.bridged.longest;
             findings.line(format!("{gaps}: {rows} missing, at most {most} in one; trajectories continue across them"));
         }
-        findings.lines(self.cuts.iter().take(ROWS).map(|cut| {
+        findings.lines(self.cuts.iter().take(SHOWN_ROWS).map(|cut| {
             let (seconds, steps) = (short(cut.seconds), short(cut.steps));
             format!("gap: {seconds} s ({steps} steps) between rows {} and {} of {}", cut.before, cut.after, cut.file)
         }));
         findings.lines(more(self.cuts.len(), ("gap", "gaps")));
-        findings.lines(self.dropped.iter().take(ROWS).map(|part| {
+        findings.lines(self.dropped.iter().take(SHOWN_ROWS).map(|part| {
             let samples = pluralize(part.samples, "sample", "samples");
             format!("left out: {samples} between gaps, rows {}-{} of {}", part.first, part.last, part.file)
         }));
@@ -180,7 +178,7 @@ impl FileFacts {
 
 /// The number of entries that are not shown.
 fn more(all: usize, (one, many): (&str, &str)) -> Option<String> {
-    let rest = all.checked_sub(ROWS).filter(|rest| *rest > 0)?;
+    let rest = all.checked_sub(SHOWN_ROWS).filter(|rest| *rest > 0)?;
     Some(format!("and {}", pluralize(rest, &format!("more {one}"), &format!("more {many}"))))
 }
 
@@ -208,7 +206,7 @@ impl CoordinateSurvey {
 impl TrajectorySurvey {
     fn row(&self) -> Vec<String> {
         let rows = format!("{}-{}", self.first_row, self.last_row);
-        let jitter = percentage(if self.jitter < ROUNDING { 0.0 } else { self.jitter });
+        let jitter = percentage(if self.jitter < ROUNDING_JITTER { 0.0 } else { self.jitter });
         let times = [self.start, self.end, self.rate].map(short);
         [vec![self.name.clone(), rows, self.samples.to_string()], times.to_vec(), vec![jitter]].concat()
     }

@@ -1,5 +1,9 @@
 //! Samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
 
+use super::thresholds::{
+    FROZEN_STEP_GRID, FROZEN_STEP_NOISE, KEPT_WARNINGS, LEAST_FROZEN, LONGEST_CONTRAST, SCALE_SAMPLES,
+    SUSPICIOUS_CONTRAST,
+};
 use crate::recording::Recording;
 use crate::recording::clock::Clock;
 use crate::recording::smooth::contrast_weights;
@@ -8,14 +12,6 @@ use serde::Serialize;
 
 /// Points of a contrast: sixth differences.
 const POINTS: usize = 7;
-/// Time that the neighbours of a contrast may span, over that of equal steps.
-const LONGEST: f64 = 1.7;
-/// Contrasts that far from 0, in standard deviations, are no noise.
-const LIMIT: f64 = 6.0;
-/// Fewest equal values in a row that may be a frozen sensor.
-const FROZEN: usize = 8;
-/// Warnings that are kept.
-const MOST: usize = 1000;
 
 /// Kind of a suspicious place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -76,7 +72,7 @@ pub fn find(
     for (number, track) in recording.tracks.iter().enumerate() {
         let mut report = |at: usize, kind: Kind, size: f64| {
             count += 1;
-            if found.len() < MOST {
+            if found.len() < KEPT_WARNINGS {
                 let (name, coordinate) = (track.name.clone(), recording.coordinates[i].clone());
                 let (row, value, place) = (row(number, at), track.q[at * n + i], (number, at));
                 found.push(Warning { track: name, row, place, coordinate, kind, value, size });
@@ -88,9 +84,9 @@ pub fn find(
             continue;
         }
         differences(&track.times, q, &mut z);
-        let stride = (z.len() >> 16).max(1);
+        let stride = (z.len() / SCALE_SAMPLES).max(1);
         let mut some: Vec<f64> = z.iter().step_by(stride).copied().collect();
-        let limit = LIMIT * robust_deviation(&mut some).max(sigma);
+        let limit = SUSPICIOUS_CONTRAST * robust_deviation(&mut some).max(sigma);
         let mut quiet_from = 0;
         for k in 1..z.len() - 1 {
             let far = z[k].abs() > limit && z[k] * z[k - 1] < 0.0 && z[k] * z[k + 1] < 0.0;
@@ -110,7 +106,7 @@ pub fn find(
 fn differences(times: &[f64], q: impl Fn(usize) -> f64, z: &mut Vec<f64>) {
     z.clear();
     let clock = Clock::of(times);
-    let longest = LONGEST * (POINTS - 1) as f64 * clock.step;
+    let longest = LONGEST_CONTRAST * (POINTS - 1) as f64 * clock.step;
     let mut weights = [0.0; POINTS];
     for (start, window) in times.windows(POINTS).enumerate() {
         if window[POINTS - 1] - window[0] > longest {
@@ -149,17 +145,16 @@ fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
 /// Calls `report` with the first sample and the length of runs of equal values that the motion jumps into or out of.
 fn frozen(samples: usize, q: impl Fn(usize) -> f64, sigma: f64, mut report: impl FnMut(usize, usize)) {
     let step = |k: usize| (q(k) - q(k - 1)).abs();
-    let stride = (samples >> 16).max(1);
+    let stride = (samples / SCALE_SAMPLES).max(1);
     let grid = (1..samples).step_by(stride).map(step).filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
-    // A curve on a grid rests at its turning points, but leaves them one grid line at a time.
-    let jump = 6.0 * sigma + 3.0 * grid;
+    let jump = FROZEN_STEP_NOISE * sigma + FROZEN_STEP_GRID * grid;
     let mut start = 0;
     for k in 1..=samples {
         if k < samples && q(k) == q(start) {
             continue;
         }
         let jumps = (start > 0 && step(start) > jump) || (k < samples && step(k) > jump);
-        if k - start >= FROZEN && jumps {
+        if k - start >= LEAST_FROZEN && jumps {
             report(start, k - start);
         }
         start = k;

@@ -1,15 +1,16 @@
 //! Warnings that a reader should know before learning from the data.
 
 use super::suspicious::Kind;
-use super::{FEW_SAMPLES, FirstOrder, Stillness, Survey};
+use super::thresholds::{
+    LEAST_CORRELATION, LEAST_SAMPLES_PER_PERIOD, MANY_LOST_ROWS, MISTAKE_TOLERANCE, RATIO_PER_SQUARED_ERROR,
+    RATIO_TOLERANCE, TURN_TOLERANCE,
+};
+use super::{FirstOrder, Stillness, Survey};
 use crate::names::{number, percent, pluralize};
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
-
-/// Share of the rows that are missing or left out at and above which a warning is due.
-const MANY: f64 = 0.01;
 
 /// One sentence each.
 pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
@@ -30,9 +31,9 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
         if !c.noise_resolved {
             all.push(format!("{name}: motion and noise cannot be separated, the noise given is an upper bound"));
         }
-        if c.samples_per_period < FEW_SAMPLES {
+        if c.samples_per_period < LEAST_SAMPLES_PER_PERIOD {
             all.push(format!(
-                "{name}: {:.1} samples per period of its fast motion ({} s), expected at least {FEW_SAMPLES}: sample faster",
+                "{name}: {:.1} samples per period of its fast motion ({} s), expected at least {LEAST_SAMPLES_PER_PERIOD}: sample faster",
                 c.samples_per_period,
                 number(c.period)
             ));
@@ -52,7 +53,7 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
         }
         let wraps = |turn: f64| {
             let jumps = survey.suspicious.iter().filter(|s| s.kind == Kind::Jump && s.coordinate == *name);
-            jumps.filter(|s| (s.size.abs() / turn - 1.0).abs() < 0.15).count()
+            jumps.filter(|s| (s.size.abs() / turn - 1.0).abs() < TURN_TOLERANCE).count()
         };
         if !c.periodic && wraps(TAU) > 0 {
             all.push(format!("{name} jumps by a full turn {} times: is it an angle (--periodic {name})?", wraps(TAU)));
@@ -65,11 +66,11 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
     let dropped: usize = survey.dropped.iter().map(|part| part.samples).sum();
     let (missing, gaps) = (survey.bridged.rows, pluralize(survey.bridged.gaps, "short gap", "short gaps"));
     let share = |rows: usize| rows as f64 / (survey.samples + dropped + missing) as f64;
-    if share(missing) > MANY {
+    if share(missing) > MANY_LOST_ROWS {
         let rows = pluralize(missing, "row is", "rows are");
         all.push(format!("{rows} missing in {gaps} ({}): smoothing reaches across them", percent(share(missing))));
     }
-    if share(dropped) > MANY {
+    if share(dropped) > MANY_LOST_ROWS {
         let rows = pluralize(dropped, "row is", "rows are");
         all.push(format!("{rows} left out ({}): between gaps there are too few to be used", percent(share(dropped))));
     }
@@ -97,8 +98,8 @@ pub struct Consistency {
 impl Consistency {
     /// `true` if the two agree within their errors.
     pub fn holds(&self) -> bool {
-        let doubt = 0.05 + 2.0 * self.uncertainty * self.uncertainty;
-        (self.factor - 1.0).abs() <= doubt && self.correlation >= 0.9 - self.uncertainty
+        let doubt = RATIO_TOLERANCE + RATIO_PER_SQUARED_ERROR * self.uncertainty * self.uncertainty;
+        (self.factor - 1.0).abs() <= doubt && self.correlation >= LEAST_CORRELATION - self.uncertainty
     }
 
     /// A likely mistake, if the factor is one of the common ones.
@@ -115,7 +116,10 @@ impl Consistency {
             (step, "per sample instead of per second?"),
             (step * step, "per sample squared instead of per second squared?"),
         ];
-        known.into_iter().find(|(factor, _)| (self.factor / factor - 1.0).abs() < 0.05).map(|(_, text)| text)
+        known
+            .into_iter()
+            .find(|(factor, _)| (self.factor / factor - 1.0).abs() < MISTAKE_TOLERANCE)
+            .map(|(_, text)| text)
     }
 }
 
