@@ -11,12 +11,10 @@
 //! spacing of the samples. In Lyapunov times it counts the factors of `e = 2.718..` by which the error has grown until then, whatever the
 //! pace of the motion; after Pathak et al., Phys. Rev. Lett. 120, 024102 (2018), who take one norm over all components.
 
+use super::thresholds::{ROUNDING_SPREAD, VALID};
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
-
-/// The relative error up to which a prediction is valid.
-pub const VALID: f64 = 0.4;
 
 /// Time for which a prediction was valid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,7 +74,7 @@ pub fn relative_error(exact: &[f64], predicted: &[f64], periodic: &[bool], sprea
     let (mut count, mut sum) = (0, 0.0);
     for ((&q, &p), (&angle, &size)) in exact.iter().zip(predicted).zip(periodic.iter().zip(spread)) {
         // Rounding errors are no motion.
-        if size > 1e-9 * q.abs() {
+        if size > ROUNDING_SPREAD * q.abs() {
             let difference = if angle { angle_difference(q, p) } else { p - q };
             (count, sum) = (count + 1, sum + (difference / size).powi(2));
         }

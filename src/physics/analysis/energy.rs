@@ -1,6 +1,10 @@
 //! Errors of the energy and of other quantities that the exact motion conserves; the steady loss of energy in recorded motion, the mark of
 //! friction.
 
+use super::thresholds::{
+    FRICTION_SIGNIFICANCE, LEAST_LOSING, LEAST_LOSS, LEAST_STRETCH_ENERGIES, LEAST_STRETCH_SAMPLES, LEAST_STRETCHES,
+    LOSS_STRETCHES, STRETCH_SAMPLES,
+};
 use super::{Statistics, statistics};
 use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
@@ -92,28 +96,26 @@ impl EnergyLoss {
     /// `true` if motion loses energy steadily: nearly everywhere, by more than chance, and enough to matter.
     pub(crate) fn is_steady(&self) -> bool {
         let lost = self.per_second * self.seconds;
-        self.stretches >= 5 && self.per_second > 4.0 * self.error && self.losing >= 0.8 && lost > 0.01
+        let significant = self.per_second > FRICTION_SIGNIFICANCE * self.error;
+        self.stretches >= LEAST_STRETCHES && significant && self.losing >= LEAST_LOSING && lost > LEAST_LOSS
     }
 }
-
-/// Stretches that trajectories are cut into, at least about.
-const STRETCHES: usize = 20;
-/// Largest number of samples of a stretch at which the energy is examined.
-const SAMPLES: usize = 64;
 
 /// Energy lost along the estimated states of recorded motion, with the work of known forces subtracted: the slope of straight lines through
 /// `E - work` over stretches of the trajectories. `None` if the model gives no energy.
 pub fn energy_loss(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<EnergyLoss> {
     let n = model.coordinates();
-    let pieces = STRETCHES.div_ceil(part.states.len().max(1)).max(1);
+    let pieces = LOSS_STRETCHES.div_ceil(part.states.len().max(1)).max(1);
     let (mut slopes, mut seconds) = (Vec::new(), 0.0);
     let (mut kinetic, mut count) = (0.0, 0.0);
     let mut terms = Terms::default();
     for (track, states) in part.recording.tracks.iter().zip(&part.states) {
         let rows = states.interior();
         let length = rows.len() / pieces;
-        for first in (rows.start..rows.end).step_by(length.max(1)).take(pieces).filter(|_| length >= 8) {
-            let stride = length.div_ceil(SAMPLES);
+        for first in
+            (rows.start..rows.end).step_by(length.max(1)).take(pieces).filter(|_| length >= LEAST_STRETCH_SAMPLES)
+        {
+            let stride = length.div_ceil(STRETCH_SAMPLES);
             let (mut line, mut work) = (Vec::new(), 0.0);
             for row in first..first + length {
                 let at = |values: &[f64], row: usize| values[row * n..(row + 1) * n].to_vec();
@@ -133,7 +135,7 @@ pub fn energy_loss(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Energ
                     }
                 }
             }
-            if line.len() >= 4 {
+            if line.len() >= LEAST_STRETCH_ENERGIES {
                 seconds += line[line.len() - 1].0 - line[0].0;
                 slopes.push(slope(&line));
             }

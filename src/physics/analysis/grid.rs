@@ -3,6 +3,7 @@
 use super::AffineFit;
 use super::statistics::quantile;
 use super::terms::matrices_at_rest;
+use super::thresholds::{METRIC_ROUNDING, MOST_AXIS_POINTS, POINTS_AT_ONCE};
 use crate::geometry::{at_once, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, leading_minors};
@@ -148,7 +149,7 @@ fn evaluate<S: Scalar>(
     for (axis, a) in axes.iter().enumerate() {
         let problem = match a {
             a if a.component >= 2 * n => "names no component",
-            a if !(2..=10_000).contains(&a.points) => "needs 2 to 10,000 points",
+            a if !(2..=MOST_AXIS_POINTS).contains(&a.points) => "needs 2 to 10,000 points",
             a if !(a.from.is_finite() && a.to.is_finite() && a.from != a.to) => "needs two different finite bounds",
             _ if axes[0].component == axes[1].component => "both axes are the same component",
             _ => continue,
@@ -208,11 +209,8 @@ pub(crate) fn is_metric(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) ->
     if q.is_empty() || model.terms(q, v, Request::LAGRANGIAN | Request::ENERGY, &mut terms).is_err() {
         return false;
     }
-    terms.lagrangian.iter().zip(&terms.energy).all(|(l, e)| (l - e).abs() <= 1e-9 * (l.abs() + e.abs()))
+    terms.lagrangian.iter().zip(&terms.energy).all(|(l, e)| (l - e).abs() <= METRIC_ROUNDING * (l.abs() + e.abs()))
 }
-
-/// Largest number of points whose geometry is computed at once.
-const CHUNK: usize = 64;
 
 /// Curvature scalar `R` of the mass matrix at rest, as a metric, at points `(points, n)`; `NaN` where there is none.
 pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Vec<f64> {
@@ -224,7 +222,7 @@ pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Ve
             Err(_) => vec![f64::NAN; points.len() / n],
         }
     };
-    q.chunks(CHUNK.min(at_once(n)) * n).flat_map(scalars).collect()
+    q.chunks(POINTS_AT_ONCE.min(at_once(n)) * n).flat_map(scalars).collect()
 }
 
 /// Values of the axes and points `(points, n)` over them, the other coordinates as at `point`.

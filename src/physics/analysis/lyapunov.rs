@@ -1,17 +1,10 @@
 //! Finite-time Lyapunov exponent, so that divergence by chaos is not mistaken for an error of the model.
 
+use super::thresholds::{REGULAR, REGULAR_TIME, WIDEST_SEPARATION};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, dot, eigh, inertia, inverse};
 use crate::rollout::{Domain, Integrable, RolloutError, RolloutOptions, rollout};
 use serde::{Deserialize, Serialize};
-
-/// Logarithm of the growth of a separation, below which a motion of at most 50 units of time is regular: its Lyapunov time is then above a
-/// fifth of the time span. Separations of regular motions grow in proportion to time, by a factor of some 50 in 50 s.
-pub const REGULAR: f64 = 5.0;
-/// Largest distance of neighbours in the numbers of the chart, over that at the start: more would leave the linear range.
-const WIDEST: f64 = 1e4;
-/// Time beyond which that factor is allowed to grow in proportion to time.
-const LONG: f64 = 50.0;
 
 /// Rate at which neighbouring motions part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,7 +23,7 @@ impl Lyapunov {
 
     /// `true` if neighbouring motions separate faster than for regular motion.
     pub fn is_chaotic(&self) -> bool {
-        self.exponent * self.time >= REGULAR + (self.time / LONG).ln().max(0.0)
+        self.exponent * self.time >= REGULAR + (self.time / REGULAR_TIME).ln().max(0.0)
     }
 }
 
@@ -86,7 +79,7 @@ pub fn lyapunov<S: Integrable>(
         let now = here.size(&offset);
         if now > 0.0 && now.is_finite() && before > 0.0 {
             growth += (now / before).ln();
-            let shrink = (now / unit).max(size(&offset) / (WIDEST * distance));
+            let shrink = (now / unit).max(size(&offset) / (WIDEST_SEPARATION * distance));
             offset.iter_mut().for_each(|x| *x /= shrink);
             before = now / shrink;
         } else {

@@ -26,12 +26,13 @@ mod lyapunov;
 mod prediction;
 mod statistics;
 mod terms;
+mod thresholds;
 mod trajectories;
 mod tube;
 
 pub(crate) use determination::{Decay, decay};
 pub(crate) use distance::{
-    CoordinateError, VALID, ValidTime, ValidTimes, coordinate_error, spread, valid_time, velocity_error,
+    CoordinateError, ValidTime, ValidTimes, coordinate_error, spread, valid_time, velocity_error,
 };
 pub(crate) use distance::{angle_difference, relative_error};
 pub(crate) use energy::conserved_change;
@@ -42,7 +43,6 @@ pub(crate) use grid::{Axis, Grid, determinant_grid, lagrangian_grid};
 pub(crate) use grid::{
     MetricComponent, Spread, curvature_grid, curvature_scalars, grid_points, is_metric, metric_components, metric_grids,
 };
-pub(crate) use lyapunov::REGULAR;
 pub use lyapunov::{Lyapunov, lyapunov};
 pub use prediction::PredictionError;
 pub(crate) use prediction::follow;
@@ -53,13 +53,15 @@ pub(crate) use statistics::{Statistics, statistics, stretches};
 pub(crate) use terms::wrong_signatures;
 pub(crate) use terms::{AffineFit, affine_fit, element_factor, matrices_at_rest, nearest_factor};
 pub use terms::{MassMatrixError, mass_matrix_error};
+pub(crate) use thresholds::{REGULAR, VALID};
 pub(crate) use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
 
 // For the packages of this repository.
 #[doc(hidden)]
 pub use {
-    determination::{Determination, Estimate, MOST_MISFIT, Observed, constants, determination, misfit},
+    determination::{Determination, Estimate, Observed, constants, determination, misfit},
     prediction::{Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error},
     terms::{acceleration_errors, mass_matrix_error_within},
+    thresholds::MOST_MISFIT,
     tube::{Tube, TubeError},
 };

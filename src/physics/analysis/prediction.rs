@@ -5,6 +5,7 @@
 //! after the last of them.
 
 use super::statistics::quantile;
+use super::thresholds::{STEPS_ANYWAY, STEPS_PER_SAMPLE, TIME_ROUNDING};
 use super::{ValidTime, angle_difference, relative_error, valid_time};
 use crate::data::StateEstimate;
 use crate::lagrangian::EulerLagrange;
@@ -50,9 +51,10 @@ impl Window {
             let seen = reach.get(start).copied().unwrap_or(start).clamp(start, interior.end - 1);
             let origin = track.times[seen];
             // The last sample may be early or late by a rounding error of the times.
-            let length = track.times[seen..interior.end].partition_point(|t| t - origin <= seconds * (1.0 + 1e-9));
+            let length =
+                track.times[seen..interior.end].partition_point(|t| t - origin <= seconds * (1.0 + TIME_ROUNDING));
             let end = seen + length;
-            let whole = end < interior.end || track.times[end - 1] - origin >= seconds * (1.0 - 1e-9);
+            let whole = end < interior.end || track.times[end - 1] - origin >= seconds * (1.0 - TIME_ROUNDING);
             if !whole || length < 2 {
                 break;
             }
@@ -78,11 +80,6 @@ impl Window {
 /// Coordinates at the times of every window's samples, `(samples, n)`; not finite where a predictor gave up.
 pub type Predictions = Vec<Vec<f64>>;
 
-/// Steps that a motion may take before it is given up, beside [`STEPS_PER_SAMPLE`]: irregular ones would take a million.
-const STEPS: usize = 1000;
-/// Allowed steps per sample of the windows; one step of a healthy motion covers several samples.
-const STEPS_PER_SAMPLE: f64 = 4.0;
-
 /// The motion of a model under the known forces; `NaN` from where it ends before its time. The result does not depend on `threads`.
 pub fn predict_by_motion(model: &dyn EulerLagrange<f64>, windows: &[Window], threads: usize) -> Predictions {
     follow(model, windows, threads).0
@@ -102,7 +99,7 @@ pub fn follow(
     let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
     let step = shortest.fold(end, f64::min);
     // A little longer, so that rounding leaves the last sample of every window inside.
-    let max_steps = STEPS + (STEPS_PER_SAMPLE * end / step) as usize;
+    let max_steps = STEPS_ANYWAY + (STEPS_PER_SAMPLE * end / step) as usize;
     let options = RolloutOptions::new(end * (1.0 + 1e-12), step).energy(false).max_steps(max_steps);
     let motions = rollout_each(model, &starts, &options, threads);
     let pairs = windows.iter().zip(motions);

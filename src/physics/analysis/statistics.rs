@@ -1,6 +1,7 @@
 //! Statistics of a series of errors, and the training instability: how much a loss oscillates about its trend
 //! (Hamzaogullari and Ozakin, appendix B).
 
+use super::thresholds::{LEAST_LOSSES, LOSS_WINDOW};
 use crate::configuration::Config;
 use crate::optimizers::Schedule;
 use serde::{Deserialize, Serialize};
@@ -88,9 +89,6 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// Window of the filter in epochs.
-const WINDOW: usize = 15;
-
 /// Savitzky-Golay filter of order 2: at every point the value of the parabola fitted to the `window` points around it,
 /// at the ends to the first or last `window` points.
 ///
@@ -143,10 +141,10 @@ pub fn stretches(config: &Config) -> Vec<Range<usize>> {
 /// Stretches beyond the end of the series are cut or passed over. `None` for fewer than five losses, too few for a parabola, without a
 /// stretch of two epochs, or if a loss is not finite.
 pub fn training_instability(losses: &[f64], stretches: &[Range<usize>]) -> Option<f64> {
-    if losses.len() < 5 || losses.iter().any(|loss| !loss.is_finite()) {
+    if losses.len() < LEAST_LOSSES || losses.iter().any(|loss| !loss.is_finite()) {
         return None;
     }
-    let trend = savitzky_golay(losses, WINDOW);
+    let trend = savitzky_golay(losses, LOSS_WINDOW);
     let oscillation: Vec<f64> = losses.iter().zip(&trend).map(|(loss, trend)| loss - trend).collect();
     let deviations: Vec<f64> = stretches
         .iter()

@@ -2,6 +2,7 @@
 //! that motion leaves open.
 
 use super::statistics::ErrorDistribution;
+use super::thresholds::COMPARED_AT_ONCE;
 use crate::lagrangian::{EulerLagrange, Manifold, ManifoldRows, ReducedMass, Request, Terms, group_factors, groups};
 use crate::linalg::{Inertia, dot, inertia};
 use crate::scalar::{Real, Scalar};
@@ -16,12 +17,11 @@ pub fn acceleration_errors<S: Scalar>(
     q: &[S],
     v: &[S],
 ) -> Vec<ErrorDistribution> {
-    const CHUNK: usize = 256;
     let n = exact.coordinates();
     let mut errors = vec![Vec::new(); n];
     let mut failed = 0;
     let (mut a, mut b) = (Terms::default(), Terms::default());
-    let size = CHUNK * n.max(1);
+    let size = COMPARED_AT_ONCE * n.max(1);
     for (q, v) in q.chunks(size).zip(v.chunks(size)) {
         for (model, terms) in [(exact, &mut a), (learned, &mut b)] {
             terms.acceleration.clear();

@@ -1,6 +1,10 @@
 //! The trajectory test: learned motion against exact motion from random starts, and the part of it that an eye
 //! can follow, in dense samples.
 
+use super::thresholds::{
+    DRAWN_BEYOND_VALID, DRAWN_LYAPUNOV_TIMES, DRAWN_SAMPLES, DRAWN_TURNS, LEARNED_STEPS, MOST_DRAWN_TURNS,
+    RENORMALISATIONS, RUNS_AT_ONCE, SEPARATION_TOLERANCE,
+};
 use super::{
     CoordinateError, EnergyError, Lyapunov, Statistics, ValidTime, coordinate_error, energy_drift, energy_error,
     lyapunov, relative_error, spread, statistics, valid_time, velocity_error,
@@ -33,10 +37,6 @@ impl StartBox {
         (0..count).map(|_| (draw(&self.q), draw(&self.v))).collect()
     }
 }
-
-/// Steps after which a learned motion is given up: ten times what a healthy one takes over the longest test. A model that learned next to
-/// nothing, and runs into a singular mass matrix, then costs only seconds.
-const LEARNED_STEPS: usize = 30_000;
 
 /// The test as the paper makes it: random starts, exact motion by [`RolloutOptions::reference`], learned motion at rtol 1e-6 and
 /// atol 1e-8.
@@ -128,9 +128,6 @@ pub struct TrajectorySummary {
     pub reference_stopped: Option<String>,
 }
 
-/// Number of starts whose motions are computed together.
-const PART: usize = 64;
-
 impl<S: Integrable> TrajectoryTest<S> {
     /// The paper's pendulum test: 4 starts, `t` in `[0, 100]`, `dt` 0.1, rtol 1e-6, atol 1e-8, on one thread.
     pub fn new(bounds: StartBox, periodic: Vec<bool>) -> Self {
@@ -188,7 +185,7 @@ impl<S: Integrable> TrajectoryTest<S> {
         let (reference, options) = self.options();
         let scale = S::of_f64(self.energy_scale);
         // Part by part, so that an interrupted test keeps the runs of earlier parts.
-        let pairs = starts.chunks(PART).flat_map(|part| {
+        let pairs = starts.chunks(RUNS_AT_ONCE).flat_map(|part| {
             let truths = rollout_many(exact, part, &reference, self.threads);
             let learned = rollout_many(learned, part, &options, self.threads);
             part.iter().zip(truths.into_iter().zip(learned))
@@ -238,8 +235,8 @@ impl<S: Integrable> TrajectoryTest<S> {
 
     /// Options of the Lyapunov estimate: a hundred renormalisations are plenty.
     fn leaps(&self, reference: &RolloutOptions<S>) -> RolloutOptions<S> {
-        let tolerance = S::max(S::of_f64(1e-10), reference.rtol);
-        reference.clone().dt(S::of_f64(self.t_end.abs() / 100.0)).tolerances(tolerance, tolerance)
+        let tolerance = S::max(S::of_f64(SEPARATION_TOLERANCE), reference.rtol);
+        reference.clone().dt(S::of_f64(self.t_end.abs() / RENORMALISATIONS)).tolerances(tolerance, tolerance)
     }
 }
 
@@ -282,17 +279,6 @@ impl<S: Scalar> TrajectoryRun<S> {
     }
 }
 
-/// Samples of a drawn motion.
-const SAMPLES: f64 = 4000.0;
-/// Lyapunov times that are drawn of a chaotic motion, at least and at most.
-const LYAPUNOV_TIMES: (f64, f64) = (4.0, 12.0);
-/// Time span of a portrait over the time of valid prediction, so that it shows how the two motions separate.
-const BEYOND: f64 = 1.3;
-/// Turns of its liveliest coordinate that are drawn of a regular motion: ten swings.
-const TURNS: usize = 20;
-/// Most turns that are drawn of a chaotic motion: weak chaos parts neighbours only after many swings.
-const MOST_TURNS: usize = 40;
-
 /// Exact and learned motion from one start, in the same dense samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Portrait<S> {
@@ -310,10 +296,11 @@ impl<S: Integrable> TrajectoryTest<S> {
         let end = trajectory.t.last().map_or(0.0, |t| t.to_f64());
         match run.chaos() {
             Some(time) => {
-                let until = (BEYOND * run.valid.time).clamp(LYAPUNOV_TIMES.0 * time, LYAPUNOV_TIMES.1 * time);
-                until.min(nth_turn(trajectory, &self.periodic, MOST_TURNS).unwrap_or(end)).min(end)
+                let until = (DRAWN_BEYOND_VALID * run.valid.time)
+                    .clamp(DRAWN_LYAPUNOV_TIMES.0 * time, DRAWN_LYAPUNOV_TIMES.1 * time);
+                until.min(nth_turn(trajectory, &self.periodic, MOST_DRAWN_TURNS).unwrap_or(end)).min(end)
             }
-            None => nth_turn(trajectory, &self.periodic, TURNS).unwrap_or(end).min(end),
+            None => nth_turn(trajectory, &self.periodic, DRAWN_TURNS).unwrap_or(end).min(end),
         }
     }
 
@@ -331,7 +318,7 @@ impl<S: Integrable> TrajectoryTest<S> {
             }
             let (q, v) = truth.state(0);
             let start = [(q.to_vec(), v.to_vec())];
-            let (t_end, dt) = (S::of_f64(until), S::of_f64(until / SAMPLES));
+            let (t_end, dt) = (S::of_f64(until), S::of_f64(until / DRAWN_SAMPLES));
             let dense = |model: &dyn EulerLagrange<S>, options: RolloutOptions<S>| {
                 let options = options.t_end(t_end).dt(dt).energy(false);
                 rollout_many(model, &start, &options, 1).remove(0).trajectory

@@ -8,9 +8,7 @@
 
 use super::prediction::{Predictions, Window};
 use super::statistics::quantile;
-
-/// Times at which the scale is known at most; it is linear between them.
-const KNOTS: usize = 50;
+use super::thresholds::{TIME_ROUNDING, TUBE_KNOTS};
 
 /// Why there is no tube.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -52,7 +50,7 @@ pub struct Tube {
 
 /// Motions that calibrate a tube at least: of fewer, no score is large enough.
 fn calibrating(share: f64) -> usize {
-    (share / (1.0 - share) - 1e-9).ceil().max(1.0) as usize
+    (share / (1.0 - share) - TIME_ROUNDING).ceil().max(1.0) as usize
 }
 
 /// Linear in time between the rows `(times, n)` of `values`; the last one beyond.
@@ -105,7 +103,7 @@ impl Tube {
         };
         let end = windows.iter().filter_map(|window| window.times.last()).fold(0.0, |end: f64, t| end.max(*t));
         let fewest = windows.iter().map(|window| window.times.len()).min().unwrap_or(1);
-        let knots = fewest.clamp(1, KNOTS);
+        let knots = fewest.clamp(1, TUBE_KNOTS);
         let times: Vec<f64> = (0..=knots).map(|k| end * k as f64 / knots as f64).collect();
         let largest = largest_errors(&scaling, n, end / knots as f64, &times);
         let mut scale = Vec::with_capacity(times.len() * n);
@@ -122,7 +120,7 @@ impl Tube {
         let size = |t: f64| between(&times, &scale, n, t);
         let mut scores: Vec<f64> = scored.iter().map(|(window, predicted)| score(window, predicted, n, size)).collect();
         scores.sort_by(f64::total_cmp);
-        let rank = ((scores.len() + 1) as f64 * share - 1e-9).ceil() as usize;
+        let rank = ((scores.len() + 1) as f64 * share - TIME_ROUNDING).ceil() as usize;
         let factor = scores[rank.clamp(1, scores.len()) - 1];
         if !factor.is_finite() {
             return Err(lost());
@@ -149,7 +147,7 @@ fn largest_errors(motions: &[(&Window, &Vec<f64>)], n: usize, step: f64, times: 
         let errors = errors(window, predicted);
         let mut largest: Vec<f64> = Vec::with_capacity(times.len() * n);
         for (k, knot) in times.iter().enumerate() {
-            let reach = step * (1.0 + 1e-9);
+            let reach = step * (1.0 + TIME_ROUNDING);
             let first = window.times.partition_point(|t| *t < knot - reach);
             let end = window.times.partition_point(|t| *t <= knot + reach);
             for i in 0..n {

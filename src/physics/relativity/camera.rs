@@ -2,6 +2,7 @@
 
 use super::coordinates::{Chart, depends_on_time};
 use super::orbits::{along, dot, lower, norm, product, times};
+use super::thresholds::EXAMINED_SPAN;
 use super::{RelativityError, expect};
 use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -108,9 +109,6 @@ pub struct Tetrad {
     camera: Camera,
 }
 
-/// Time of rays that matters, in distances of the camera.
-const SPAN: f64 = 10.0;
-
 impl Tetrad {
     /// The frame of a camera in a metric by Gram-Schmidt orthonormalization: velocity, forward, right, up.
     ///
@@ -123,7 +121,7 @@ impl Tetrad {
         let centre = camera.chart.vector(0.0, times(0.5, camera.chart.space_of(event)));
         let mirrored = camera.chart.vector(0.0, times(-1.0, camera.chart.space_of(event)));
         let points = [event, centre, mirrored].concat();
-        if depends_on_time(model, camera.chart.time, &points, SPAN * camera.distance)? {
+        if depends_on_time(model, camera.chart.time, &points, EXAMINED_SPAN * camera.distance)? {
             return Err(RelativityError::DependsOnTime);
         }
         let mut terms = Terms::default();

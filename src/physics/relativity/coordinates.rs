@@ -3,6 +3,7 @@
 
 use super::RelativityError;
 use super::orbits::directions;
+use super::thresholds::{COMPARED_TIMES, INFLUENCE_POINTS, LEAST_INFLUENCE, TIME_ROUNDING};
 use crate::geometry::{Equator, Turn, TurningPoint};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms, acting_groups};
 use std::f64::consts::FRAC_PI_2;
@@ -287,14 +288,10 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
     }
 }
 
-/// Share of an acceleration up to which an influence may be an error of a learned metric.
-const APART: f64 = 0.05;
-
 /// `true` if the time and the spatial coordinates of a metric do not act on each other, as in `-c dt^2 + h`. Motion then leaves the unit of
 /// time relative to that of length open, and with it every impact parameter. States within a `distance` from the centre are examined.
 pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: f64) -> bool {
-    const POINTS: usize = 128;
-    let q = CentralCoordinates::Cartesian(chart).points(POINTS, (0.3 * distance, distance));
+    let q = CentralCoordinates::Cartesian(chart).points(INFLUENCE_POINTS, (0.3 * distance, distance));
     let v: Vec<f64> = (0..q.len()).map(|k| (1.0 + 2.4 * k as f64).cos()).collect();
     let accelerations = |q: &[f64], v: &[f64]| {
         let mut terms = Terms::default();
@@ -306,14 +303,9 @@ pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: 
     let finite = own.chunks_exact(4).filter(|a| a.iter().all(|a| a.is_finite()));
     let (sum, count) =
         finite.fold((0.0, 0.0), |(sum, count), a| (sum + a.iter().map(|a| a * a).sum::<f64>(), count + 4.0));
-    let noise = APART * f64::sqrt(sum / count);
+    let noise = LEAST_INFLUENCE * f64::sqrt(sum / count);
     acting_groups(4, (&q, &v), &accelerations, &[noise; 4]).contains(&vec![chart.time])
 }
-
-/// Later and earlier times at which a metric is compared, as shares of the relevant span.
-const TIMES: [f64; 3] = [0.31, -0.57, 1.0];
-/// Differences of the components up to this, relative to the largest of them, are rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// `true` if the metric at some point changes with time: by a span of time, or a part of it, later or earlier. `points` are `(points, n)`,
 /// `time` is the index of the time.
@@ -331,9 +323,9 @@ pub fn depends_on_time(
     let mut velocity = vec![0.0; n];
     velocity[time] = 1.0;
     for point in points.chunks_exact(n) {
-        let mut q = point.repeat(1 + TIMES.len());
-        q.iter_mut().skip(n + time).step_by(n).zip(TIMES).for_each(|(t, part)| *t += part * span);
-        match model.terms(&q, &velocity.repeat(1 + TIMES.len()), Request::MASS_MATRIX, &mut terms) {
+        let mut q = point.repeat(1 + COMPARED_TIMES.len());
+        q.iter_mut().skip(n + time).step_by(n).zip(COMPARED_TIMES).for_each(|(t, part)| *t += part * span);
+        match model.terms(&q, &velocity.repeat(1 + COMPARED_TIMES.len()), Request::MASS_MATRIX, &mut terms) {
             Ok(()) | Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -341,7 +333,7 @@ pub fn depends_on_time(
         let metrics = || terms.mass_matrix.chunks_exact(n * n);
         let Some(one) = metrics().find(|g| g.iter().all(|g| g.is_finite())) else { continue };
         let most = one.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-        let differs = |(g, one): (&f64, &f64)| (g - one).is_nan() || (g - one).abs() > ROUNDING * most;
+        let differs = |(g, one): (&f64, &f64)| (g - one).is_nan() || (g - one).abs() > TIME_ROUNDING * most;
         if metrics().any(|g| g.iter().zip(one).any(differs)) {
             return Ok(true);
         }

@@ -31,6 +31,7 @@ mod readings;
 mod says;
 mod shadow;
 mod sky;
+mod thresholds;
 mod two_sided;
 
 pub use camera::{Camera, Observer};
@@ -48,8 +49,8 @@ pub use two_sided::TwoSided;
 pub use {
     coordinates::{depends_on_time, time_moves_alone},
     orbits::orbits,
-    rays::TOLERANCES,
     sky::difference_image,
+    thresholds::TOLERANCES,
 };
 
 use crate::geometry::GeometryError;

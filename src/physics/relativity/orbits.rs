@@ -2,19 +2,16 @@
 //! free fall through a horizon.
 
 use super::CentralCoordinates;
+use super::thresholds::{
+    CROSSING_STEPS, CROSSING_VALUE, ECCENTRICITIES, ELLIPSE_RECTUM, MOTION_STEPS, MOTION_TOLERANCE, PLUNGE_VELOCITY,
+    REACHED_APASTRON, WHIRL_EXCESS, WHIRL_HALVINGS,
+};
 use crate::geometry::{GeometryError, Sense, characters};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::Inertia;
 use crate::rollout::{Integrator, RolloutError, RolloutOptions, rollout, rollout_in_pieces};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
-
-/// Local error of the motions that are followed.
-const TOLERANCE: f64 = 1e-11;
-/// Largest number of steps of a motion: many times what an orbit takes.
-const STEPS: usize = 50_000;
-/// Largest number of steps of the search between two samples.
-const REFINEMENTS: usize = 60;
 
 /// State of a motion at a time.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,8 +25,8 @@ pub(super) struct MotionState {
 pub(super) fn options(t_end: f64, dt: f64) -> RolloutOptions<f64> {
     RolloutOptions::new(t_end, dt)
         .method(Integrator::Dop853)
-        .tolerances(TOLERANCE, TOLERANCE)
-        .max_steps(STEPS)
+        .tolerances(MOTION_TOLERANCE, MOTION_TOLERANCE)
+        .max_steps(MOTION_STEPS)
         .energy(false)
 }
 
@@ -71,7 +68,7 @@ pub(super) fn zero(
     let (mut low, mut high) = ((0.0, of(from)), (to.t - from.t, of(to)));
     let mut best = to.clone();
     let mut kept = 0_i32;
-    for _ in 0..REFINEMENTS {
+    for _ in 0..CROSSING_STEPS {
         let step = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
         let span = high.0 - low.0;
         if !(step > low.0 && step < high.0 && span > f64::EPSILON * to.t.abs()) {
@@ -98,7 +95,9 @@ pub(super) fn zero(
             }
             kept = -1;
         }
-        if (high.0 - low.0) < TOLERANCE * to.t.abs() || value.abs() < TOLERANCE * (low.1.abs() + high.1.abs()) * 1e-3 {
+        if (high.0 - low.0) < MOTION_TOLERANCE * to.t.abs()
+            || value.abs() < MOTION_TOLERANCE * (low.1.abs() + high.1.abs()) * CROSSING_VALUE
+        {
             break;
         }
     }
@@ -165,15 +164,6 @@ pub struct Orbit {
     pub inner: f64,
 }
 
-/// Eccentricity of the ellipse, and of the whirl.
-const ECCENTRICITY: [f64; 2] = [0.5, 0.7];
-/// Semilatus rectum of the ellipse over the mass.
-const ELLIPSE: f64 = 12.0;
-/// Halvings of the search for the last orbit that comes back.
-const HALVINGS: usize = 24;
-/// Relative excess of the whirl over the semilatus rectum of that orbit.
-const EXCESS: f64 = 3e-3;
-
 /// The orbits of a hole of mass `mass`, whose metric is known down to the distance `inner`; orbits that it does not have are left out.
 ///
 /// # Errors
@@ -195,8 +185,8 @@ pub fn orbits(
         Ok(turning.map(|turning| (around.turning(near, &turning), kepler(0.5 * (near + far)))))
     };
     let mut found = Vec::new();
-    let [ellipse, whirl] = ECCENTRICITY;
-    if let Some(([q, v], period)) = bound(ELLIPSE, ellipse)? {
+    let [ellipse, whirl] = ECCENTRICITIES;
+    if let Some(([q, v], period)) = bound(ELLIPSE_RECTUM, ellipse)? {
         let (t_end, dt) = (5.0 * period, period / 200.0);
         found.push(Orbit { title: "Precessing ellipse", q, v, t_end, dt, inner });
     }
@@ -204,12 +194,13 @@ pub fn orbits(
         let Some(([q, v], period)) = bound(p, whirl)? else { return Ok(false) };
         let far = p / (1.0 - whirl) * mass;
         // Motion that starts inside the last orbit turns around elsewhere, or not at all.
-        let reaches =
-            passing(model, (&q, &v), (2.0 * period, period / 400.0), |state| around.distance(&state.q) > 0.99 * far);
+        let reaches = passing(model, (&q, &v), (2.0 * period, period / 400.0), |state| {
+            around.distance(&state.q) > REACHED_APASTRON * far
+        });
         Ok(reaches.is_some() && radial_period(model, (&q, &v), around, (4.0 * period, period / 400.0)).is_some())
     };
-    let (mut low, mut high) = (1.0, ELLIPSE);
-    for _ in 0..HALVINGS {
+    let (mut low, mut high) = (1.0, ELLIPSE_RECTUM);
+    for _ in 0..WHIRL_HALVINGS {
         let middle = 0.5 * (low + high);
         if comes_back(middle)? {
             high = middle;
@@ -217,13 +208,13 @@ pub fn orbits(
             low = middle;
         }
     }
-    if let Some(([q, v], period)) = bound(high * (1.0 + EXCESS), whirl)? {
+    if let Some(([q, v], period)) = bound(high * (1.0 + WHIRL_EXCESS), whirl)? {
         found.push(Orbit { title: "Zoom and whirl", q, v, t_end: 2.2 * period, dt: period / 600.0, inner });
     }
     // At 10 M, with a fraction of the circular velocity: too slow to stay.
     let place = 10.0 * mass;
     let circle = equator.at(place)?;
-    if let Some(w) = circle.angular_velocity(Sense::Forward).map(|w| 0.6 * w) {
+    if let Some(w) = circle.angular_velocity(Sense::Forward).map(|w| PLUNGE_VELOCITY * w) {
         let [tt, tp, pp] = circle.value;
         let time_rate = (-(tt + (tp + tp + pp * w) * w)).sqrt().recip();
         let turning = crate::geometry::TurningPoint {

@@ -5,6 +5,10 @@
 use super::camera::Camera;
 use super::coordinates::Chart;
 use super::orbits::{along, dot, norm, times};
+use super::thresholds::{
+    BEYOND_SKY, BLOCK_SIZES, FIRST_RAY_STEP, LONGEST_RAY_STEP, RAY_BLOCKS, SHORTEST_RAY_STEP, STEP_CHANGES,
+    STEP_SAFETY, TOLERANCES,
+};
 use super::two_sided::beyond;
 use super::{RelativityError, expect};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
@@ -44,9 +48,6 @@ pub struct Ray {
     /// `g(k, k)` at the end over the sum of the sizes of its terms; 0 of a light ray.
     pub drift: f64,
 }
-
-/// Least and largest tolerance of a step.
-pub const TOLERANCES: (f64, f64) = (1e-12, 0.01);
 
 /// Choices of ray tracing.
 ///
@@ -101,17 +102,6 @@ impl Tracing {
     }
 }
 
-/// Parts that rays are cut into, whatever the number of threads, and the bounds of their size: one call of a model is for that many.
-const BLOCKS: (usize, usize, usize) = (8, 32, 1024);
-/// First step and longest step over the distance from the centre.
-const STEP: (f64, f64) = (0.2, 1.0);
-/// Smallest step over the distance from the centre.
-const LEAST: f64 = 1e-12;
-/// Safety factor of a step, and the bounds of its change.
-const SAFETY: (f64, f64, f64) = (0.9, 0.2, 5.0);
-/// Distance beyond the sky to which a step may lead, over that of the sky.
-const BEYOND: f64 = 1e-3;
-
 /// Follows rays from events with tangents `k`, `(4)` each, along which the affine parameter grows; the order is kept.
 ///
 /// `progress` receives the number of rays of every finished block, from any thread. Rays that had not ended when the model was interrupted
@@ -140,7 +130,7 @@ pub(super) fn trace_each(
 ) -> Result<Vec<Ray>, RelativityError> {
     tracing.check()?;
     chart.check(model.coordinates())?;
-    let block = count.div_ceil(BLOCKS.0).clamp(BLOCKS.1, BLOCKS.2);
+    let block = count.div_ceil(RAY_BLOCKS).clamp(BLOCK_SIZES.0, BLOCK_SIZES.1);
     let blocks: Vec<usize> = (0..count).step_by(block).collect();
     let traced = in_order(&blocks, tracing.threads, |&first| {
         let starts: Vec<_> = (first..count.min(first + block)).map(start).collect();
@@ -224,7 +214,7 @@ impl Batch<'_> {
         let mut moving: Vec<Moving> = Vec::with_capacity(starts.len());
         for (index, ((&q, &k), &a)) in q.iter().zip(&k).zip(&slopes[0]).enumerate() {
             let distance = norm(self.chart.space_of(q));
-            let step = STEP.0 * distance / norm(self.chart.space_of(k));
+            let step = FIRST_RAY_STEP * distance / norm(self.chart.space_of(k));
             moving.push(Moving { index, q, k, a, step, size: norm(k), steps: 0, refused: false });
         }
         self.sort_out(&mut moving, ended);
@@ -260,13 +250,13 @@ impl Batch<'_> {
                 let error =
                     (norm(self.chart.space_of(place)) / distance).max(norm(tangent) / size) / self.tracing.tolerance;
                 let fine = error.is_finite() && distance.is_finite() && size.is_finite();
-                let change = if fine { SAFETY.0 * error.powf(-0.2) } else { SAFETY.1 };
+                let change = if fine { STEP_SAFETY * error.powf(-0.2) } else { STEP_CHANGES.0 };
                 ray.steps += 1;
                 if fine && error <= 1.0 {
                     (ray.q, ray.k, ray.a) = (places[at], k[at], slopes[STAGES - 1][at]);
-                    ray.step *= change.clamp(SAFETY.1, if ray.refused { 1.0 } else { SAFETY.2 });
+                    ray.step *= change.clamp(STEP_CHANGES.0, if ray.refused { 1.0 } else { STEP_CHANGES.1 });
                 } else {
-                    ray.step *= change.clamp(SAFETY.1, SAFETY.0);
+                    ray.step *= change.clamp(STEP_CHANGES.0, STEP_SAFETY);
                 }
                 ray.refused = !(fine && error <= 1.0);
             }
@@ -281,8 +271,9 @@ impl Batch<'_> {
         let (distance, speed, far) = (norm(place), norm(tangent), self.tracing.far);
         let toward = dot(place, tangent) / speed;
         let room = toward * toward + far * far - distance * distance;
-        let most = if distance < far { (room.sqrt() - toward) * (1.0 + BEYOND) + BEYOND * far } else { f64::INFINITY };
-        most.min(STEP.1 * distance) / speed
+        let most =
+            if distance < far { (room.sqrt() - toward) * (1.0 + BEYOND_SKY) + BEYOND_SKY * far } else { f64::INFINITY };
+        most.min(LONGEST_RAY_STEP * distance) / speed
     }
 
     /// Moves the rays that have ended from `moving` to `ended`.
@@ -307,8 +298,9 @@ impl Batch<'_> {
         if distance <= self.tracing.second && dot(place, tangent) < 0.0 {
             return Some(RayOutcome::Crossed(beyond(place, tangent)));
         }
-        let stuck =
-            ray.step * speed < LEAST * distance || !ray.step.is_finite() || ray.a.iter().any(|a| !a.is_finite());
+        let stuck = ray.step * speed < SHORTEST_RAY_STEP * distance
+            || !ray.step.is_finite()
+            || ray.a.iter().any(|a| !a.is_finite());
         (stuck || ray.steps >= self.tracing.most_steps).then_some(RayOutcome::Unfinished)
     }
 

@@ -3,6 +3,12 @@
 
 use super::coordinates::Spheroidal;
 use super::orbits::{infall, passing, radial_period};
+use super::thresholds::{
+    ADVANCE_TARGET, BOUND_ORBITS, DRIFT_TARGET, FIRST_DAMPING, FIRST_PARAMETERS, HORIZON_TARGET, INFALL_TARGET,
+    KRETSCHMANN_TARGET, LAST_PARAMETER_STEP, LIGHT_ORBIT_TARGETS, MASS_DISTANCE, METRIC_POINTS, METRIC_TARGETS,
+    MOST_DAMPING, NO_SPIN, PARAMETER_DIFFERENCE, PARAMETER_STEPS, PERIOD_SAMPLES, RICCI_TARGET, STABLE_ORBIT_TARGETS,
+    VACUUM,
+};
 use super::{CentralCoordinates, Chart};
 use crate::analysis::{conserved_change, mass_matrix_error, matrices_at_rest, nearest_factor};
 use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
@@ -43,16 +49,6 @@ pub struct LearnedHole<'a> {
     pub range: (f64, f64),
 }
 
-/// Points of the deviation of the metric.
-const POINTS: usize = 4000;
-/// Distance at which the mass is read, where only its attraction remains.
-const FAR: f64 = 1e6;
-/// Semilatus rectum over mass, and eccentricity, of bound orbits.
-const ORBITS: [(f64, f64); 8] =
-    [(8.0, 0.2), (8.0, 0.5), (15.0, 0.2), (15.0, 0.5), (30.0, 0.2), (30.0, 0.5), (50.0, 0.2), (50.0, 0.5)];
-/// Samples of a radial period.
-const SAMPLES: f64 = 400.0;
-
 impl LearnedHole<'_> {
     fn reading(quantity: impl Into<String>, exact: Option<f64>, learned: Option<f64>, aim: f64) -> Option<Reading> {
         let exact = exact?;
@@ -79,8 +75,8 @@ impl LearnedHole<'_> {
     /// Those of the exact metric.
     pub fn mass(&self) -> Result<f64, GeometryError> {
         let origin = self.around.origin();
-        let metric = self.around.equator(self.exact, &origin).at(FAR)?;
-        Ok(-0.5 * metric.first[0] * FAR * FAR)
+        let metric = self.around.equator(self.exact, &origin).at(MASS_DISTANCE)?;
+        Ok(-0.5 * metric.first[0] * MASS_DISTANCE * MASS_DISTANCE)
     }
 
     /// All quantities that can be read, with lengths in units of the mass.
@@ -107,11 +103,11 @@ impl LearnedHole<'_> {
 
     /// The error of the metric, and the factor that brings the learned one closest.
     fn metric(&self, mass: f64, all: &mut Vec<Reading>) -> f64 {
-        let points = self.around.points(POINTS, self.within(mass, (1.5, 20.0)));
+        let points = self.around.points(METRIC_POINTS, self.within(mass, (1.5, 20.0)));
         let found = mass_matrix_error(self.exact, self.learned, &points);
         let error = Some(found.error).filter(|error| error.failed == 0);
-        all.push(Self::error("metric, R from 1.5 to 20 M, median", error.map(|error| error.median), 2e-4));
-        all.push(Self::error("metric, R from 1.5 to 20 M, 99 %", error.map(|error| error.p99), 3e-3));
+        all.push(Self::error("metric, R from 1.5 to 20 M, median", error.map(|error| error.median), METRIC_TARGETS[0]));
+        all.push(Self::error("metric, R from 1.5 to 20 M, 99 %", error.map(|error| error.p99), METRIC_TARGETS[1]));
         found.factor
     }
 
@@ -125,8 +121,8 @@ impl LearnedHole<'_> {
         let spins = senses.len() > 1;
         let radius = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.radius / mass);
         let impact = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.impact_parameter() / mass);
-        let stable_aim = if spins { 3e-3 } else { 1e-3 };
-        let light_aim = if spins { 1e-3 } else { 5e-4 };
+        let [stable_aim, light_aim] =
+            [STABLE_ORBIT_TARGETS, LIGHT_ORBIT_TARGETS].map(|targets| targets[usize::from(spins)]);
         for &(sense, suffix) in senses {
             let stable = |model: &dyn EulerLagrange<f64>| {
                 self.around.equator(model, &origin).innermost_stable(range, sense).map(radius)
@@ -145,12 +141,12 @@ impl LearnedHole<'_> {
         let through = self.within(mass, (1.25, 20.0));
         let (exact, learned) = self.both(|model| self.around.equator(model, &origin).horizon(through))?;
         let scaled = |radius: Option<f64>| radius.map(|radius| radius / mass);
-        all.extend(Self::reading("horizon [M]", scaled(exact), scaled(learned.flatten()), 5e-3));
+        all.extend(Self::reading("horizon [M]", scaled(exact), scaled(learned.flatten()), HORIZON_TARGET));
         if spins {
             let (exact, learned) = self.both(|model| self.around.equator(model, &origin).ergosurface(through))?;
-            all.extend(Self::reading("ergosurface [M]", scaled(exact), scaled(learned.flatten()), 5e-3));
+            all.extend(Self::reading("ergosurface [M]", scaled(exact), scaled(learned.flatten()), HORIZON_TARGET));
             let learned = learned_turns.map(|turns| turns * mass);
-            all.extend(Self::reading("frame dragging at 4 M [1/M]", Some(turns * mass), learned, 5e-3));
+            all.extend(Self::reading("frame dragging at 4 M [1/M]", Some(turns * mass), learned, HORIZON_TARGET));
         }
         Ok(())
     }
@@ -159,7 +155,7 @@ impl LearnedHole<'_> {
     fn senses(&self, mass: f64) -> Result<&'static [(Sense, &'static str)], GeometryError> {
         let origin = self.around.origin();
         let turns = self.around.equator(self.exact, &origin).at(4.0 * mass)?.dragging();
-        let spins = turns.abs() > 1e-12 / mass;
+        let spins = turns.abs() > NO_SPIN / mass;
         Ok(if spins {
             &[(Sense::Forward, ", forward"), (Sense::Backward, ", backward")]
         } else {
@@ -171,7 +167,7 @@ impl LearnedHole<'_> {
         let origin = self.around.origin();
         let exact = self.around.equator(self.exact, &origin);
         for &(sense, suffix) in self.senses(mass)? {
-            for (p, e) in ORBITS {
+            for (p, e) in BOUND_ORBITS {
                 let (near, far) = (p / (1.0 + e) * mass, p / (1.0 - e) * mass);
                 if near < self.range.0 {
                     continue;
@@ -180,13 +176,13 @@ impl LearnedHole<'_> {
                 let [q, v] = self.around.turning(near, &turning);
                 let kepler = TAU * (0.5 * (near + far)).powf(1.5) / mass.sqrt();
                 let advance = |model: &dyn EulerLagrange<f64>| {
-                    let found = radial_period(model, (&q, &v), self.around, (4.0 * kepler, kepler / SAMPLES))?;
+                    let found = radial_period(model, (&q, &v), self.around, (4.0 * kepler, kepler / PERIOD_SAMPLES))?;
                     Some(found.advance)
                 };
                 // Orbits that fall in or turn elsewhere do not lie between the two.
                 let Some(truth) = advance(self.exact).filter(|advance| *advance > 0.0) else { continue };
                 let name = format!("periastron advance, p = {p} M, e = {e}{suffix} [rad]");
-                all.extend(Self::reading(name, Some(truth), advance(self.learned), 2e-3));
+                all.extend(Self::reading(name, Some(truth), advance(self.learned), ADVANCE_TARGET));
             }
         }
         Ok(())
@@ -205,28 +201,32 @@ impl LearnedHole<'_> {
         let (truth, learned) = (fall(self.exact), fall(self.learned));
         let kept = learned.filter(|fall| fall.keeps_signature).map(|fall| fall.time / mass);
         let name = "infall from rest at 10 M to 1.5 M, signature kept: proper time [M]";
-        all.extend(Self::reading(name, truth.map(|fall| fall.time / mass), kept, 1e-3));
+        all.extend(Self::reading(name, truth.map(|fall| fall.time / mass), kept, INFALL_TARGET));
         // An inclined bound orbit, between 10 and 14 M without a spin: far from whirling orbits, which multiply every error.
         let (q, mut v) = (self.around.place(10.0 * mass, [1.0, 0.0, 0.0]), [0.0; 4]);
         if let CentralCoordinates::Cartesian(Chart { space: [_, y, z], .. }) = self.around {
             (v[y], v[z]) = (0.28, 0.28);
             if self.system.impose_constraint(&q, &mut v).is_ok() {
                 let drift = conserved_drift(self.system, self.learned, (&q, &v), (1000.0 * mass, mass));
-                all.push(Self::error("conserved quantities along an inclined orbit, drift until 1000 M", drift, 1e-4));
+                all.push(Self::error(
+                    "conserved quantities along an inclined orbit, drift until 1000 M",
+                    drift,
+                    DRIFT_TARGET,
+                ));
             }
         }
     }
 
     fn parameters(&self, mass: f64, all: &mut Vec<Reading>) {
-        let points = self.around.points(POINTS / 8, self.within(mass, (1.5, 20.0)));
+        let points = self.around.points(METRIC_POINTS / 8, self.within(mass, (1.5, 20.0)));
         let symbols = self.system.system.parameters.iter().map(|p| p.symbol.to_string());
         let exact: Vec<(String, f64)> = symbols.zip(self.system.parameters.iter().copied()).collect();
         // From values that are far off.
-        let start = exact.iter().map(|(symbol, value)| (symbol.clone(), 0.6 * value)).collect();
+        let start = exact.iter().map(|(symbol, value)| (symbol.clone(), FIRST_PARAMETERS * value)).collect();
         let found = nearest_parameters(self.system, self.learned, &points, &start);
         for (symbol, value) in exact.into_iter().filter(|(_, value)| *value != 0.0) {
             let learned = found.as_ref().and_then(|found| found.get(&symbol).copied());
-            all.extend(Self::reading(format!("parameter {symbol}"), Some(value), learned, 5e-3));
+            all.extend(Self::reading(format!("parameter {symbol}"), Some(value), learned, HORIZON_TARGET));
         }
     }
 
@@ -238,12 +238,13 @@ impl LearnedHole<'_> {
             let of = |model| geometries(model, &points, &rest)?.into_iter().collect::<Result<Vec<_>, _>>();
             let (exact, learned) = (of(self.exact)?, of(self.learned).ok());
             let largest = |errors: &mut dyn Iterator<Item = f64>| errors.fold(0.0, f64::max);
-            let vacuum = exact.iter().all(|point| size(&point.curvature.ricci) < 1e-6 * size(&point.curvature.riemann));
+            let vacuum =
+                exact.iter().all(|point| size(&point.curvature.ricci) < VACUUM * size(&point.curvature.riemann));
             if vacuum {
                 let share = learned.as_ref().map(|learned| {
                     largest(&mut learned.iter().map(|p| size(&p.curvature.ricci) / size(&p.curvature.riemann)))
                 });
-                all.push(Self::error(format!("Ricci over Riemann at {distance} M, largest"), share, 1e-2));
+                all.push(Self::error(format!("Ricci over Riemann at {distance} M, largest"), share, RICCI_TARGET));
             }
             // Around a spin it passes through zero.
             let size = largest(&mut exact.iter().map(|point| point.curvature.kretschmann.abs()));
@@ -255,7 +256,7 @@ impl LearnedHole<'_> {
             all.push(Self::error(
                 format!("Kretschmann's scalar at {distance} M over its largest, largest error"),
                 error,
-                2e-2,
+                KRETSCHMANN_TARGET,
             ));
         }
         Ok(())
@@ -319,11 +320,6 @@ impl LearnedHole<'_> {
     }
 }
 
-/// Largest number of Levenberg-Marquardt steps.
-const STEPS: usize = 60;
-/// Relative change of a parameter for difference quotients; the result does not depend on it.
-const DIFFERENCE: f64 = 1e-5;
-
 /// Values by symbol.
 type Values = BTreeMap<String, f64>;
 
@@ -361,11 +357,11 @@ pub fn nearest_parameters(
     let of = |values: &Values| residuals(system, values, &learned, points);
     let (mut values, symbols) = (start.clone(), start.keys().cloned().collect::<Vec<_>>());
     let (mut now, count) = (of(&values)?, symbols.len());
-    let (mut damping, mut workspace) = (1e-3, Workspace::default());
-    for _ in 0..STEPS {
+    let (mut damping, mut workspace) = (FIRST_DAMPING, Workspace::default());
+    for _ in 0..PARAMETER_STEPS {
         let mut columns = Vec::with_capacity(count);
         for symbol in &symbols {
-            let step = DIFFERENCE * (1.0 + values[symbol].abs());
+            let step = PARAMETER_DIFFERENCE * (1.0 + values[symbol].abs());
             let moved = |by: f64| {
                 let mut values = values.clone();
                 values.entry(symbol.clone()).and_modify(|x| *x += by);
@@ -382,12 +378,15 @@ pub fn nearest_parameters(
         solve(count, &normal, &down, &mut step, &mut workspace).ok()?;
         let mut trial = values.clone();
         symbols.iter().zip(&step).for_each(|(symbol, step)| *trial.entry(symbol.clone()).or_default() += step);
-        let small = symbols.iter().zip(&step).all(|(symbol, step)| step.abs() < 1e-12 * (1.0 + values[symbol].abs()));
+        let small = symbols
+            .iter()
+            .zip(&step)
+            .all(|(symbol, step)| step.abs() < LAST_PARAMETER_STEP * (1.0 + values[symbol].abs()));
         match of(&trial).filter(|then| square(then) <= square(&now)) {
             Some(then) => (values, now, damping) = (trial, then, damping * 0.1),
             None => damping *= 10.0,
         }
-        if small || damping > 1e12 {
+        if small || damping > MOST_DAMPING {
             break;
         }
     }

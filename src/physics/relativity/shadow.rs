@@ -2,7 +2,8 @@
 
 use super::camera::{Camera, Tetrad};
 use super::orbits::{dot, norm};
-use super::rays::{Ray, RayOutcome, TOLERANCES, Tracing, trace, trace_each};
+use super::rays::{Ray, RayOutcome, Tracing, trace, trace_each};
+use super::thresholds::{EDGE_HALVINGS, EDGE_TOLERANCE, TOLERANCES};
 use super::{RelativityError, expect};
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::{PI, TAU};
@@ -174,11 +175,6 @@ impl Outline {
     }
 }
 
-/// Halvings of the angle from 0 to pi.
-const HALVINGS: usize = 30;
-/// Tolerance of a step for the edge, over that for a picture.
-const FINER: f64 = 0.01;
-
 /// Finds the edge of the shadow, or of the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the
 /// error of rays a hundred times as accurate as those of a picture; `None` if the ray of the centre is not captured.
 ///
@@ -195,7 +191,7 @@ pub fn outline(
     expect(directions > 0, "directions", "at least 1", directions as f64)?;
     let tetrad = Tetrad::new(model, camera)?;
     let count = directions.next_multiple_of(4);
-    let tracing = Tracing { tolerance: (FINER * tracing.tolerance).max(TOLERANCES.0), ..*tracing };
+    let tracing = Tracing { tolerance: (EDGE_TOLERANCE * tracing.tolerance).max(TOLERANCES.0), ..*tracing };
     let toward = |k: usize, angle: f64| {
         let ((sin, cos), (up, right)) = (angle.sin_cos(), (TAU * k as f64 / count as f64).sin_cos());
         tetrad.ray([sin * right, sin * up, cos])
@@ -209,7 +205,7 @@ pub fn outline(
         return Ok(None);
     }
     let mut brackets = vec![(0.0, PI); count];
-    for _ in 0..HALVINGS {
+    for _ in 0..EDGE_HALVINGS {
         let middles: Vec<f64> = brackets.iter().map(|(low, high)| 0.5 * (low + high)).collect();
         let inside = captured(middles.iter().enumerate().map(|(k, &angle)| toward(k, angle)).collect())?;
         for ((bracket, middle), inside) in brackets.iter_mut().zip(middles).zip(inside) {

@@ -2,6 +2,7 @@
 
 use super::RelativityError;
 use super::orbits::{along, dot, norm, times};
+use super::thresholds::{EXAMINED_PLACES, LEAST_AXIS_SINE, MOST_AREA_DEVIATION};
 use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use std::f64::consts::FRAC_PI_2;
@@ -23,14 +24,6 @@ pub struct TwoSided<M> {
     scale: f64,
 }
 
-/// Smallest sine of the angle from the axis, where the angle about it is not determined: a state closer to the axis is turned away to this
-/// angle, and its acceleration is turned back.
-const AXIS: f64 = 1e-6;
-/// Deviation of the area of distant spheres from that of flat space.
-const FLAT: f64 = 0.1;
-/// Places on either side at which the metric is examined, each half as far out as the one before.
-const PLACES: i32 = 40;
-
 /// A place: `rho`, directions along `l`, `theta` and `phi`, the sine and the cosine of `theta`, and the coordinates.
 struct Place {
     rho: f64,
@@ -50,10 +43,10 @@ impl<M: EulerLagrange<f64>> TwoSided<M> {
     pub fn new(model: M, time: usize, space: [usize; 3], scale: f64, far: f64) -> Result<Self, RelativityError> {
         super::Chart { time, space }.check(model.coordinates())?;
         let sided = Self { model, time, space, scale };
-        let outward = (0..PLACES).map(|k| far * 0.5_f64.powi(k));
+        let outward = (0..EXAMINED_PLACES).map(|k| far * 0.5_f64.powi(k));
         for radius in outward.flat_map(|l| [l, -l]).chain([0.0]) {
             let area = sided.area_radius(radius)?;
-            if radius.abs() == far && (area / far - 1.0).abs() > FLAT {
+            if radius.abs() == far && (area / far - 1.0).abs() > MOST_AREA_DEVIATION {
                 return Err(RelativityError::OneSided { radius });
             }
         }
@@ -88,8 +81,8 @@ impl<M: EulerLagrange<f64>> TwoSided<M> {
         let (mut sine, mut cosine) = (across / rho, x[2] / rho);
         let (sin, cos) = x[1].atan2(x[0]).sin_cos();
         let legs = [[sine * cos, sine * sin, cosine], [cosine * cos, cosine * sin, -sine], [-sin, cos, 0.0]];
-        if sine < AXIS {
-            (sine, cosine) = (AXIS, cosine.signum());
+        if sine < LEAST_AXIS_SINE {
+            (sine, cosine) = (LEAST_AXIS_SINE, cosine.signum());
         }
         Place {
             rho,

@@ -3,6 +3,10 @@
 use super::basis::{Basis, Values};
 use super::null_space::{Orthonormal, add, dot, orthonormal};
 use super::sample::Sample;
+use super::thresholds::{
+    CLOSURE_NOISE, CLOSURES, COMMUTATOR_PRODUCTS, COMMUTATOR_STATES, CONSTANT_NOISE, INDEPENDENT_AXIS,
+    LEAST_CONSTANT_NOISE, MOST_NAMED_DIMENSION, SQUARE_ROUNDING,
+};
 use super::{Field, SymmetryError};
 use crate::linalg::{MatMut, MatRef, Workspace, eigenvalues, gemm, inverse, singular};
 use serde::Serialize;
@@ -26,19 +30,14 @@ pub struct Algebra {
     pub name: Option<String>,
 }
 
-/// Largest number of fields whose algebra is computed: beyond, their commutators take minutes.
-pub const MOST_FIELDS: usize = 200;
-/// Largest number of states at which commutators are computed, and of products of numbers, which take seconds.
-const STATES: (usize, usize) = (400, 10_000_000_000);
-
 impl Algebra {
     /// The algebra of fields whose coefficients have this relative noise.
     pub(crate) fn new(sample: &Sample, basis: &Basis, fields: &[Field], noise: f64) -> Result<Self, SymmetryError> {
         let (n, m) = (sample.n, fields.len());
         let pairs: Vec<(usize, usize)> = (0..m).flat_map(|a| (a + 1..m).map(move |b| (a, b))).collect();
         // Each state has n equations for m unknown coefficients of every commutator.
-        let (few, worth) = (4 * m / n + 1, STATES.1 / (pairs.len() * n * m).max(1));
-        let at_states = vectors(sample, basis, fields, few.max(worth.min(STATES.0)));
+        let (few, worth) = (4 * m / n + 1, COMMUTATOR_PRODUCTS / (pairs.len() * n * m).max(1));
+        let at_states = vectors(sample, basis, fields, few.max(worth.min(COMMUTATOR_STATES)));
         let states = at_states.len();
         let mean = |a: usize| at_states.iter().map(|at| dot(&at.vectors[a], &at.vectors[a])).sum::<f64>();
         let lengths: Vec<f64> =
@@ -80,15 +79,19 @@ impl Algebra {
             let x: Vec<f64> = x.iter().enumerate().map(|(c, x)| x * scale(c)).collect();
             let largest = x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             for c in 0..m {
-                let value = if x[c].abs() <= (10.0 * noise).max(1e-7) * largest.max(1.0) { 0.0 } else { x[c] };
+                let value = if x[c].abs() <= (CONSTANT_NOISE * noise).max(LEAST_CONSTANT_NOISE) * largest.max(1.0) {
+                    0.0
+                } else {
+                    x[c]
+                };
                 constants[a][b][c] = value;
                 constants[b][a][c] = -value;
             }
         }
         // A difference of squares has only half of the digits.
-        let rest = if rest > 1e-12 * squares.iter().sum::<f64>() { rest } else { 0.0 };
+        let rest = if rest > SQUARE_ROUNDING * squares.iter().sum::<f64>() { rest } else { 0.0 };
         let closure = (rest / states as f64).sqrt();
-        let tolerance = (30.0 * noise).clamp(1e-6, 0.1);
+        let tolerance = (CLOSURE_NOISE * noise).clamp(CLOSURES.0, CLOSURES.1);
         let closes = closure <= tolerance;
         Ok(Self {
             closure,
@@ -171,9 +174,6 @@ const SEMISIMPLE: [(usize, usize, &str); 13] = [
     (4, 6, "so(3,2)"),
 ];
 
-/// Largest dimension of an algebra that is identified: named ones are far smaller.
-const MOST: usize = 64;
-
 /// Name of the algebra with these constants, known to `tolerance`; `None` if it cannot be identified.
 ///
 /// Abelian, semisimple (of dimension 3, 6, 8, 9, 10), Euclidean `e(n)` and pseudo-Euclidean `iso(p,q)`, `n` from 2 to 5, the solvable
@@ -187,7 +187,7 @@ pub(crate) fn name(c: &Constants, tolerance: f64) -> Option<String> {
     if derived.columns.is_empty() {
         return Some(abelian(m));
     }
-    if m > MOST {
+    if m > MOST_NAMED_DIMENSION {
         return None;
     }
     let center = center(c, tolerance)?;
@@ -352,7 +352,7 @@ fn null(columns: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
 fn complement(m: usize, these: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let axes = (0..m).map(|k| (0..m).map(|i| f64::from(u8::from(i == k))).collect());
     let all: Vec<Vec<f64>> = these.iter().cloned().chain(axes).collect();
-    orthonormal(&all, 1e-6).columns.split_off(these.len())
+    orthonormal(&all, INDEPENDENT_AXIS).columns.split_off(these.len())
 }
 
 /// Structure constants of a subalgebra, or of the quotient by the complementary ideal, in an orthonormal basis.

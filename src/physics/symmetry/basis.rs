@@ -1,5 +1,6 @@
 //! Functions of the coordinates: products of one factor per coordinate, of powers, harmonics, cotangents, hyperbolic functions.
 
+use super::thresholds::{HIGHEST_DEGREE, MOST_NUMBERS, MOST_UNKNOWNS, MOST_USUAL_UNKNOWNS};
 use crate::names::unknown;
 use std::f64::consts::PI;
 use std::fmt::{self, Display, Formatter};
@@ -79,28 +80,19 @@ impl FromStr for Degrees {
                 "hyperbolic" => &mut degrees.hyperbolic,
                 _ => return Err(unknown("family", family, ["polynomial", "trigonometric", "hyperbolic"])),
             };
-            let degree = degree.trim().parse().ok().filter(|degree| *degree <= MOST);
-            *place = degree.ok_or_else(|| format!("{family}: expected a degree from 0 to {MOST}"))?;
+            let degree = degree.trim().parse().ok().filter(|degree| *degree <= HIGHEST_DEGREE);
+            *place = degree.ok_or_else(|| format!("{family}: expected a degree from 0 to {HIGHEST_DEGREE}"))?;
         }
         Ok(degrees)
     }
 }
-
-/// Largest number of unknown coefficients of a search.
-pub const MOST_UNKNOWNS: usize = 4000;
-/// Largest number of unknown coefficients of a search over the default basis: it takes seconds.
-const USUAL: usize = 1300;
-/// Largest product of unknown coefficients and states; a search stores up to about eight times as many numbers, two gigabytes.
-const MOST_NUMBERS: usize = MOST_UNKNOWNS * 2 * MOST_UNKNOWNS;
-/// Highest degree of a family.
-const MOST: usize = 12;
 
 impl Degrees {
     /// Degree 2 of the powers; as many harmonics as the fields of a sphere in these coordinates need, one more than there are
     /// polar angles, from 2 to 12.
     pub fn usual(charts: &[Chart]) -> Self {
         let polar = charts.iter().filter(|chart| matches!(chart, Chart::Polar | Chart::Either)).count();
-        Self { polynomial: 2, trigonometric: (polar + 1).clamp(2, MOST), hyperbolic: 0 }
+        Self { polynomial: 2, trigonometric: (polar + 1).clamp(2, HIGHEST_DEGREE), hyperbolic: 0 }
     }
 }
 
@@ -315,7 +307,7 @@ impl Basis {
     pub(crate) fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
         let count = |degrees: &Degrees| Self::number(charts, *degrees);
         let mut degrees = Degrees::usual(charts);
-        while unknowns(names.len(), count(&degrees) as usize) > USUAL {
+        while unknowns(names.len(), count(&degrees) as usize) > MOST_USUAL_UNKNOWNS {
             let lower = [
                 Degrees { polynomial: degrees.polynomial.saturating_sub(1), ..degrees },
                 Degrees { trigonometric: degrees.trigonometric.saturating_sub(1), ..degrees },

@@ -4,6 +4,7 @@ use super::basis::{Basis, Values, unknowns};
 use super::find::room;
 use super::null_space::{add, dot, norm, orthonormal};
 use super::sample::Sample;
+use super::thresholds::{INDEPENDENT_COLUMN, METRIC_POWERS, ROUNDING_TERM};
 use super::{SymmetryError, field, null_space};
 use crate::lagrangian::{EulerLagrange, Regrouped, Request, Terms};
 use crate::linalg::{Workspace, eigh};
@@ -42,13 +43,6 @@ pub struct Comparison {
     /// square over that of the energy of `A` about its mean, or over the energy where that of `B` is the same at all states.
     pub energy: f64,
 }
-
-/// Highest power of `B` in `f`, for geodesics.
-const POWERS: usize = 3;
-/// Smallest independent part of a column.
-const DEPENDENT: f64 = 1e-9;
-/// Part of the whole below which a term is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Compares two Lagrangians at states `(q, v)`, `(states, n)`: what they have in common beyond the freedom that `L` has.
 ///
@@ -124,7 +118,7 @@ impl Fit {
         let (n, states, functions) = (b.n, b.len(), basis.len());
         let (values, own) = (lagrangians(a), lagrangians(b));
         // If a function of a metric is a metric again, it is a factor.
-        let powers = if b.homogeneous && !a.homogeneous { POWERS } else { 1 };
+        let powers = if b.homogeneous && !a.homogeneous { METRIC_POWERS } else { 1 };
         // If both are even in the velocities, no difference is a dF/dt, which is odd.
         let functions = if a.even && b.even { 0 } else { functions };
         let frames = Frames::new(b)?;
@@ -142,7 +136,7 @@ impl Fit {
         at.iter_mut().zip(b.q.chunks_exact(n)).for_each(|(at, q)| basis.evaluate(q, at));
         let gradient = |f: usize, k: usize| &at[k].gradient[f * n..(f + 1) * n];
         let level = own.iter().sum::<f64>() / states as f64;
-        let on_shell = powers > 1 && own.iter().all(|x| (x - level).abs() <= DEPENDENT * level.abs());
+        let on_shell = powers > 1 && own.iter().all(|x| (x - level).abs() <= INDEPENDENT_COLUMN * level.abs());
         let powers = if on_shell { 1 } else { powers };
         let factors = factors(terms, (b, &own), &frames, (powers, unit, on_shell));
         let found = Self { factors, on_shell, gauge: vec![], known_gauge: vec![], constant: 0.0, rest: 0.0 };
@@ -153,14 +147,14 @@ impl Fit {
         let (target, scale) = (at_states(&|k| p(a, k, 1.0)), at_states(&|k| p(b, k, 1.0)));
         let mut rest = target.clone();
         add(&mut rest, &at_states(&|k| p(b, k, found.slopes(own[k])[0])), -1.0);
-        let plain = orthonormal(&columns, DEPENDENT);
+        let plain = orthonormal(&columns, INDEPENDENT_COLUMN);
         let mut gauge = plain.given(&plain.along(&rest), columns.len());
-        let mut known_gauge = null_space::significant(&columns, &rest, DEPENDENT);
+        let mut known_gauge = null_space::significant(&columns, &rest, INDEPENDENT_COLUMN);
         let whole = norm(&target);
         // Roundings are not terms.
         for (k, column) in columns.iter().enumerate() {
             for c in [&mut gauge[k], &mut known_gauge[k]] {
-                if (*c * norm(column)).abs() <= ROUNDING * whole {
+                if (*c * norm(column)).abs() <= ROUNDING_TERM * whole {
                     *c = 0.0;
                 }
             }
@@ -239,16 +233,16 @@ impl Fit {
     fn energy(&self, a: &Sample, b: &Sample) -> f64 {
         let largest = b.energy.iter().fold(f64::MIN_POSITIVE, |m: f64, e| m.max(e.abs()));
         let power = |k: usize| b.energy.iter().map(|e| (e / largest).powi(k as i32)).collect::<Vec<f64>>();
-        let known = orthonormal(&(0..=self.factors.len()).map(power).collect::<Vec<_>>(), DEPENDENT);
+        let known = orthonormal(&(0..=self.factors.len()).map(power).collect::<Vec<_>>(), INDEPENDENT_COLUMN);
         let mut rest = a.energy.clone();
         known.remove(&mut rest);
         let about = |energy: &[f64]| {
             let mut about = energy.to_vec();
-            orthonormal(&[vec![1.0; energy.len()]], DEPENDENT).remove(&mut about);
+            orthonormal(&[vec![1.0; energy.len()]], INDEPENDENT_COLUMN).remove(&mut about);
             norm(&about)
         };
         // On a mass shell the energy is the same everywhere, and only its own size is left to compare with.
-        let constant = about(&b.energy) <= 1e-9 * norm(&b.energy);
+        let constant = about(&b.energy) <= ROUNDING_TERM * norm(&b.energy);
         let whole = if constant { norm(&a.energy) } else { about(&a.energy) };
         if norm(&rest) <= f64::EPSILON * norm(&a.energy) { 0.0 } else { norm(&rest) / whole }
     }
@@ -338,12 +332,12 @@ fn factors(
     };
     let columns: Vec<Vec<f64>> = (1..=powers).map(power).collect();
     let target = at_states(&|k, e| first.mass_matrix[k * n * n + e]);
-    let plain = orthonormal(&columns, DEPENDENT);
+    let plain = orthonormal(&columns, INDEPENDENT_COLUMN);
     let mut solution = plain.given(&plain.along(&target), columns.len());
     let whole = norm(&target);
     // Roundings are not terms.
     for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
-        if (*c * norm(column)).abs() <= ROUNDING * whole {
+        if (*c * norm(column)).abs() <= ROUNDING_TERM * whole {
             *c = 0.0;
         }
     }

@@ -5,14 +5,10 @@ use super::field::{join, sum};
 use super::find::{FunctionColumns, room};
 use super::null_space::{Separation, check, dot, norm, orthonormal, reduce};
 use super::sample::Sample;
+use super::thresholds::{ENTRY_NOISE, ENTRY_NOISES, INDEPENDENT_COLUMN, INDEPENDENT_FUNCTION, NEW_PART};
 use super::{Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::singular;
-
-/// Smallest independent part of the length of a column.
-const DEPENDENT: f64 = 1e-7;
-/// Smallest part that is independent of known quantities for a quantity to be new.
-const NEW: f64 = 1e-4;
 
 /// Factor of a function of the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -178,7 +174,7 @@ fn known(sample: &Sample, basis: &Basis, fields: &[Field]) -> Vec<Vec<f64>> {
         columns.extend([a.clone(), product(a, &sample.energy)]);
         columns.extend(charges[k..].iter().map(|b| product(a, b)));
     }
-    orthonormal(&columns, 1e-9).columns
+    orthonormal(&columns, INDEPENDENT_COLUMN).columns
 }
 
 fn search(
@@ -215,7 +211,7 @@ fn search(
             }
         }
     }
-    let plain = orthonormal(&values, DEPENDENT);
+    let plain = orthonormal(&values, INDEPENDENT_FUNCTION);
     if states < plain.columns.len() {
         return Err(SymmetryError::TooFew { unknowns: plain.columns.len(), states });
     }
@@ -242,8 +238,10 @@ fn search(
         })
         .collect();
     let decomposed = singular(&rests).ok_or(SymmetryError::NotFinite { what: "a conserved quantity" })?;
-    let noise = found.values[..zero.len()].last().map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
-    let old = decomposed.values.iter().take_while(|value| **value < NEW.max(noise)).count();
+    let noise = found.values[..zero.len()]
+        .last()
+        .map_or(0.0, |last| (ENTRY_NOISE * last).clamp(ENTRY_NOISES.0, ENTRY_NOISES.1));
+    let old = decomposed.values.iter().take_while(|value| **value < NEW_PART.max(noise)).count();
     let mut rows: Vec<Vec<f64>> =
         decomposed.vectors.iter().map(|vector| plain.given(&mix(vector, zero), values.len())).collect();
     let sizes: Vec<f64> = values.iter().map(|value| norm(value)).collect();

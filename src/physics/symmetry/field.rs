@@ -4,12 +4,10 @@ use super::SymmetryError;
 use super::basis::{Basis, Values};
 use super::null_space::dot;
 use super::sample::Sample;
+use super::thresholds::{STATES_AT_ONCE, WORKLESS};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::rollout::Trajectory;
 use serde::Serialize;
-
-/// Work of a force along a field, relative to that of its components, that counts as rounding.
-const WORKLESS: f64 = 1e-9;
 
 /// `xi = sum of coefficients * function * d_i` and the gauge function `F` that goes with it.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,9 +171,6 @@ pub struct Charge {
     pub by_integrator: f64,
 }
 
-/// States evaluated at once.
-const CHUNK: usize = 1024;
-
 /// The energy `E = p.v - L` and the charges `p.xi - F` of fields over a basis along a motion, the energy first.
 ///
 /// A charge would stay the same if the model had the symmetry and the integrator made no error. The model's contribution to its drift is
@@ -199,7 +194,7 @@ pub fn charges(
     let request = Request::ENERGY | Request::DL_DQ | Request::FORCE;
     let (mut terms, mut at) = (Terms::default(), Values::default());
     let mut series = vec![(Vec::with_capacity(motion.len()), Vec::with_capacity(motion.len())); fields.len() + 1];
-    for (q, v) in motion.q.chunks(CHUNK * n).zip(motion.v.chunks(CHUNK * n)) {
+    for (q, v) in motion.q.chunks(STATES_AT_ONCE * n).zip(motion.v.chunks(STATES_AT_ONCE * n)) {
         let found = series[0].0.len();
         let failed = |_| SymmetryError::States { states: motion.len(), found };
         model.terms(q, v, request, &mut terms).map_err(failed)?;
@@ -250,7 +245,7 @@ pub fn drifts(
     let n = exact.coordinates();
     let (mut right, mut other, mut at) = (Terms::default(), Terms::default(), Values::default());
     let mut rates = vec![Vec::with_capacity(motion.len()); all.len()];
-    for (q, v) in motion.q.chunks(CHUNK * n).zip(motion.v.chunks(CHUNK * n)) {
+    for (q, v) in motion.q.chunks(STATES_AT_ONCE * n).zip(motion.v.chunks(STATES_AT_ONCE * n)) {
         let failed = |_| SymmetryError::States { states: motion.len(), found: 0 };
         exact.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut right).map_err(failed)?;
         learned.terms(q, v, Request::ACCELERATION, &mut other).map_err(failed)?;

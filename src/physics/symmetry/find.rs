@@ -1,24 +1,15 @@
 //! Point symmetries of a Lagrangian: vector fields along which it changes by a total derivative at most.
 
-use super::algebra::MOST_FIELDS;
-use super::basis::{Basis, MOST_UNKNOWNS, Values, most_states, unknowns};
+use super::basis::{Basis, Values, most_states, unknowns};
 use super::null_space::{Orthonormal, Separation, check, dot, norm, orthonormal, reduce};
 use super::sample::{Invariant, Sample};
+use super::thresholds::{
+    ENTRY_NOISE, ENTRY_NOISES, INDEPENDENT_FUNCTION, LEAST_FIELD_SIZE, MOST_FIELDS, MOST_SIMPLIFIED, MOST_UNKNOWNS,
+    SIMPLER_NOISE,
+};
 use super::{Algebra, Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
-
-/// Functions with a smaller independent part count as combinations of the others, as `sin^2` given `1` and `cos 2x`.
-const DEPENDENT: f64 = 1e-7;
-
-/// Largest factor by which the noise of a field may grow to need fewer functions.
-const WORSE: f64 = 3.0;
-
-/// Number of fields times the cube of their unknown coefficients up to which fields of few functions are sought, half a minute.
-const SIMPLE: f64 = 2e10;
-
-/// Noise of exact terms: singular values below it are zero.
-pub const EXACT: f64 = 1e-8;
 
 /// Result of a search for symmetries.
 #[derive(Clone, Debug)]
@@ -81,7 +72,7 @@ impl FunctionColumns {
 /// states. The singular values then do not depend on how the fields are written, and the zero ones are the symmetries. If `L` does not
 /// depend on time, it also has the symmetry of time, which is not counted.
 ///
-/// `tolerance` is the noise of the terms, [`EXACT`] for a Lagrangian written down; without one, for a learned model, the largest
+/// `tolerance` is the noise of the terms, [`EXACT`](super::EXACT) for a Lagrangian written down; without one, for a learned model, the largest
 /// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
 /// coefficients.
 ///
@@ -120,7 +111,7 @@ pub(super) fn room(n: usize, unknowns: usize, states: usize) -> Result<(), Symme
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
     let columns = FunctionColumns::new(basis, sample)?;
-    let plain = orthonormal(&columns.values, DEPENDENT);
+    let plain = orthonormal(&columns.values, INDEPENDENT_FUNCTION);
     let (values, rates) = (&plain.columns, plain.mixed(&columns.rates));
     if states < unknowns(n, values.len()) {
         return Err(SymmetryError::TooFew { unknowns: unknowns(n, values.len()), states });
@@ -154,7 +145,7 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
         .collect();
     let sizes = sizes(sample, &columns.values);
     let last = found.values[..zero].last().copied();
-    let noise = last.map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
+    let noise = last.map_or(0.0, |last| (ENTRY_NOISE * last).clamp(ENTRY_NOISES.0, ENTRY_NOISES.1));
     let pivots = reduce(&mut rows, &sizes, noise, 0);
     if let Some(last) = last.filter(|_| pivots.len() == zero) {
         let unknowns = Unknowns { sample, columns: &columns, plain: &plain, gauge: &gauge, weight: &weight };
@@ -254,7 +245,7 @@ impl Unknowns<'_> {
         fixed.iter_mut().for_each(|column| self.gauge.remove(column));
         let gram = null_space::gram(&fixed);
         let weights: Vec<f64> = places.iter().map(|at| sizes[*at]).collect();
-        if rows.len() as f64 * (places.len() as f64).powi(3) > SIMPLE {
+        if rows.len() as f64 * (places.len() as f64).powi(3) > MOST_SIMPLIFIED {
             return;
         }
         for (row, pivot) in rows.iter_mut().zip(pivots) {
@@ -264,7 +255,7 @@ impl Unknowns<'_> {
             let Some(found) = null_space::sparsest(&gram, &start, &weights, own, &taken, noise) else { continue };
             // Large terms that cancel may leave a small field, which changes L by more than its size allows.
             let part = combined(std::slice::from_ref(&found), &fixed).remove(0);
-            if norm(&part) > WORSE * noise * self.size(&places, &found) {
+            if norm(&part) > SIMPLER_NOISE * noise * self.size(&places, &found) {
                 continue;
             }
             let change = combined(std::slice::from_ref(&found), &free).remove(0);
@@ -281,10 +272,10 @@ impl Unknowns<'_> {
 /// `dF/dt` cannot be part of it.
 fn gauge(sample: &Sample, rates: &[Vec<f64>], weight: &[f64]) -> Orthonormal {
     if sample.even {
-        return orthonormal(&[], DEPENDENT);
+        return orthonormal(&[], INDEPENDENT_FUNCTION);
     }
     let weighed = |rate: &Vec<f64>| rate.iter().zip(weight).map(|(r, w)| r * w).collect();
-    orthonormal(&rates.iter().map(weighed).collect::<Vec<Vec<f64>>>(), DEPENDENT)
+    orthonormal(&rates.iter().map(weighed).collect::<Vec<Vec<f64>>>(), INDEPENDENT_FUNCTION)
 }
 
 /// Combinations of the fields `values[f] d_i` that are orthonormal in the frame, on average over the states, as rows `(fields, n *
@@ -312,7 +303,7 @@ fn unit_fields(sample: &Sample, values: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Sy
     let largest = sizes.iter().fold(0.0, |m: f64, s| m.max(*s));
     let rows = sizes.iter().zip(vectors.chunks_exact(count));
     Ok(rows
-        .filter(|(size, _)| **size > 1e-13 * largest)
+        .filter(|(size, _)| **size > LEAST_FIELD_SIZE * largest)
         .map(|(size, row)| row.iter().map(|x| x / size.sqrt()).collect())
         .collect())
 }

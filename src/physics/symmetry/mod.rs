@@ -42,6 +42,7 @@ mod find;
 mod null_space;
 mod sample;
 mod says;
+mod thresholds;
 
 pub use algebra::Algebra;
 pub use basis::{Basis, Chart, Degrees};
@@ -49,20 +50,21 @@ pub use canonical::{Canonical, CanonicalForm};
 pub use compare::{Comparison, compare};
 pub use conserved::{Conserved, Quadratic, quadratic};
 pub use field::{Charge, Field, charges};
-pub use find::{EXACT, Symmetries, symmetries};
+pub use find::{Symmetries, symmetries};
 pub use null_space::Separation;
 pub use sample::{Invariant, Region};
 pub use says::{ComparisonSummary, QuadraticSummary, SymmetrySummary};
+pub use thresholds::EXACT;
 
 // For the packages of this repository.
 #[doc(hidden)]
 pub use {
-    algebra::MOST_FIELDS,
-    basis::{MOST_UNKNOWNS, most_states, unknowns},
+    basis::{most_states, unknowns},
     conserved::quadratic_unknowns,
     field::drifts,
-    null_space::{TOLERANCES, bases, enough, most_symmetries},
+    null_space::{bases, enough, most_symmetries},
     sample::middle,
+    thresholds::{MOST_FIELDS, MOST_UNKNOWNS, TOLERANCES},
 };
 
 use crate::lagrangian::MechanicsError;

@@ -1,5 +1,11 @@
 //! Null vectors of a matrix: how many singular values count as zero, and the simplest vectors that span the space.
 
+use super::thresholds::{
+    EXACT_STATES, GAUGE_SIGNIFICANCE, INDEPENDENT_NULL_COLUMN, LEAST_ABOVE_NOISE, LEAST_EXACT_GAP, LEAST_MODEL_GAP,
+    LEAST_MODEL_NOISE, LEAST_PIVOT, MODEL_STATES, MOST_ZERO_VALUE, NEGLIGIBLE_ENTRIES, REFINED_RESIDUAL,
+    REFINED_ROUNDING, ROUNDING_ENTRY, SPARSE_LEAST_RESIDUAL, SPARSE_PENALTY, SPARSE_RESIDUAL, SPARSE_STEPS,
+    SPARSE_WIDTH, SPARSE_ZERO, STATES_PER_UNKNOWN, TOLERANCES,
+};
 use super::{Basis, Chart, Degrees, EXACT, Symmetries, SymmetryError, symmetries};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{MatMut, MatRef, Workspace, gemm, solve};
@@ -14,17 +20,6 @@ pub struct Separation {
     /// all values are zero.
     pub gap: Option<f64>,
 }
-
-/// Largest value that may be meant to be zero if the noise is unknown: a tenth of its size without a symmetry.
-const SMALL: f64 = 0.1;
-/// Smallest gap that separates values if the noise is unknown.
-const APART: f64 = 10.0;
-/// Noise that a model has at the least: smaller values are not distinguished.
-const NOISE: f64 = 1e-3;
-/// Least gap above a known noise.
-const ABOVE: f64 = 30.0;
-/// Tolerances that can be used: from the rounding of a number near 1 to the largest value that may be meant to be zero.
-pub const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
 
 /// Refuses a tolerance outside [`TOLERANCES`].
 ///
@@ -52,16 +47,19 @@ impl Separation {
             Some(tolerance) => {
                 let count = values.iter().take_while(|value| **value <= tolerance).count();
                 let gap = ratio(count, if count == 0 { tolerance } else { values[count - 1] });
-                let least = if count == 0 { 3.0 } else { ABOVE };
-                let clear = gap.is_none_or(|gap| gap >= least) && ratio(count, tolerance).is_none_or(|r| r >= 3.0);
+                let least = if count == 0 { LEAST_ABOVE_NOISE } else { LEAST_EXACT_GAP };
+                let clear = gap.is_none_or(|gap| gap >= least)
+                    && ratio(count, tolerance).is_none_or(|r| r >= LEAST_ABOVE_NOISE);
                 Self { count: clear.then_some(count), gap }
             }
             None => {
-                let small = values.iter().take_while(|value| **value < SMALL).count();
-                let cuts = (1..=small).filter_map(|k| Some((k, ratio(k, values[k - 1].max(NOISE))?)));
+                let small = values.iter().take_while(|value| **value < MOST_ZERO_VALUE).count();
+                let cuts = (1..=small).filter_map(|k| Some((k, ratio(k, values[k - 1].max(LEAST_MODEL_NOISE))?)));
                 match cuts.max_by(|a, b| a.1.total_cmp(&b.1)) {
-                    None => Self { count: Some(small), gap: ratio(0, SMALL) },
-                    Some((k, apart)) => Self { count: (apart >= APART).then_some(k), gap: ratio(k, values[k - 1]) },
+                    None => Self { count: Some(small), gap: ratio(0, MOST_ZERO_VALUE) },
+                    Some((k, apart)) => {
+                        Self { count: (apart >= LEAST_MODEL_GAP).then_some(k), gap: ratio(k, values[k - 1]) }
+                    }
                 }
             }
         }
@@ -90,7 +88,7 @@ pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact
 
 /// Number of states for this many unknown coefficients, for a Lagrangian that is written down or for a model.
 pub fn enough(unknowns: usize, exact: bool) -> usize {
-    (2 * unknowns).max(if exact { 400 } else { 1000 })
+    (STATES_PER_UNKNOWN * unknowns).max(if exact { EXACT_STATES } else { MODEL_STATES })
 }
 
 /// Point symmetries in the basis that shows the most of them, or, if several do, in the one with the widest gap; `tolerance` as in
@@ -138,7 +136,7 @@ pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: us
             let entries = candidates.clone().map(|k| (k, (rows[k][column] * sizes[column]).abs()));
             entries.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((done, 0.0))
         };
-        let Some(column) = (0..sizes.len()).find(|&column| best(column).1 > 0.3) else { break };
+        let Some(column) = (0..sizes.len()).find(|&column| best(column).1 > LEAST_PIVOT) else { break };
         let row = best(column).0;
         rows.swap(done, row);
         let pivot = rows[done].clone();
@@ -280,11 +278,6 @@ pub(crate) fn add(a: &mut [f64], b: &[f64], factor: f64) {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
 }
 
-/// Parts of the largest entry below which entries are tried without, one after the other.
-const NEGLIGIBLE: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
-/// Residual of the null vector with few entries, in units of the one it replaces and of `1/NEGLIGIBLE` roundings.
-const WORSE: f64 = 10.0;
-
 /// Replaces a null vector of columns by one without its small entries, if that is a null vector too.
 ///
 /// `column` gives the column of an entry of `vector`; `sizes` are those of the functions that they belong to. The largest entry keeps its
@@ -306,12 +299,12 @@ fn refine_once(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[
     let weighed: Vec<f64> = vector.iter().zip(sizes).map(|(x, s)| (x * s).abs()).collect();
     let largest = weighed.iter().fold(0.0, |m: f64, x| m.max(*x));
     let mut before = 0;
-    for small in NEGLIGIBLE {
+    for small in NEGLIGIBLE_ENTRIES {
         let mut support: Vec<usize> = (0..vector.len()).filter(|k| weighed[*k] > small * largest).collect();
         let Some(pivot) = support.iter().copied().max_by(|a, b| weighed[*a].total_cmp(&weighed[*b])) else { return };
         support.retain(|k| *k != pivot);
         // The same entries would be refused again.
-        if small < NEGLIGIBLE[0] && support.len() == before {
+        if small < NEGLIGIBLE_ENTRIES[0] && support.len() == before {
             continue;
         }
         before = support.len();
@@ -335,7 +328,7 @@ fn fitted(
 ) -> Option<Vec<f64>> {
     let columns: Vec<Vec<f64>> = support.iter().map(|k| column(*k)).collect();
     let target: Vec<f64> = pivot.iter().map(|x| -value * x).collect();
-    let plain = orthonormal(&columns, 1e-10);
+    let plain = orthonormal(&columns, INDEPENDENT_NULL_COLUMN);
     let mut solution = plain.given(&plain.along(&target), support.len());
     let mut rest = target.clone();
     let mut whole = norm(&target).powi(2);
@@ -344,21 +337,18 @@ fn fitted(
         whole += (x * norm(column)).powi(2);
     }
     let whole = whole.sqrt();
-    if whole > 0.0 && norm(&rest) > (WORSE * noise).max(1e-9) * whole {
+    if whole > 0.0 && norm(&rest) > (REFINED_RESIDUAL * noise).max(REFINED_ROUNDING) * whole {
         return None;
     }
     let parts: Vec<f64> = solution.iter().zip(&columns).map(|(x, column)| (x * norm(column)).abs()).collect();
     let last = parts.iter().fold(0.0, |m: f64, part| m.max(*part));
     for (x, part) in solution.iter_mut().zip(&parts) {
-        if *part <= 1e-10 * last {
+        if *part <= ROUNDING_ENTRY * last {
             *x = 0.0;
         }
     }
     Some(solution)
 }
-
-/// A column that explains less than this many standard errors counts as chance.
-const CERTAIN: f64 = 3.0;
 
 /// Coefficients of the least-squares fit of columns to a target, 0 for those that it does not determine: columns that explain no more than
 /// chance beyond the columns before them are left out and the others refitted, as long as the residual grows no more than by chance.
@@ -376,7 +366,7 @@ pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) 
         // The columns that were left out explained no more than the same number of noise columns.
         let left_out = (columns.len() - support.len()) as f64;
         if let Some((before, least)) = &found
-            && square > least * (1.0 + CERTAIN * (2.0 * left_out).sqrt() / free)
+            && square > least * (1.0 + GAUGE_SIGNIFICANCE * (2.0 * left_out).sqrt() / free)
         {
             return before.clone();
         }
@@ -385,7 +375,7 @@ pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) 
         support.iter().zip(&solution).for_each(|(k, x)| all[*k] = *x);
         let least = found.map_or(square, |(_, least)| least);
         found = Some((all.clone(), least));
-        let known = plain.kept.iter().zip(&along).filter(|(_, along)| along.abs() > CERTAIN * square.sqrt());
+        let known = plain.kept.iter().zip(&along).filter(|(_, along)| along.abs() > GAUGE_SIGNIFICANCE * square.sqrt());
         let kept: Vec<usize> = known.map(|(k, _)| support[*k]).collect();
         if kept.len() == support.len() {
             return all;
@@ -403,15 +393,6 @@ pub(crate) fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
     gemm(MatMut::new(&mut product, count, count), false, 1.0, a, a.t());
     product
 }
-
-/// Steps of [`sparsest`].
-const STEPS: usize = 12;
-/// Part of the largest entry that counts as zero in the end.
-const NOTHING: f64 = 2e-3;
-/// Price of an entry, in units of the squared noise.
-const PRICE: f64 = 0.3;
-/// Largest growth of the residual that few entries justify.
-const WORTH: f64 = 2.0;
 
 /// The vector of fewest entries near `start` that solves `A x = 0` to about `noise`, where `gram` is `A^T A`; `None` if its residual is
 /// more than twice as large.
@@ -434,10 +415,11 @@ pub(crate) fn sparsest(
     let mut x = start.to_vec();
     // A field of unit size changes L by the noise.
     let size = x.iter().zip(sizes).fold(0.0, |m: f64, (x, s)| m.max((x * s).abs()));
-    let price = PRICE * residual(start).max((noise * size).powi(2) * 1e-2).max(f64::MIN_POSITIVE);
+    let price =
+        SPARSE_PENALTY * residual(start).max((noise * size).powi(2) * SPARSE_LEAST_RESIDUAL).max(f64::MIN_POSITIVE);
     let mut active: Vec<usize> = (0..count).filter(|k| *k != pivot && !taken[*k]).collect();
     let mut workspace = Workspace::new();
-    for step in 0..STEPS {
+    for step in 0..SPARSE_STEPS {
         let near = size * 0.5_f64.powi(step as i32);
         let m = active.len();
         if m == 0 {
@@ -455,16 +437,16 @@ pub(crate) fn sparsest(
         x.fill(0.0);
         x[pivot] = kept;
         active.iter().zip(next).for_each(|(i, value)| x[*i] = value);
-        let floor = (NOTHING * size).min(0.1 * near);
+        let floor = (SPARSE_ZERO * size).min(SPARSE_WIDTH * near);
         active.retain(|i| (x[*i] * sizes[*i]).abs() > floor);
     }
     for (x, s) in x.iter_mut().zip(sizes) {
-        if (*x * s).abs() <= NOTHING * size {
+        if (*x * s).abs() <= SPARSE_ZERO * size {
             *x = 0.0;
         }
     }
-    let before = residual(start).max((noise * size).powi(2) * 1e-2);
-    (residual(&x) <= WORTH * WORTH * before).then_some(x)
+    let before = residual(start).max((noise * size).powi(2) * SPARSE_LEAST_RESIDUAL);
+    (residual(&x) <= SPARSE_RESIDUAL * SPARSE_RESIDUAL * before).then_some(x)
 }
 
 #[cfg(test)]

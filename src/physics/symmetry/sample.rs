@@ -1,6 +1,7 @@
 //! States at which the terms of a Lagrangian are evaluated, with the typical sizes of the motion and of the terms.
 
 use super::SymmetryError;
+use super::thresholds::{DRAWS_PER_STATE, EQUAL_TERMS, INNER_RANGE, LEAST_EIGENVALUE};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, eigh, inertia};
 use crate::random::RngStream;
@@ -77,9 +78,6 @@ impl Invariant {
     }
 }
 
-/// Relative rounding of terms that differ between `v` and `-v`.
-const EVEN: f64 = 1e-10;
-
 impl Sample {
     /// The terms of `model` at states where they are finite.
     ///
@@ -135,11 +133,11 @@ impl Sample {
             }
             let same = |here: &[f64], there: &[f64], sign: f64| {
                 let size = here.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-                here.iter().zip(there).all(|(a, b)| (a - sign * b).abs() <= EVEN * size)
+                here.iter().zip(there).all(|(a, b)| (a - sign * b).abs() <= EQUAL_TERMS * size)
             };
             let action: f64 = p.iter().zip(&v[one.clone()]).map(|(p, v)| p * v).sum();
             let size: f64 = p.iter().zip(&v[one.clone()]).map(|(p, v)| (p * v).abs()).sum();
-            sample.homogeneous &= (action - 2.0 * energy).abs() <= EVEN * size;
+            sample.homogeneous &= (action - 2.0 * energy).abs() <= EQUAL_TERMS * size;
             let reversed = [&back.momentum, &back.dl_dq].map(|x| x.get(one.clone()));
             sample.even &= match reversed {
                 [Some(there), Some(pull)] => same(p, there, -1.0) && same(g, pull, 1.0),
@@ -173,7 +171,7 @@ impl Sample {
         for k in 0..states {
             let (w, u) = (&values[k * n..(k + 1) * n], &vectors[k * n * n..(k + 1) * n * n]);
             let largest = w.iter().fold(f64::MIN_POSITIVE, |m, w| m.max(w.abs()));
-            let w: Vec<f64> = w.iter().map(|w| w.abs().max(1e-12 * largest)).collect();
+            let w: Vec<f64> = w.iter().map(|w| w.abs().max(LEAST_EIGENVALUE * largest)).collect();
             let norm = |x: &[f64], inverse: bool| -> f64 {
                 let square = w.iter().zip(u.chunks_exact(n)).map(|(w, u)| {
                     let along: f64 = u.iter().zip(x).map(|(u, x)| u * x).sum();
@@ -219,7 +217,7 @@ impl Sample {
     pub fn cyclic(&self) -> Vec<bool> {
         let size = |i: usize| self.g.iter().skip(i).step_by(self.n).fold(0.0, |m: f64, g| m.max(g.abs()));
         let momentum = self.p.iter().fold(f64::MIN_POSITIVE, |m: f64, p| m.max(p.abs()));
-        (0..self.n).map(|i| size(i) <= EVEN * momentum).collect()
+        (0..self.n).map(|i| size(i) <= EQUAL_TERMS * momentum).collect()
     }
 
     /// Root mean square of every coordinate about its mean; 1 for a constant one.
@@ -243,9 +241,6 @@ pub struct Region {
     /// Ranges of the velocities, `(n)`.
     pub velocity: Vec<[f64; 2]>,
 }
-
-/// Largest number of refused draws for each accepted one.
-const REFUSED: usize = 100;
 
 impl Region {
     /// The range of a column, coordinates before velocities.
@@ -290,7 +285,7 @@ impl Region {
             bounds.iter().map(|[low, high]| low + (high - low) * random.random::<f64>()).collect()
         };
         let (mut all, mut taken) = ((Vec::new(), Vec::new()), 0);
-        for _ in 0..REFUSED * states {
+        for _ in 0..DRAWS_PER_STATE * states {
             if taken == states {
                 break;
             }
@@ -305,12 +300,9 @@ impl Region {
     }
 }
 
-/// Share of every training range over which a model is examined: it is worst near the edges.
-const INNER: f64 = 0.8;
-
 /// The middle of a range.
 pub fn middle([low, high]: [f64; 2]) -> [f64; 2] {
-    let (middle, half) = (0.5 * (low + high), 0.5 * INNER * (high - low));
+    let (middle, half) = (0.5 * (low + high), 0.5 * INNER_RANGE * (high - low));
     [middle - half, middle + half]
 }
 

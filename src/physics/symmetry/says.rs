@@ -1,13 +1,10 @@
 //! Reports of symmetries and of comparisons.
 
+use super::thresholds::{MOST_SHOWN, OTHER_LAGRANGIAN, SAME_MOTION, SHOWN_BEYOND_GAP, UNIT_FACTOR};
 use super::{Comparison, Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
 use crate::names::{number as digits, pluralize, rounded};
 use serde::{Serialize, Serializer};
-
-/// Singular values that are shown beyond the gap, and at most.
-const BEYOND: usize = 5;
-const SHOWN: usize = 20;
 
 /// Symmetries in formulas, as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -162,7 +159,7 @@ impl SymmetrySummary {
     }
 
     fn say_search(&self, findings: &mut Findings) {
-        let last = (self.count.unwrap_or(0) + BEYOND).min(SHOWN);
+        let last = (self.count.unwrap_or(0) + SHOWN_BEYOND_GAP).min(MOST_SHOWN);
         let shown: Vec<String> = self.singular_values.iter().take(last).map(|x| digits(*x)).collect();
         let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
         findings.line(format!("singular values {}{more}", shown.join(", ")));
@@ -214,7 +211,7 @@ impl SymmetrySummary {
 fn factor(x: f64) -> String {
     let sign = if x < 0.0 { "-" } else { "+" };
     let size = x.abs();
-    if (size - 1.0).abs() < 1e-6 { sign.to_string() } else { format!("{sign} {}", digits(size)) }
+    if (size - 1.0).abs() < UNIT_FACTOR { sign.to_string() } else { format!("{sign} {}", digits(size)) }
 }
 
 impl QuadraticSummary {
@@ -233,10 +230,6 @@ impl QuadraticSummary {
         };
     }
 }
-
-/// Largest relative distance at which motions agree, and smallest one at which Lagrangians do not.
-const SAME: f64 = 1e-6;
-const OTHER: f64 = 1e-3;
 
 /// A comparison of two Lagrangians by name, at states drawn by a seed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -269,7 +262,7 @@ impl ComparisonSummary {
         let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
         findings
             .table(&["quantity", "relative distance"], rows.iter().map(|(name, x)| [name.to_string(), distance(*x)]));
-        if found.motion < SAME && found.lagrangian > OTHER {
+        if found.motion < SAME_MOTION && found.lagrangian > OTHER_LAGRANGIAN {
             findings.line(
                 "The motions agree, but the Lagrangians do not: F may be a function that the basis lacks (--basis).",
             );

@@ -11,7 +11,7 @@ mod warnings;
 pub(crate) use coordinate::CoordinateSurvey;
 pub(crate) use motionless::{Stillness, is_uniform, stillness};
 pub(crate) use suspicious::{Kind, Warning, find as find_suspicious};
-use thresholds::{AMBIGUOUS_STEP, LEAST_SAMPLES_PER_PERIOD};
+use thresholds::AMBIGUOUS_STEP;
 
 use crate::recording::clock::Clock;
 use crate::recording::read::FileFacts;

@@ -3,6 +3,10 @@
 //! A change of `L` is `f(q)` times a product of velocities: none (a potential), two (a mass matrix) or four; a change of the dissipation
 //! `D` is `f(q) v_i^2/2` (viscous) or `w_i^2 ln cosh(v_i/w_i)` (dry beyond `w_i`). The equations of motion are linear in each change.
 
+use crate::analysis::thresholds::{
+    CHANGE_DEGREE, DRY_KNEE, MOST_CHANGES, MOST_DEPENDENT_COORDINATES, MOST_QUARTIC_COORDINATES, PRIOR_SIZE,
+};
+
 /// The factor of a function of the coordinates.
 #[derive(Clone, Debug, PartialEq)]
 enum VelocityFactor {
@@ -56,18 +60,11 @@ pub struct Row {
     pub energy: Vec<f64>,
 }
 
-/// Most changes that are considered.
-const MOST: usize = 260;
-/// Highest degree of functions of the coordinates.
-const DEGREE: usize = 4;
-/// A potential is believed to be that many kinetic energies at most, a friction that many inertial forces.
-const GENEROUS: f64 = 3.0;
-
 impl Changes {
     /// Changes for coordinates that are angles or lie in `range`, including changes of the friction if `friction`. The functions have the
     /// highest degree that their number allows; `None` if even constants are too many.
     pub fn new(periodic: &[bool], range: &[[f64; 2]], usual: &Typical, friction: bool) -> Option<Self> {
-        (0..=DEGREE).rev().find_map(|degree| Self::of_degree(periodic, range, usual, friction, degree))
+        (0..=CHANGE_DEGREE).rev().find_map(|degree| Self::of_degree(periodic, range, usual, friction, degree))
     }
 
     fn of_degree(
@@ -80,11 +77,11 @@ impl Changes {
         let n = periodic.len();
         let pairs: Vec<[usize; 2]> = (0..n).flat_map(|i| (i..n).map(move |j| [i, j])).collect();
         // The number of changes by constants. Lists of higher degree grow as a power of `n` and are not built merely to be counted.
-        if pairs.len() + 2 * n > MOST || (degree > 0 && n > 8) {
+        if pairs.len() + 2 * n > MOST_CHANGES || (degree > 0 && n > MOST_DEPENDENT_COORDINATES) {
             return None;
         }
         let changes = Self::listed(periodic, range, usual, friction, (degree, &pairs));
-        (changes.len() <= MOST).then_some(changes)
+        (changes.len() <= MOST_CHANGES).then_some(changes)
     }
 
     fn listed(
@@ -108,10 +105,10 @@ impl Changes {
                 add(VelocityFactor::Product(vec![i, j]), function, size);
             }
             if function > 0 {
-                add(VelocityFactor::Product(Vec::new()), function, GENEROUS * kinetic);
+                add(VelocityFactor::Product(Vec::new()), function, PRIOR_SIZE * kinetic);
             }
         }
-        if n <= 3 {
+        if n <= MOST_QUARTIC_COORDINATES {
             for (k, &[i, j]) in pairs.iter().enumerate() {
                 for &[a, b] in &pairs[k..] {
                     let size = 0.25 * inertia([i, j]) / (velocity[a] * velocity[b]);
@@ -125,9 +122,9 @@ impl Changes {
         }
         if friction {
             for i in 0..n {
-                let size = GENEROUS * mass[i] * acceleration[i] / velocity[i];
+                let size = PRIOR_SIZE * mass[i] * acceleration[i] / velocity[i];
                 let all_of = (0..functions.up_to(1)).map(|function| (VelocityFactor::Viscous(i), function));
-                let knee = 0.2 * velocity[i];
+                let knee = DRY_KNEE * velocity[i];
                 let all_of = all_of.chain([(VelocityFactor::Dry(i, knee), 0)]);
                 let sized = all_of.map(|(kind, function)| Change { kind, function, size });
                 all.extend(sized.filter(|change| change.size.is_finite()));
@@ -359,7 +356,7 @@ mod tests {
             Changes::new(&vec![true; n], &vec![[0.0, 1.0]; n], &usual, true).map(|changes| changes.len())
         };
         for n in 1..=20 {
-            assert!(count(n).is_some_and(|count| count <= MOST), "{n}");
+            assert!(count(n).is_some_and(|count| count <= MOST_CHANGES), "{n}");
         }
         assert_eq!(count(60), None);
     }

@@ -7,6 +7,10 @@
 
 use super::Estimate;
 use super::posterior::{Sums, groups, jackknife};
+use crate::analysis::thresholds::{
+    CONSTANT_SAMPLES, CONSTANT_STRETCH, EXAMINED_WEIGHTS, INDEPENDENT_COLUMN, LEAST_CONSTANT_STRETCH, PARAMETER_STEP,
+    START_CORRECTIONS,
+};
 use crate::configuration::Penalty;
 use crate::data::{RecordingSplit, StateEstimate};
 use crate::linalg::dot;
@@ -16,19 +20,6 @@ use crate::shooting::{Curvature, Segments, ShootingObjective};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// Samples of a stretch, and integration steps.
-const STRETCH: usize = 40;
-/// Fewest samples of a stretch.
-const LEAST: usize = 8;
-/// Samples that are examined; of more, evenly spaced stretches.
-const SAMPLES: usize = 6000;
-/// Corrections of the starts.
-const CORRECTIONS: usize = 4;
-/// Largest number of parameters beside the constants; if there are more, evenly spaced ones are used.
-const WEIGHTS: usize = 128;
-/// Step of a difference by a parameter.
-const DIFFERENCE: f64 = 1e-4;
 
 /// Values and ranges of the learned constants of the known part of a network, by name; `None` where no range can be given, and empty if no
 /// constants are learned.
@@ -82,7 +73,7 @@ fn columns(layout: &Layout, weights: &[f64]) -> Vec<(usize, f64)> {
     let joints = (!layout.joint_friction.is_empty()).then(|| layout.joint_friction.clone().collect());
     for kind in outputs.chain(friction).chain(joints) {
         let size = (kind.iter().map(|&k| weights[k] * weights[k]).sum::<f64>() / kind.len() as f64).sqrt();
-        let stride = kind.len().div_ceil(WEIGHTS).max(1);
+        let stride = kind.len().div_ceil(EXAMINED_WEIGHTS).max(1);
         columns.extend(kind.into_iter().step_by(stride).filter(|_| size > 0.0).map(|k| (k, size)));
     }
     columns
@@ -103,11 +94,13 @@ impl Stretches {
         let pairs = measured.training.recording.tracks.iter().zip(&measured.training.states);
         let pieces: Vec<_> = pairs
             .flat_map(|(track, states)| {
-                let ends = (0..track.len()).step_by(STRETCH).map(|first| first..(first + STRETCH).min(track.len()));
-                ends.filter(|rows| rows.len() >= LEAST).map(move |rows| (track, states, rows))
+                let ends = (0..track.len())
+                    .step_by(CONSTANT_STRETCH)
+                    .map(|first| first..(first + CONSTANT_STRETCH).min(track.len()));
+                ends.filter(|rows| rows.len() >= LEAST_CONSTANT_STRETCH).map(move |rows| (track, states, rows))
             })
             .collect();
-        let stride = (pieces.len() * STRETCH).div_ceil(SAMPLES).max(1);
+        let stride = (pieces.len() * CONSTANT_STRETCH).div_ceil(CONSTANT_SAMPLES).max(1);
         let pieces: Vec<_> = pieces.into_iter().step_by(stride).collect();
         let cut = |(track, _, rows): &(&RecordedTrajectory, _, Range<usize>)| {
             let of = |values: &[f64]| values.get(rows.start * n..rows.end * n).unwrap_or_default().to_vec();
@@ -120,11 +113,11 @@ impl Stretches {
             StateEstimate { track, q: &states.q[rows.clone()], v: &states.v[rows], between: measured.training.between }
         });
         let estimated: Vec<StateEstimate<'_>> = estimated.collect();
-        let segments = Segments::new(architecture, &estimated, &measured.noise(), STRETCH, STRETCH);
+        let segments = Segments::new(architecture, &estimated, &measured.noise(), CONSTANT_STRETCH, CONSTANT_STRETCH);
         let mut objective = ShootingObjective::new(architecture, Penalty::None, (0.0, f64::INFINITY), threads).ok()?;
         let mut starts = segments.starts().to_vec();
         let mut curvature = Curvature::default();
-        for _ in 0..CORRECTIONS {
+        for _ in 0..START_CORRECTIONS {
             objective.refine(weights, &segments, &mut starts, &mut curvature, 1.0);
         }
         let rows = (0..segments.len() as u32).collect();
@@ -141,7 +134,7 @@ impl Stretches {
         let width = 2 * self.n;
         let by_start: Vec<Vec<f64>> = (0..width)
             .map(|k| {
-                let by = DIFFERENCE.sqrt() * self.segments.tolerance(k);
+                let by = PARAMETER_STEP.sqrt() * self.segments.tolerance(k);
                 let moved = self.starts.iter().enumerate().map(|(at, x)| if at % width == k { x + by } else { *x });
                 self.residuals(weights, &moved.collect::<Vec<_>>())
             })
@@ -155,9 +148,9 @@ impl Stretches {
                     moved[k] += by;
                     self.residuals(&moved, &self.starts)
                 };
-                let by = DIFFERENCE * size;
+                let by = PARAMETER_STEP * size;
                 // The column has the sign of the residuals, measured minus predicted, which a change of the parameters has to explain.
-                moved(by).iter().zip(moved(-by)).map(|(up, down)| (down - up) * (0.5 / DIFFERENCE)).collect()
+                moved(by).iter().zip(moved(-by)).map(|(up, down)| (down - up) * (0.5 / PARAMETER_STEP)).collect()
             })
             .collect();
         let mut ends = Vec::with_capacity(self.rows.len());
@@ -197,7 +190,7 @@ fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let before = dot(&column, &column).sqrt();
         (0..2).for_each(|_| eliminate(&all, &mut column));
         let norm = dot(&column, &column).sqrt();
-        if norm > 1e-10 * before {
+        if norm > INDEPENDENT_COLUMN * before {
             column.iter_mut().for_each(|x| *x /= norm);
             all.push(column);
         }

@@ -7,6 +7,9 @@ use super::changes::{Functions, Values};
 use super::observed::Observed;
 use super::posterior::{Sums, groups, jackknife};
 use super::ranges;
+use crate::analysis::thresholds::{
+    DECAY_DEGREE, DECAY_TRUST, FRICTION_SIGNIFICANCE, LEAST_DECAY, LEAST_GROUP_STATES, MOST_DECAY_RESIDUAL,
+};
 use serde::{Deserialize, Serialize};
 
 /// Decay of the motion of one coordinate.
@@ -25,24 +28,16 @@ pub struct Decay {
 impl Decay {
     /// `true` if the motion is damped by more than chance and by enough to matter, and agrees with this model.
     pub fn is_certain(&self) -> bool {
-        self.rate > 4.0 * self.error && self.share > SHARE && self.left < LEFT
+        self.rate > FRICTION_SIGNIFICANCE * self.error && self.share > LEAST_DECAY && self.left < MOST_DECAY_RESIDUAL
     }
 }
-
-/// Smallest share of the acceleration that matters, and the largest residual share: above it, the motion is of another kind.
-const SHARE: f64 = 0.005;
-const LEFT: f64 = 0.3;
-/// Degree of the functions of the coordinate.
-const DEGREE: usize = 4;
-/// Weight of the data relative to the prior that no part of the acceleration exceeds the acceleration itself.
-const TRUST: f64 = 1e3;
 
 /// Decay of the motion of one coordinate; `None` if there are several, or too few states.
 pub fn decay(periodic: &[bool], observed: &Observed) -> Option<Decay> {
     let [angle] = *periodic else { return None };
-    let functions = Functions::new(&[angle], &ranges(1, &observed.q), DEGREE);
+    let functions = Functions::new(&[angle], &ranges(1, &observed.q), DECAY_DEGREE);
     let states = observed.q.len();
-    let groups = groups(states, 5)?;
+    let groups = groups(states, LEAST_GROUP_STATES)?;
     let rms = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt();
     let (speed, size, force) = (rms(&observed.v), rms(&observed.a), rms(&observed.force));
     if !(speed > 0.0 && size > 0.0) {
@@ -67,8 +62,8 @@ pub fn decay(periodic: &[bool], observed: &Observed) -> Option<Decay> {
         })
         .collect();
     let sums = Sums::of(&parts);
-    let factors = sums.solve(TRUST)?;
-    let without = sums.without(&parts, TRUST)?;
+    let factors = sums.solve(DECAY_TRUST)?;
+    let without = sums.without(&parts, DECAY_TRUST)?;
     let left: f64 = parts.iter().zip(&without).map(|(part, factors)| part.left(factors)).sum::<f64>() / states as f64;
     let error = observed.error.first().map_or(0.0, |error| error / size);
     let variance = jackknife(factors[0], without.iter().map(|factors| factors[0]));
@@ -120,6 +115,6 @@ mod tests {
         let mut rng = RngStream::Test.generator(2);
         observed.a.iter_mut().for_each(|a| *a += 10.0 * rng.random_range(-1.0..1.0));
         let found = decay(&[true], &observed).unwrap();
-        assert!(!found.is_certain() && found.left > LEFT, "{found:?}");
+        assert!(!found.is_certain() && found.left > MOST_DECAY_RESIDUAL, "{found:?}");
     }
 }

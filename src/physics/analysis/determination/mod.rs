@@ -43,6 +43,7 @@ mod decay;
 mod observed;
 mod posterior;
 
+use crate::analysis::thresholds::{CONSERVED_RATE, ENERGY_STATES, RANGE};
 pub use constants::constants;
 pub use decay::{Decay, decay};
 pub use observed::Observed;
@@ -62,9 +63,6 @@ pub struct Estimate {
     /// Upper end of the range, not below the value; infinite where the data leave the number open.
     pub high: f64,
 }
-
-/// Standard deviations on either side that a range has.
-pub const RANGE: f64 = 2.0;
 
 impl Estimate {
     /// The range of a value that a regression shifts by `shift`, with this standard deviation. The regression is of first order: half of
@@ -157,11 +155,6 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
     finite.then_some(result)
 }
 
-/// Largest rate of a momentum that counts as conserved, relative to the two parts of the rate (root mean squares). Models that explain the
-/// motion of a planet have 0.07 to 0.3 in the angle, models of a cart with some friction 0.05 to 0.45; where a force acts the rate is 0.5
-/// to 1.
-const CONSERVED: f64 = 1.0 / 3.0;
-
 /// Whether the momentum of each coordinate is conserved: whether `M a` and the change of the momentum with the position cancel.
 fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
     let n = model.coordinates();
@@ -178,11 +171,8 @@ fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
             *parts += inertia * inertia + drift * drift;
         }
     }
-    Some(squares.into_iter().map(|[rate, parts]| rate < CONSERVED * CONSERVED * parts).collect())
+    Some(squares.into_iter().map(|[rate, parts]| rate < CONSERVED_RATE * CONSERVED_RATE * parts).collect())
 }
-
-/// Largest [`misfit`] of held-out motion for which the ranges of a model are valid.
-pub const MOST_MISFIT: f64 = 0.3;
 
 /// Root mean square residual of the accelerations of each coordinate beyond their expected error, over their size: 0 where only noise is
 /// left, 1 for a model that explains nothing. `None` where the model is not finite.
@@ -220,9 +210,6 @@ impl Linear {
     }
 }
 
-/// Largest number of states at which the energy is examined.
-const ENERGIES: usize = 256;
-
 /// Numbers of the model that are requested.
 struct Wanted {
     mass: Vec<Linear>,
@@ -242,7 +229,7 @@ impl Wanted {
             energy: Vec::new(),
         };
         let states = q.len() / n;
-        let stride = states.div_ceil(ENERGIES).max(1);
+        let stride = states.div_ceil(ENERGY_STATES).max(1);
         let mut squares = vec![0.0; n];
         let none = vec![0.0; n];
         let mut used = 0.0;

@@ -1,5 +1,6 @@
 //! Observations that a model is compared with.
 
+use crate::analysis::thresholds::{EXAMINED_STATES, OUTSIDE_MARGIN};
 use crate::data::{Dataset, RecordingSplit, RecordingSplitError};
 use crate::recording::Targets;
 
@@ -24,9 +25,6 @@ pub struct Observed {
     /// not fitted.
     pub missed: Vec<f64>,
 }
-
-/// States that are examined; of more, evenly spaced ones.
-const STATES: usize = 4000;
 
 impl Observed {
     /// The training states of a fit.
@@ -94,7 +92,7 @@ impl Observed {
         let count = other.q.len() / n;
         let outside = |k: &usize| {
             let beyond = |([low, high], x): (&[f64; 2], f64)| {
-                let margin = MARGIN * (high - low);
+                let margin = OUTSIDE_MARGIN * (high - low);
                 x < low - margin || x > high + margin
             };
             ranges.iter().zip(seen(other, *k)).any(beyond)
@@ -108,14 +106,11 @@ fn is_derived(measured: &RecordingSplit, targets: Targets) -> bool {
     !(targets.takes_measured() && measured.training.recording.has_accelerations())
 }
 
-/// Evenly spaced rows of `n` numbers, at most about [`STATES`].
+/// Evenly spaced rows of `n` numbers, at most about [`EXAMINED_STATES`].
 fn some(n: usize, values: &[f64]) -> Vec<f64> {
-    let stride = (values.len() / n).div_ceil(STATES).max(1);
+    let stride = (values.len() / n).div_ceil(EXAMINED_STATES).max(1);
     values.chunks_exact(n).step_by(stride).flatten().copied().collect()
 }
-
-/// Share of a range by which a state may lie outside it.
-const MARGIN: f64 = 0.05;
 
 #[cfg(test)]
 mod tests {

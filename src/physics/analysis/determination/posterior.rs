@@ -4,6 +4,10 @@
 use super::changes::{Changes, Row, Typical};
 use super::observed::Observed;
 use super::{Estimate, Linear};
+use crate::analysis::thresholds::{
+    INFLUENCE_STATES, JACKKNIFE_GROUPS, LEAST_GROUP_STATES, LEAST_GROUPS, LEAST_INFLUENCE, LEAST_SQUARE_RESIDUAL,
+    OPEN_SHARE,
+};
 use crate::lagrangian::{EulerLagrange, Request, Terms, acting_groups};
 use crate::linalg::{MatMut, MatRef, Workspace, dot, gemm, inverse, solve};
 use std::ops::Range;
@@ -104,16 +108,17 @@ impl Data {
     }
 
     /// Groups of coordinates that do not act on each other, as far as the model knows. An influence does not count if it is below the
-    /// model's residuals beyond the error of the data, below twice its residuals on held-out motion, or below a share [`COUPLED`] of the
+    /// model's residuals beyond the error of the data, below twice its residuals on held-out motion, or below a share [`LEAST_INFLUENCE`] of the
     /// acceleration.
     pub fn groups(&self, model: &dyn EulerLagrange<f64>) -> Vec<Vec<usize>> {
-        let (n, stride) = (self.n, self.states().div_ceil(SHOWN).max(1));
+        let (n, stride) = (self.n, self.states().div_ceil(INFLUENCE_STATES).max(1));
         let some = |x: &[f64]| -> Vec<f64> { x.chunks_exact(n).step_by(stride).flatten().copied().collect() };
         let (q, v, force) = (some(&self.q), some(&self.v), some(&self.force));
         let squares = mean_squares(n, &self.missed);
         let noise = self.observed.iter().zip(&squares).enumerate().map(|(i, ([size, error, independent], square))| {
             let beyond = (square - error).max(0.0) + 2.0 * square * (2.0 / independent).sqrt();
-            let share = self.missed_elsewhere.get(i).map_or(COUPLED, |missed| COUPLED.max(2.0 * missed));
+            let share =
+                self.missed_elsewhere.get(i).map_or(LEAST_INFLUENCE, |missed| LEAST_INFLUENCE.max(2.0 * missed));
             beyond.max(share * share * size).sqrt()
         });
         let accelerations = |q: &[f64], v: &[f64]| {
@@ -160,13 +165,13 @@ impl Data {
     /// The changes that explain the residuals.
     pub fn posterior(&self, changes: &Changes) -> Option<Posterior> {
         let (n, count) = (self.n, changes.len());
-        let groups = groups(self.states(), LEAST)?;
+        let groups = groups(self.states(), LEAST_GROUP_STATES)?;
         let weights: Vec<f64> = mean_squares(n, &self.missed)
             .into_iter()
             .zip(&self.observed)
             .map(|(square, [size, _, independent])| {
                 // No number is known more accurately than its digits.
-                let square = square.max(1e-20 * size).max(f64::MIN_POSITIVE.sqrt());
+                let square = square.max(LEAST_SQUARE_RESIDUAL * size).max(f64::MIN_POSITIVE.sqrt());
                 independent / (square * self.states() as f64)
             })
             .collect();
@@ -208,17 +213,6 @@ impl Data {
     }
 }
 
-/// Share of the prior standard deviation that the data must leave for a number to count as open.
-const OPEN: f64 = 0.5;
-/// Fewest states of a group.
-const LEAST: usize = 5;
-/// Share of an acceleration up to which the influence of another coordinate may be an error of the network: small networks of motion
-/// without any coupling that miss 7 to 29 % of held-out accelerations show influences of 0.05 to 0.23, below twice that error, and networks
-/// of coupled motion that miss 4 to 11 % show 0.18 to 0.32 (as in `lnn-studies rates --part readings`).
-const COUPLED: f64 = 0.1;
-/// Largest number of states at which couplings are examined.
-const SHOWN: usize = 500;
-
 /// Mean square of each of `n` columns.
 fn mean_squares(n: usize, values: &[f64]) -> Vec<f64> {
     let count = (values.len() / n) as f64;
@@ -255,7 +249,7 @@ impl Posterior {
     /// The range of a number whose systematic error is `floor`; without ends where it would reflect the prior and not the data.
     pub fn estimate(&self, linear: &Linear, floor: f64) -> Estimate {
         let before = dot(&linear.slopes, &linear.slopes);
-        if self.believed(&linear.slopes) > OPEN * OPEN * before {
+        if self.believed(&linear.slopes) > OPEN_SHARE * OPEN_SHARE * before {
             return Estimate::open(linear.value);
         }
         let (middle, variance) = self.middle(&linear.slopes);
@@ -269,16 +263,11 @@ impl Posterior {
     }
 }
 
-/// Groups that states are cut into, each long enough to be independent of the others.
-const GROUPS: usize = 20;
-/// Fewest groups.
-const FEWEST: usize = 4;
-
 /// Groups of at least `least` consecutive states; `None` if they are too few.
 pub fn groups(states: usize, least: usize) -> Option<Vec<Range<usize>>> {
-    let groups = GROUPS.min(states / least);
+    let groups = JACKKNIFE_GROUPS.min(states / least);
     let range = |group: usize| group * states / groups..(group + 1) * states / groups;
-    (groups >= FEWEST).then(|| (0..groups).map(range).collect())
+    (groups >= LEAST_GROUPS).then(|| (0..groups).map(range).collect())
 }
 
 /// Jackknife variance of a number that is `whole` for all groups, from its values without each of them.
