@@ -33,7 +33,7 @@ pub fn place<'a>(field: &str, name: &str, coordinates: impl Iterator<Item = &'a 
 pub struct Faults(pub Vec<ConfigError>);
 
 impl Faults {
-    /// Notes a value unless it is as expected; whether it is comes back.
+    /// Notes a value unless it is as expected; returns whether it is.
     pub fn check(&mut self, ok: bool, field: &str, expected: impl Into<Cow<'static, str>>, found: String) -> bool {
         if !ok {
             self.0.push(ConfigError { field: field.to_string(), expected: expected.into(), found });

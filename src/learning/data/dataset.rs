@@ -1,6 +1,7 @@
 //! States with their accelerations, from which a network learns, and weights by the size of the accelerations, so that a few large ones do
 //! not outweigh the others.
 
+use super::thresholds::{STATES_PER_DISTANCE, WIDENED_RANGE};
 use crate::lagrangian::{Manifold, ManifoldRows, project, project_acceleration};
 use crate::network::file::StoredPrecision;
 use crate::recording::RecordedTrajectory;
@@ -27,7 +28,7 @@ pub struct Dataset<S> {
     force_scale: Vec<S>,
 }
 
-/// Why numbers do not make a dataset.
+/// Why numbers do not form a dataset.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DatasetError {
@@ -283,8 +284,7 @@ impl<S: Scalar> Dataset<S> {
     /// Smallest and largest value of every coordinate, and of every velocity; a little more under constraints, which leave some of them
     /// no width but rounding.
     pub(crate) fn ranges(&self) -> [Vec<[f64; 2]>; 2] {
-        const MORE: f64 = 1e-3;
-        let (n, more) = (self.coordinates, if self.constraints() > 0 { MORE } else { 0.0 });
+        let (n, more) = (self.coordinates, if self.constraints() > 0 { WIDENED_RANGE } else { 0.0 });
         [&self.q, &self.v].map(|values| {
             let range = |i: usize| {
                 let all = values.iter().skip(i).step_by(n).map(|x| x.to_f64());
@@ -356,7 +356,7 @@ pub struct Datasets<S> {
     pub training: Vec<Dataset<S>>,
     /// Validation states.
     pub validation: Dataset<S>,
-    /// Fresh states for the final figure.
+    /// Fresh states for the final error.
     pub test: Dataset<S>,
 }
 
@@ -369,9 +369,6 @@ impl<S: Scalar> Datasets<S> {
         training.chain(others).map(|(name, set)| (name, set.checksum())).collect()
     }
 }
-
-/// States that are about as far from the centre.
-const ALIKE: usize = 200;
 
 /// Sizes with which accelerations are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -412,7 +409,7 @@ impl Weighting<'_> {
         set.with_weights(uncertain.into_iter().map(weight).collect())
     }
 
-    /// The states with the weights `1/(|a| + f m + e)`, `m` the median of `|a|` among [`ALIKE`] states at about the same distance from the
+    /// The states with the weights `1/(|a| + f m + e)`, `m` the median of `|a|` among [`STATES_PER_DISTANCE`] states at about the same distance from the
     /// centre of these coordinates; unchanged for `f = 0`.
     pub fn by_distance<S: Scalar>(&self, set: Dataset<S>, around: &[usize]) -> Result<Dataset<S>, DatasetError> {
         if self.floor == 0.0 {
@@ -424,7 +421,7 @@ impl Weighting<'_> {
         let mut order: Vec<usize> = (0..set.len()).collect();
         order.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
         let mut weights = vec![S::of_f64(1.0); set.len()];
-        for group in order.chunks(ALIKE) {
+        for group in order.chunks(STATES_PER_DISTANCE) {
             let mut alike: Vec<f64> = group.iter().map(|&k| sizes[k]).collect();
             alike.sort_by(f64::total_cmp);
             let floor = self.floor * alike[alike.len() / 2];

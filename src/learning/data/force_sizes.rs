@@ -1,12 +1,10 @@
 //! Sizes of known forces, of the inertias that they move, and of the errors to expect from a model.
 
+use super::thresholds::FORCE_ERROR;
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::network::Sizes;
 use crate::recording::INERTIAL_SHARE;
 use crate::scalar::Scalar;
-
-/// Share of the spread of a force that is added to its error besides noise: no model is more accurate than that.
-const MISSED: f64 = 0.1;
 
 /// Mean, standard deviation and root mean square of column `i` of `(states, n)` numbers.
 fn moments<S: Scalar>(values: &[S], n: usize, i: usize) -> [f64; 3] {
@@ -55,7 +53,7 @@ pub(crate) fn by_forces<S: Scalar>(
 ) -> Result<Dataset<S>, DatasetError> {
     let errors = force.iter().zip(inertias(like).into_iter().zip(acceleration)).zip(force_spreads(like));
     let scale = errors.map(|((noise, (inertia, error)), spread)| {
-        let all = noise.hypot(inertia * error).hypot(MISSED * spread);
+        let all = noise.hypot(inertia * error).hypot(FORCE_ERROR * spread);
         S::of_f64(all)
     });
     let scale = scale.collect();

@@ -6,6 +6,7 @@ mod of_config;
 mod recording_split;
 mod sampling;
 mod shell;
+mod thresholds;
 
 pub(crate) use dataset::Weighting;
 pub use dataset::{Dataset, DatasetError, Datasets};

@@ -4,6 +4,7 @@
 //! local polynomials ([`Smoothing`]) unless they were measured; accelerations so obtained start a network that may then
 //! be fitted through its motion ([`shooting`](crate::shooting)).
 
+use super::thresholds::LEAST_NOISE;
 use crate::data::dataset::{Dataset, DatasetError, Datasets, Noise, StateEstimate, Weighting};
 use crate::data::force_sizes::by_forces;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise};
@@ -41,25 +42,25 @@ impl Default for PrepareOptions {
     }
 }
 
-/// Why recorded motion cannot be learned from.
+/// Why nothing can be learned from recorded motion.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingSplitError {
     /// Too little data to hold anything out.
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),
-    /// No derivatives.
+    /// Derivatives cannot be estimated.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
-    /// A coordinate that stands still, or follows from others.
+    /// A coordinate that does not move, or that follows from others.
     #[error("{coordinate} {how}; leave it out of the coordinates, or record motion in which it moves independently")]
     Motionless {
         /// Its name.
         coordinate: String,
-        /// The way it does.
+        /// The reason.
         how: Stillness,
     },
-    /// Numbers that make no dataset.
+    /// Numbers that do not form a dataset.
     #[error("{which}: {source}")]
     Dataset {
         /// Training, validation or test.
@@ -221,7 +222,7 @@ impl RecordingSplit {
         Ok(Self { training, validation, test, held_out, most_states: *most_states, smoothing })
     }
 
-    /// The way that suits the data.
+    /// The quantity that suits the data.
     pub(crate) fn advice(&self) -> Targets {
         Targets::advised(&self.training.recording, &self.smoothing)
     }
@@ -314,9 +315,6 @@ impl RecordingSplit {
         Noise { q, v }
     }
 }
-
-/// Smallest noise that is assumed, relative to the size of the data.
-const LEAST_NOISE: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! Training data of hand-written systems: uniform states, or states along exact motions, with exact accelerations.
 
+use super::thresholds::{SLOWEST, STATES_PER_MOTION};
 use crate::configuration::{Config, ConfigError};
 use crate::data::dataset::{Dataset, DatasetError, Datasets, Weighting};
 use crate::data::shell::{in_shell, weigh_by_distance};
@@ -43,7 +44,7 @@ fn fill(
     let n = bounds.0.len();
     let mut refused = 0_usize;
     while drawn.q.len() < states * n {
-        Drawn::go_on(interrupt)?;
+        Drawn::check_interrupt(interrupt)?;
         let (mut q, mut v) = draw(bounds, log_uniform, rng);
         let demand = match drawn.impose(&mut q, &mut v)? {
             None => drawn.take(&q, &v)?,
@@ -58,9 +59,6 @@ fn fill(
     }
     drawn.finish()
 }
-
-/// Slowest velocity off a mass shell, as a part of one on it.
-const SLOWEST: f64 = 0.03;
 
 /// Slows a `fraction` of geodesic states down and reverses half of them: `v -> u v`, `a -> u^2 a`, `|u|` between
 /// [`SLOWEST`] and 1, uniform in its logarithm.
@@ -171,7 +169,7 @@ pub enum SamplingError {
         /// Which bounds.
         field: String,
     },
-    /// A flag ended it.
+    /// A flag was raised.
     #[error("interrupted while states were drawn")]
     Interrupted,
     /// The accelerations do not fit the precision.
@@ -205,11 +203,11 @@ impl<'a> Drawn<'a> {
         Ok(Self { system, model, q: Vec::new(), v: Vec::new(), a: Vec::new() })
     }
 
-    /// Continues unless a flag was raised.
+    /// Checks that no flag was raised.
     ///
     /// # Errors
     /// [`SamplingError::Interrupted`].
-    pub fn go_on(interrupt: &AtomicBool) -> Result<(), SamplingError> {
+    pub fn check_interrupt(interrupt: &AtomicBool) -> Result<(), SamplingError> {
         if interrupt.load(Ordering::Relaxed) { Err(SamplingError::Interrupted) } else { Ok(()) }
     }
 
@@ -282,9 +280,6 @@ pub(crate) fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
     bounds.iter().map(|&(low, high)| [low, high]).collect()
 }
 
-/// Average number of states that a motion of full length contributes.
-const PER_MOTION: f64 = 10.0;
-
 /// Draws `states` states of exact motions from the starts of the system's trajectory test, every sample up to its end with
 /// the same chance; a motion ends where it leaves the bounds. An angle is turned back into its bounds, to any turn that lies
 /// within them. Starts are drawn as states are, half of the log-uniform coordinates uniform in their logarithm.
@@ -313,11 +308,11 @@ fn along_motions<'a>(
         .tolerances(1e-9, 1e-9)
         .energy(false)
         .domain(Domain::new(chart.chain(pace).collect()));
-    let chance = PER_MOTION * test.dt / test.t_end;
+    let chance = STATES_PER_MOTION * test.dt / test.t_end;
     let mut drawn = Drawn::new(system)?;
     let mut motions = 0;
     while drawn.q.len() < states * n {
-        Drawn::go_on(interrupt)?;
+        Drawn::check_interrupt(interrupt)?;
         if motions > 100 && drawn.q.len() < motions * n {
             return Err(SamplingError::Motions { field: field.to_string() });
         }

@@ -34,7 +34,7 @@ pub(crate) fn in_shell(
     let [low, high] = shell.radius;
     let (mut drawn, mut refused) = (Drawn::new(system)?, 0_usize);
     while drawn.q.len() < states * n {
-        Drawn::go_on(interrupt)?;
+        Drawn::check_interrupt(interrupt)?;
         let (mut q, _) = draw((position, &[]), &[], rng);
         let radius = low * (high / low).powf(rng.random::<f64>());
         for (&i, part) in around.iter().zip(direction(around.len(), rng)) {

@@ -2,7 +2,7 @@
 //!
 //! For a weight matrix `W` with gradient `G` the running means of `G G^T` and `G^T G` have eigenvectors `U`, `V` (as
 //! rows); Adam works on `U G V^T`, where the curvature is closer to diagonal, and its step is turned back. The
-//! eigenvectors follow by a step of subspace iteration every [`EVERY`] steps.
+//! eigenvectors follow by a step of subspace iteration every [`STEPS_PER_UPDATE`] steps.
 
 use crate::learning::state::numbers;
 use crate::linalg::{MatMut, MatRef, Workspace, eigh, gemm};
@@ -10,10 +10,10 @@ use crate::optimizers::{Part, Rule, Update};
 use crate::scalar::{Real, Scalar, vectorized};
 use serde::{Deserialize, Serialize};
 
-/// Steps between two looks at the eigenvectors.
-const EVERY: u32 = 10;
-/// Sides longer than this are not turned.
-const LONGEST: usize = 1024;
+/// Steps between two updates of the eigenvectors (the preconditioning frequency of Vyas et al. 2024).
+const STEPS_PER_UPDATE: u32 = 10;
+/// Longest side of a matrix that has eigenvectors; longer sides are not rotated.
+const LONGEST_SIDE: usize = 1024;
 
 /// A weight matrix within the flat parameters, row-major.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,7 +34,7 @@ impl Block {
 
     /// Lengths of the sides that are turned.
     fn sides(&self) -> [usize; 2] {
-        [self.rows, self.cols].map(|size| if (2..=LONGEST).contains(&size) { size } else { 0 })
+        [self.rows, self.cols].map(|size| if (2..=LONGEST_SIDE).contains(&size) { size } else { 0 })
     }
 
     /// Numbers that the eigenbases of these matrices keep; `None` if they cannot be counted.
@@ -97,7 +97,7 @@ impl<S: Scalar> Eigenbasis<S> {
         rotate(*block, sides, Choice::Vectors, part.gradient, half);
         part.advance(&step.rule);
         rotate(*block, sides, Choice::Inverse, part.gradient, half);
-        if step.number.is_multiple_of(EVERY) {
+        if step.number.is_multiple_of(STEPS_PER_UPDATE) {
             let [left, right] = &mut *sides;
             both(parallel, || left.update_basis(), || right.update_basis());
             rotate(*block, sides, Choice::Turn, part.first, half);
@@ -167,7 +167,7 @@ impl<S: Scalar> Step<S> {
 
     /// Advances all parameters: matrices in their `bases`, all others one by one.
     ///
-    /// No number depends on which thread makes it.
+    /// The result does not depend on the threads.
     pub fn take(&self, mut part: Part<'_, S>, bases: &mut [Eigenbasis<S>], parallel: bool) {
         match bases {
             [] => {
@@ -191,17 +191,17 @@ impl<S: Scalar> Step<S> {
     }
 }
 
-/// Running means after a step.
-const KEEP: f64 = 0.95;
+/// Decay of the running means of `G G^T` and `G^T G` (beta of Shampoo in Vyas et al. 2024).
+const COVARIANCE_DECAY: f64 = 0.95;
 /// Rows of a square that are multiplied at once, up to the last column that lies on the diagonal.
-const ROWS: usize = 32;
+const ROWS_AT_ONCE: usize = 32;
 
 /// Running mean of `G G^T` or `G^T G` and its eigenvectors as rows, `(size, size)`; empty if this side is not turned.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 pub(super) struct Side<S> {
     pub size: usize,
-    /// Up to its diagonal; beyond it lie numbers of the last look at the eigenvectors.
+    /// Up to its diagonal; beyond it are numbers of the last update of the eigenvectors.
     #[serde(with = "numbers")]
     pub covariance: Vec<S>,
     #[serde(with = "numbers")]
@@ -240,12 +240,12 @@ impl<S: Scalar> Side<S> {
         if self.size == 0 {
             return;
         }
-        let (keep, take) = if first { (0.0, 1.0) } else { (KEEP, 1.0 - KEEP) };
+        let (keep, take) = if first { (0.0, 1.0) } else { (COVARIANCE_DECAY, 1.0 - COVARIANCE_DECAY) };
         let keep = S::of_f64(keep);
         self.covariance.iter_mut().for_each(|c| *c *= keep);
         let size = self.size;
-        for start in (0..size).step_by(ROWS) {
-            let end = (start + ROWS).min(size);
+        for start in (0..size).step_by(ROWS_AT_ONCE) {
+            let end = (start + ROWS_AT_ONCE).min(size);
             let rows = MatMut::with_stride(&mut self.covariance[start * size..], end - start, end, size);
             gemm(rows, true, S::of_f64(take), g.row_range(start, end), g.row_range(0, end).t());
         }
@@ -310,7 +310,7 @@ fn product<S: Scalar>(size: usize, out: &mut [S], a: &[S], b: MatRef<'_, S>) {
 }
 
 /// Rows that are made orthonormal at once.
-const PANEL: usize = 16;
+const ORTHONORMAL_ROWS: usize = 16;
 
 /// Makes the rows orthonormal, one after the other: a block of rows against those before it by matrix products, then within
 /// itself, all of it twice (Giraud, Langou, Rozložník 2005: twice is enough; for blocks Barlow, Smoktunowicz 2013); `false` if
@@ -319,9 +319,9 @@ const PANEL: usize = 16;
 /// `scratch` has room for as many numbers as `rows`.
 fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S], scratch: &mut [S]) -> bool {
     let one = <S as Real>::one();
-    for start in (0..size).step_by(PANEL) {
+    for start in (0..size).step_by(ORTHONORMAL_ROWS) {
         let (before, rest) = rows.split_at_mut(start * size);
-        let count = PANEL.min(size - start);
+        let count = ORTHONORMAL_ROWS.min(size - start);
         let block = &mut rest[..count * size];
         if !normalize(size, block) {
             return false;
@@ -549,7 +549,7 @@ mod tests {
             let numbers = random(size * other, step);
             let g = MatRef::new(&numbers, size, other);
             side.observe(g, step == 0);
-            let keep = if step == 0 { 0.0 } else { KEEP };
+            let keep = if step == 0 { 0.0 } else { COVARIANCE_DECAY };
             mean.iter_mut().for_each(|c| *c *= keep);
             gemm(MatMut::new(&mut mean, size, size), true, 1.0 - keep, g, g.t());
         }

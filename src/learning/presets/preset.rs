@@ -243,7 +243,7 @@ pub(crate) fn of_states() -> Config {
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no
-/// Lorentzian metric could satisfy; its text says Lorentzian Sylvester, and that is what stands here.
+/// Lorentzian metric could satisfy; its text says Lorentzian Sylvester, which is used here.
 fn paper(system: &SystemInstance<f64>) -> Option<Config> {
     let n = system.coordinates;
     let PaperBudget { states, hidden, phases } = system.system.learning.paper?;

@@ -1,4 +1,4 @@
-//! Times of a trajectory's samples: the usual step, gaps, windows around a sample.
+//! Times of a trajectory's samples: the typical step, gaps, windows around a sample.
 
 use super::thresholds::{
     BRIDGED_STEPS, EVEN_ROUNDINGS, EXAMINED_STEPS, GAP_DEVIATIONS, GAP_QUANTILE, GAP_STEPS, TYPICAL_SPAN,
@@ -20,20 +20,20 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Looks at the steps of a trajectory.
+    /// Measures the steps of a trajectory.
     ///
     /// A gap is a step longer than one and a half typical ones. Where sampling is uneven, it is longer than the median plus six robust
     /// standard deviations, and than one and a half times the 90 % quantile.
     pub fn of(times: &[f64]) -> Self {
         let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
         let stride = (times.len() / EXAMINED_STEPS).max(1);
-        let mut some: Vec<f64> = steps().step_by(stride).collect();
-        let most = quantile(&mut some, GAP_QUANTILE);
-        let middle = median(&mut some);
-        for step in &mut some {
+        let mut sampled: Vec<f64> = steps().step_by(stride).collect();
+        let most = quantile(&mut sampled, GAP_QUANTILE);
+        let middle = median(&mut sampled);
+        for step in &mut sampled {
             *step -= middle;
         }
-        let robust = robust_deviation(&mut some);
+        let robust = robust_deviation(&mut sampled);
         let longest = (middle + ((GAP_STEPS - 1.0) * middle).max(GAP_DEVIATIONS * robust)).max(GAP_STEPS * most);
         if is_even(times) {
             return Self { step: middle, spread: robust, longest, even: true };

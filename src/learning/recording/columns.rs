@@ -42,7 +42,7 @@ pub struct Columns {
     pub whole: bool,
 }
 
-/// Why a description of columns makes no sense, whatever the data.
+/// Mistakes in a description of columns that show without the data.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{}", .0.join("; "))]
 pub struct ColumnsError(pub Vec<String>);
@@ -118,7 +118,7 @@ impl Columns {
         }
         if let (true, Some(column)) = (self.wide, &self.trajectory) {
             wrong.push(format!(
-                "expected trajectories either side by side (wide) or told by the column {column}, found both"
+                "expected trajectories either side by side (wide) or distinguished by the column {column}, found both"
             ));
         }
         self.check_units(&mut wrong);

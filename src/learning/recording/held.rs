@@ -1,7 +1,7 @@
 //! Readings that a sensor held while the motion went on.
 //!
 //! A driver that misses a new reading repeats the previous one, digit by digit. Such a reading is late by a step, an error of the motion's
-//! velocity times the step, which no average takes out. It is taken for missing and filled in from the readings around it.
+//! velocity times the step, which averaging does not remove. It is treated as missing and interpolated from the readings around it.
 
 use super::thresholds::{
     EXAMINED_MARKS, FINE_STEPS, FRESH_NEIGHBOURS, LEAST_MARKED_CHANGES, MANY_REPETITIONS, MOST_REPETITIONS,
@@ -17,7 +17,7 @@ pub(crate) struct Filled {
 }
 
 impl Filled {
-    /// Adds missing readings, which `recording` has filled in.
+    /// Marks missing readings, which `recording` has filled in, as held too.
     pub fn without(this: Option<Self>, recording: &Recording, missing: &[Vec<bool>]) -> Option<Self> {
         if !missing.iter().flatten().any(|missing| *missing) {
             return this;
@@ -43,7 +43,7 @@ pub(crate) fn filled(recording: &Recording) -> Option<Filled> {
     let mut filled = recording.clone();
     let mut held: Vec<Vec<bool>> = recording.tracks.iter().map(|track| vec![false; track.q.len()]).collect();
     for i in 0..n {
-        let scale = Scale::of(recording, i);
+        let scale = SensorResolution::of(recording, i);
         for ((track, filled), held) in recording.tracks.iter().zip(&mut filled.tracks).zip(&mut held) {
             let values: Vec<f64> = track.q.iter().skip(i).step_by(n).copied().collect();
             let fresh = scale.fresh(&track.times, &values);
@@ -57,14 +57,14 @@ pub(crate) fn filled(recording: &Recording) -> Option<Filled> {
 }
 
 /// The resolution of a sensor.
-struct Scale {
+struct SensorResolution {
     /// Smallest change of a reading.
     smallest: f64,
     /// `true` if the sensor holds readings however slow the motion is.
     holds: bool,
 }
 
-impl Scale {
+impl SensorResolution {
     fn of(recording: &Recording, i: usize) -> Self {
         let n = recording.n();
         let changes = recording.tracks.iter().flat_map(|track| {
@@ -106,7 +106,7 @@ impl Scale {
 
 /// Distance of the marks of coordinate `i`, if its sensor has some: small changes are whole numbers of them.
 pub(crate) fn marks(recording: &Recording, i: usize) -> Option<f64> {
-    let Scale { smallest, .. } = Scale::of(recording, i);
+    let SensorResolution { smallest, .. } = SensorResolution::of(recording, i);
     let n = recording.n();
     let changes = recording.tracks.iter().flat_map(|track| {
         let values = || track.q.iter().skip(i).step_by(n);

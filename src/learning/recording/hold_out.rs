@@ -1,4 +1,4 @@
-//! Training and validation, apart by whole trajectories.
+//! Division of a recording into training and validation by whole trajectories.
 
 use crate::names::pluralize;
 use crate::random::RngStream;

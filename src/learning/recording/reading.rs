@@ -39,7 +39,7 @@ impl Rows {
     }
 }
 
-/// A step in time so long that the trajectory was cut there.
+/// A gap in time at which a trajectory was cut.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cut {
     /// The file.
@@ -175,7 +175,7 @@ impl Targets {
         matches!(self, Self::Measured | Self::Forces)
     }
 
-    /// The way that suits the data: measured accelerations if there are any; known forces if they are noisier than the accelerations;
+    /// The quantity that suits the data: measured accelerations if there are any; known forces if they are noisier than the accelerations;
     /// smoothed accelerations if they are accurate to `LARGE_ACCELERATION_ERROR`; otherwise the motion itself.
     pub(crate) fn advised(recording: &Recording, smoothing: &Smoothing) -> Self {
         if recording.has_accelerations() {

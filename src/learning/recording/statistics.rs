@@ -17,7 +17,7 @@ pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Standard deviation of normal numbers of mean 0, some of them spoilt: median magnitude over 0.6745. Reorders.
+/// Standard deviation of normal numbers of mean 0 with outliers: median magnitude over 0.6745. Reorders.
 pub fn robust_deviation(values: &mut [f64]) -> f64 {
     for x in values.iter_mut() {
         *x = x.abs();

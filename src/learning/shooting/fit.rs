@@ -1,5 +1,6 @@
 //! From recorded trajectories and a first guess of the weights to a network fitted through its motion.
 
+use super::thresholds::{INTEGRATION_ERROR, MEASURED_SEGMENTS};
 use crate::configuration::{ConfigError, Penalty};
 use crate::data::{Noise, StateEstimate};
 use crate::lagrangian::{FormulaConstraints, FormulaError, Manifold};
@@ -163,10 +164,6 @@ impl<S: Scalar> Task<'_, S> {
 
 const TRAINING: &str = "training trajectories";
 const VALIDATION: &str = "validation trajectories";
-/// Largest root mean square error of the integrator, in units of noise.
-const INTEGRATION_ERROR: f64 = 0.05;
-/// Segments on which it is measured.
-const PROBES: usize = 64;
 
 /// Root mean square difference of the predictions of two cuts of the same trajectories, in units of noise.
 fn difference<S: Scalar>(
@@ -175,7 +172,7 @@ fn difference<S: Scalar>(
     coarse: &Segments<S>,
     fine: &Segments<S>,
 ) -> f64 {
-    let rows = coarse.cross_section(PROBES);
+    let rows = coarse.cross_section(MEASURED_SEGMENTS);
     let mut residuals = |segments: &Segments<S>| shots.residuals(weights, segments, segments.starts(), &rows);
     let (coarse, fine) = (residuals(coarse), residuals(fine));
     let differences = coarse.iter().zip(&fine).map(|(&a, &b)| (a - b).to_f64()).filter(|d| d.is_finite());

@@ -1,5 +1,6 @@
 //! Segments of motion as the data of the loop over epochs: their starts are fitted together with the weights.
 
+use super::thresholds::{FIRST_STEPS, SEGMENTS_PER_LEFT_OUT};
 use crate::learning::state::{self, numbers};
 use crate::optimizers::{Method, Moments};
 use crate::scalar::{Real, Scalar};
@@ -11,11 +12,6 @@ use crate::training::learner::{Learner, Validation};
 use argmin::core::KV;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// At most one in this many validation segments may be left out of a loss that counts.
-const LEFT_OUT: usize = 20;
-/// Gauss-Newton steps of all starts before the first epoch.
-const PREPARATION: usize = 3;
 
 /// Problem of an argmin run.
 pub(super) struct ShootingProblem<S> {
@@ -123,7 +119,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
     }
 
     fn begin(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Option<f64> {
-        for _ in 1..PREPARATION {
+        for _ in 1..FIRST_STEPS {
             self.starts.refine(&mut problem.shots, weights, &problem.training);
             self.validation_starts.refine(&mut problem.shots, weights, &problem.validation);
         }
@@ -172,7 +168,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
         let rows: Vec<u32> = (0..validation.len() as u32).collect();
         let report = shots.loss(weights, validation, &self.validation_starts.at, &rows);
         let loss = report.loss.to_f64();
-        let counts = loss.is_finite() && LEFT_OUT * report.left_out <= validation.len();
+        let counts = loss.is_finite() && SEGMENTS_PER_LEFT_OUT * report.left_out <= validation.len();
         let loss = if counts { loss } else { f64::INFINITY };
         Validation { loss, cost: loss }
     }

@@ -31,6 +31,7 @@ mod segments;
 mod settings;
 mod starts;
 mod starts_allowed;
+mod thresholds;
 
 pub use fit::{Fitted, ShootingError, Task, fit, resume};
 pub use objective::ShootingObjective;

@@ -147,7 +147,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Residuals of the chunk that was shot, `NaN` for segments given up.
+    /// Residuals of the integrated chunk, `NaN` for segments that are left out.
     fn add_values(&mut self, segments: &Segments<S>, rows: &[u32]) {
         let Self { integrator, values, .. } = self;
         for (row, &segment) in rows.iter().enumerate() {

@@ -5,6 +5,7 @@
 //! of positions and velocities at both, whose error is of the integrator's own order 4. Periodic coordinates are counted
 //! from a multiple of `2 pi` near the segment's start, so that a motion of many turns loses no digits.
 
+use super::thresholds::{NOISE_RANGE, STATE_RANGE};
 use crate::data::{Noise, StateEstimate};
 use crate::lagrangian::Manifold;
 use crate::network::Architecture;
@@ -15,9 +16,6 @@ use crate::shooting::starts_allowed::StartsAllowed;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// A state may leave the range of the data by this factor before its segment is given up.
-const RANGE: f64 = 10.0;
 
 /// One segment.
 #[derive(Clone, Debug)]
@@ -158,7 +156,7 @@ impl<S: Scalar> Segments<S> {
         }
         // If nothing moves, the noise sets the range.
         all.range = (0..2 * n)
-            .map(|k| S::of_f64(RANGE * largest[k] / scale(k % n)).max(S::of_f64(100.0 * RANGE) * all.tau[k]))
+            .map(|k| S::of_f64(STATE_RANGE * largest[k] / scale(k % n)).max(S::of_f64(NOISE_RANGE) * all.tau[k]))
             .collect();
         all
     }

@@ -6,17 +6,11 @@
 //! is that of the loss with starts eliminated, without the steep directions that starts can compensate (Golub and Pereyra 1973, variable
 //! projection). After that the exact gradient `g`, which is available anyway, corrects the remainder by `-H^-1 g`.
 
+use super::thresholds::{LONGEST_CORRECTION, START_DAMPING, START_DIFFERENCE};
 use crate::linalg::{Workspace, solve};
 use crate::scalar::{Real, Scalar};
 use crate::shooting::loss::Huber;
 use crate::shooting::segments::Segments;
-
-/// Weight, relative to the observations, of keeping an initial state unchanged: it keeps `H` regular where data do not determine it.
-const DAMPING: f64 = 1e-2;
-/// A correction is at most this part of the range that a state may move in.
-const LONGEST: f64 = 1e-2;
-/// Differences are this many times the root of the precision of the largest excursion, a tenth of the range.
-const DIFFERENCE: f64 = 0.1;
 
 /// Residuals of a chunk at its starts and at starts moved along each component.
 #[derive(Clone, Debug)]
@@ -36,10 +30,10 @@ impl<S> Default for Linearisation<S> {
 impl<S: Scalar> Linearisation<S> {
     /// Step of component `k`.
     pub fn difference(&self, segments: &Segments<S>, k: usize) -> S {
-        S::epsilon().sqrt() * S::of_f64(DIFFERENCE) * segments.range[k]
+        S::epsilon().sqrt() * S::of_f64(START_DIFFERENCE) * segments.range[k]
     }
 
-    /// Appends curvature, `(rows, 2n, 2n)`, and gradient, `(rows, 2n)`, of the rows. Rows that were given up have the gradient 0, so that their
+    /// Appends curvature, `(rows, 2n, 2n)`, and gradient, `(rows, 2n)`, of the rows. Rows that are left out have the gradient 0, so that their
     /// starts do not move.
     pub fn add(
         &self,
@@ -65,7 +59,7 @@ impl<S: Scalar> Linearisation<S> {
                 let square = (segments.tau[k] * segments.tau[k]).recip();
                 // The gap before this start.
                 let before = if segment.has_previous { two * continuity } else { zero };
-                h[k * width + k] = square * (S::of_f64(DAMPING) + before);
+                h[k * width + k] = square * (S::of_f64(START_DAMPING) + before);
             }
             let j = jacobian.len();
             jacobian.resize(j + count * width, zero);
@@ -194,7 +188,7 @@ impl<S: Scalar> Curvature<S> {
                 }
             };
             let Some(step) = step else { continue };
-            let limit = |k: usize| S::of_f64(LONGEST) * segments.range[k];
+            let limit = |k: usize| S::of_f64(LONGEST_CORRECTION) * segments.range[k];
             let excess = (0..width).map(|k| share * step[k].abs() / limit(k));
             let excess = excess.fold(<S as Real>::one(), |most, x| if x > most { x } else { most });
             for (x, &d) in start.iter_mut().zip(&step) {

@@ -1,4 +1,4 @@
-//! Starts under constraints: where they may be, and the steps that keep them there.
+//! Starts under constraints: the states that are allowed, and the steps that satisfy the constraints.
 
 use crate::lagrangian::{Bordered, Manifold, ManifoldRows, project};
 use crate::linalg::Workspace;

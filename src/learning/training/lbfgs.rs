@@ -3,6 +3,7 @@
 //! Minimises loss plus penalty plus `weight_decay |w|^2 / 2` over all training states of the last phase. The loss is an absolute value,
 //! whose kinks end the line search sooner or later; the result is the iterate with the lowest validation loss, which may be the start.
 
+use super::thresholds::EVALUATIONS_PER_ITERATION;
 use crate::configuration::Lbfgs;
 use crate::training::checkpoint::Clock;
 use crate::training::epoch::Epoch;
@@ -12,9 +13,6 @@ use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, Probl
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use std::sync::atomic::Ordering;
-
-/// Evaluations an iteration may take on average; argmin's line searches know no limit.
-const EVALUATIONS: usize = 20;
 
 /// Start of a refinement, the same for all iterations.
 pub(crate) struct Start {
@@ -40,7 +38,7 @@ pub(crate) struct Refined {
     pub history: Vec<Epoch>,
 }
 
-/// The problem with an end to its evaluations.
+/// The problem with a limited number of evaluations.
 #[derive(Clone, Copy)]
 struct Bounded<'p, 'a> {
     problem: &'p TrainingProblem<'a, f64>,
@@ -83,7 +81,7 @@ impl Gradient for Bounded<'_, '_> {
     }
 }
 
-/// The iterates so far, kept apart from argmin: an error of a line search ends its run and takes problem and solver along.
+/// The iterates so far, kept outside argmin, which drops problem and solver if a line search fails.
 struct Record<'p, 'a> {
     problem: &'p TrainingProblem<'a, f64>,
     hooks: &'p Hooks,
@@ -165,13 +163,14 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
     }
 }
 
-/// Polishes; a failed line search ends it and keeps the best iterate.
+/// Refines the weights; a failed line search ends this and keeps the best iterate.
 ///
 /// # Errors
 /// The message of argmin if not even the start could be evaluated.
 pub(crate) fn lbfgs(settings: &Lbfgs, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Refined, String> {
     let Start { weights, validation_loss, last, clock, hooks } = start;
-    let bounded = Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS) };
+    let bounded =
+        Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS_PER_ITERATION) };
     let refined = Refined { weights: None, validation_loss, history: Vec::new() };
     let mut record = Record { problem, hooks: &hooks, last, clock, refined };
     let search = MoreThuenteLineSearch::new().with_bounds(1e-10, 10.0).map_err(|e| e.to_string())?;

@@ -1,5 +1,6 @@
 //! Samples that the loop over epochs learns from: states of a dataset here, segments of motion in multiple shooting.
 
+use super::thresholds::STATES_PER_LEFT_OUT;
 use crate::optimizers::{Method, Moments};
 use crate::scalar::Scalar;
 use crate::training::objective::BatchReport;
@@ -7,9 +8,6 @@ use crate::training::problem::TrainingProblem;
 use argmin::core::KV;
 use std::marker::PhantomData;
 use std::sync::Arc;
-
-/// At most one in this many validation states may be left out of a loss that counts.
-const LEFT_OUT: usize = 100;
 
 /// Loss of the validation samples.
 pub(crate) struct Validation {
@@ -106,7 +104,7 @@ impl<'a, S: Scalar> Learner<S> for States<'a> {
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let report = problem.validation_loss(weights);
         let loss = report.loss.to_f64();
-        let counts = loss.is_finite() && LEFT_OUT * report.left_out <= problem.validation().len();
+        let counts = loss.is_finite() && STATES_PER_LEFT_OUT * report.left_out <= problem.validation().len();
         Validation { loss, cost: if counts { loss } else { f64::INFINITY } }
     }
 }

@@ -1,4 +1,4 @@
-//! Memory that a training takes, known before it is taken.
+//! Estimate of the memory that a training takes.
 
 use crate::configuration::Regularizer;
 use crate::configuration::{Config, Precision};
@@ -13,7 +13,7 @@ const VECTORS: u64 = 12;
 const COPIES: u64 = 4;
 /// Vectors of all weights in a checkpoint, as often as each is held while it is written.
 const CHECKPOINT: u64 = 6 * COPIES;
-/// Vectors of all weights that polishing holds in addition to two for each pair that it remembers.
+/// Vectors of all weights that L-BFGS holds in addition to two for each pair that it remembers.
 const LBFGS: u64 = 14;
 
 /// Approximate upper bound of the bytes that a training takes; `None` if they cannot be counted in 64 bits.
@@ -29,7 +29,7 @@ const LBFGS: u64 = 14;
 ///   matrices, and `8 s r` for writing a checkpoint;
 /// - shards: `s (P + 64 j (w (2 c + 21) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
 ///   channels and `j` evaluations side by side, 1 without penalty and 2 with one, the latter with `n^2` more numbers per state;
-/// - polishing with memory `m`, which makes `s = 8` in the shards: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
+/// - L-BFGS with memory `m`, which makes `s = 8` in the shards: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
 pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u64> {
     let layout = Layout::new(architecture);
     let number = match config.precision {

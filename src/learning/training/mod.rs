@@ -12,6 +12,7 @@ mod problem;
 mod recipe;
 pub(crate) mod reduction;
 pub(crate) mod solver;
+mod thresholds;
 pub(crate) mod trainer;
 pub(crate) mod violations;
 

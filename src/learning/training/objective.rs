@@ -196,7 +196,7 @@ impl<S: Scalar> Shard<S> {
         true
     }
 
-    /// Keeps the diagonals of the chunk's mass matrices and whatever has not plainly the right signature.
+    /// Keeps the diagonals of the chunk's mass matrices, and the states whose signature is not clearly right.
     fn note_suspects(&mut self, penalty: Penalty) {
         let n = self.scale.len();
         for matrix in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n) {

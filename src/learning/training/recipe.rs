@@ -20,14 +20,14 @@ pub struct TrainingResult<S> {
     pub trained: Trained<S>,
 }
 
-/// Why a configuration gave no network.
+/// Why a configuration could not be trained.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecipeError {
-    /// The data could not be made.
+    /// The data could not be sampled.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// The network could not be made.
+    /// The network could not be built.
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// Training failed.

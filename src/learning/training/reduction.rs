@@ -1,10 +1,8 @@
 //! Sums over the shards of a batch in order, so that the numbers do not depend on the number of threads.
 
+use super::thresholds::PARAMETERS_AT_ONCE;
 use crate::scalar::Scalar;
 use rayon::prelude::*;
-
-/// Parameters summed at a time.
-const BLOCK: usize = 1 << 14;
 
 /// Writes the sum of the gradients of all `shards`, at least one, to `out`; nothing is allocated.
 pub(crate) fn sum_gradients<S: Scalar, T: Sync>(
@@ -14,8 +12,8 @@ pub(crate) fn sum_gradients<S: Scalar, T: Sync>(
     out: &mut [S],
 ) {
     pool.install(|| {
-        out.par_chunks_mut(BLOCK).enumerate().for_each(|(k, block)| {
-            let range = k * BLOCK..k * BLOCK + block.len();
+        out.par_chunks_mut(PARAMETERS_AT_ONCE).enumerate().for_each(|(k, block)| {
+            let range = k * PARAMETERS_AT_ONCE..k * PARAMETERS_AT_ONCE + block.len();
             block.copy_from_slice(&gradient(&shards[0])[range.clone()]);
             for shard in &shards[1..] {
                 for (sum, &g) in block.iter_mut().zip(&gradient(shard)[range.clone()]) {

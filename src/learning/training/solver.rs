@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// State of an argmin run: parameters and validation loss.
 pub type TrainingState<S> = IterState<Vec<S>, (), (), (), (), f64>;
 
-/// News of a training that runs.
+/// Progress of a training.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Progress<'a> {
@@ -43,7 +43,7 @@ pub enum Progress<'a> {
 /// Called while training runs.
 pub type Watcher = Arc<dyn Fn(Progress<'_>) + Send + Sync>;
 
-/// Who watches a run and who may end it.
+/// Observer of a run and the flag that ends it.
 #[derive(Clone, Default)]
 pub struct Hooks {
     /// Called after every step and epoch.
@@ -72,7 +72,7 @@ pub enum StepError {
         /// Its norm.
         norm: f64,
     },
-    /// No step of an epoch could be taken.
+    /// All steps of an epoch were skipped.
     #[error("epoch {epoch}: every step had to be skipped, the last because {failure}")]
     NoProgress {
         /// Counted from 1 over all phases.
@@ -146,7 +146,7 @@ pub(crate) struct Run<S> {
     pub steps: Option<usize>,
     /// Time since training began.
     pub clock: Clock,
-    /// Who watches.
+    /// Observer and interrupt flag.
     pub hooks: Hooks,
     /// Checkpoint writer, if enabled.
     pub writer: Option<CheckpointWriter<S>>,

@@ -128,66 +128,117 @@ pub fn resume<S: Scalar>(
     if phases != found {
         return Err(TrainingError::Datasets { phases, found });
     }
-    let pool = objective::threads(threads)?;
-    let model = architecture.model();
-    let objective = || Objective::on(Arc::clone(&pool), model.clone(), penalty);
-    let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
-    let pairs = || config.phases.iter().zip(&data.training);
-    let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
     let ResumeOptions { checkpoints, start } = session;
-    let Snapshot { seconds, mut outcome, mut in_progress } = start.unwrap_or_else(|| {
+    let Snapshot { seconds, mut outcome, in_progress } = start.unwrap_or_else(|| {
         let mut rng = RngStream::Weights.generator(config.seed);
         let weights = initial_weights(architecture, config.network.initialization, &mut rng);
         Snapshot { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     });
-    let clock = Clock::after(seconds);
-    let mut stop = StopReason::Finished;
-    // Then this training is over, and its checkpoint belongs to the next stage.
+    let (pool, clock) = (objective::threads(threads)?, Clock::after(seconds));
+    let training = Training { config, architecture, penalty, data: &data, pool, hooks, checkpoints, clock };
+    // The checkpoint of a training that is over belongs to the next stage.
     let shooting = in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some());
-    for (number, (phase, training)) in pairs().enumerate().skip(outcome.phases) {
-        let problem = TrainingProblem::new(objective(), training, &data.validation, config.optimizer.weight_decay);
-        let rng = RngStream::Order(number).generator(config.seed);
-        let run = Run {
-            phase_number: number + 1,
-            epoch: outcome.history.len(),
-            epochs_before: 0,
-            step: outcome.steps,
-            steps: Some(steps),
-            clock,
-            hooks: hooks.clone(),
-            writer: checkpoints.clone().map(|checkpoints| CheckpointWriter {
-                checkpoints,
-                outcome: outcome.clone(),
-                seconds: None,
-            }),
-        };
-        let (states, optimizer) = (States::new(), config.optimizer.clone());
-        let solver = EpochSolver::new(states, optimizer, phase.into(), rng, training.len()).within(run);
-        stop = run_phase(problem, solver, config.optimizer.batch, &mut outcome, in_progress.take())?;
-        if stop != StopReason::Finished {
-            break;
+    let mut stop = training.run_phases(&mut outcome, in_progress)?;
+    if stop == StopReason::Finished && training.refine(&mut outcome)? {
+        stop = StopReason::Interrupted;
+    }
+    if outcome.validation_loss.is_infinite() {
+        let error = if let StopReason::Failed(error) = stop { Some(error) } else { None };
+        return Err(TrainingError::NothingLearned(error));
+    }
+    if stop == StopReason::Finished && !shooting {
+        training.save(&outcome);
+    }
+    let seconds = clock.seconds();
+    let test = training.objective().loss(&outcome.weights, &data.test);
+    let Outcome { weights, history, validation_loss, steps, states, .. } = outcome;
+    Ok(Trained { weights, history, validation_loss, test, stop, steps, states, seconds })
+}
+
+/// Everything that stays the same during a training.
+struct Training<'a, S> {
+    config: &'a Config,
+    architecture: &'a Architecture,
+    penalty: Penalty,
+    data: &'a Datasets<S>,
+    pool: Arc<rayon::ThreadPool>,
+    hooks: &'a Hooks,
+    checkpoints: Option<Arc<CheckpointManager>>,
+    clock: Clock,
+}
+
+impl<S: Scalar> Training<'_, S> {
+    /// A new objective, in any precision.
+    fn objective<T: Scalar>(&self) -> Objective<T> {
+        Objective::on(Arc::clone(&self.pool), self.architecture.model(), self.penalty)
+    }
+
+    /// Saves the results so far between two phases, if checkpoints are enabled.
+    fn save(&self, outcome: &Outcome<S>) {
+        if let Some(checkpoints) = &self.checkpoints {
+            checkpoints.save(self.clock.seconds(), outcome, None);
         }
     }
-    let keep = |outcome: &Outcome<S>| {
-        if let Some(checkpoints) = &checkpoints {
-            checkpoints.save(clock.seconds(), outcome, None);
+
+    /// Runs the remaining phases, the first of them from its checkpoint if there is one; adds their results and returns why the last one
+    /// ended.
+    fn run_phases(
+        &self,
+        outcome: &mut Outcome<S>,
+        mut in_progress: Option<PhaseState<S>>,
+    ) -> Result<StopReason, TrainingError> {
+        let config = self.config;
+        let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
+        let pairs = || config.phases.iter().zip(&self.data.training);
+        let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
+        for (number, (phase, training)) in pairs().enumerate().skip(outcome.phases) {
+            let weight_decay = config.optimizer.weight_decay;
+            let problem = TrainingProblem::new(self.objective(), training, &self.data.validation, weight_decay);
+            let rng = RngStream::Order(number).generator(config.seed);
+            let run = Run {
+                phase_number: number + 1,
+                epoch: outcome.history.len(),
+                epochs_before: 0,
+                step: outcome.steps,
+                steps: Some(steps),
+                clock: self.clock,
+                hooks: self.hooks.clone(),
+                writer: self.checkpoints.clone().map(|checkpoints| CheckpointWriter {
+                    checkpoints,
+                    outcome: outcome.clone(),
+                    seconds: None,
+                }),
+            };
+            let (states, optimizer) = (States::new(), config.optimizer.clone());
+            let solver = EpochSolver::new(states, optimizer, phase.into(), rng, training.len()).within(run);
+            let stop = run_phase(problem, solver, config.optimizer.batch, outcome, in_progress.take())?;
+            if stop != StopReason::Finished {
+                return Ok(stop);
+            }
         }
-    };
-    if let (Some(settings), Some(training), StopReason::Finished) = (&config.lbfgs, data.training.last(), &stop)
-        && outcome.validation_loss.is_finite()
-        && !outcome.refined
-    {
-        keep(&outcome);
+        Ok(StopReason::Finished)
+    }
+
+    /// Refines the result of finished phases by L-BFGS in double precision, if the configuration says so and that is still to be done;
+    /// returns `true` if it was interrupted.
+    fn refine(&self, outcome: &mut Outcome<S>) -> Result<bool, TrainingError> {
+        let (Some(settings), Some(training)) = (&self.config.lbfgs, self.data.training.last()) else {
+            return Ok(false);
+        };
+        if !outcome.validation_loss.is_finite() || outcome.refined {
+            return Ok(false);
+        }
+        self.save(outcome);
         let start = Start {
             weights: outcome.weights.iter().map(|w| w.to_f64()).collect(),
             validation_loss: outcome.validation_loss,
-            last: (outcome.history.len(), config.phases.len()),
-            clock,
-            hooks: hooks.clone(),
+            last: (outcome.history.len(), self.config.phases.len()),
+            clock: self.clock,
+            hooks: self.hooks.clone(),
         };
-        let (learned, validation) = (in_double(training), in_double(&data.validation));
-        let objective = Objective::on(Arc::clone(&pool), architecture.model(), penalty);
-        let problem = TrainingProblem::new(objective, &learned, &validation, config.optimizer.weight_decay);
+        let (learned, validation) = (in_double(training), in_double(&self.data.validation));
+        let weight_decay = self.config.optimizer.weight_decay;
+        let problem = TrainingProblem::new(self.objective(), &learned, &validation, weight_decay);
         let refined = lbfgs(settings, &problem, start).map_err(TrainingError::Optimizer)?;
         if let Some(best) = refined.weights {
             outcome.weights = best.iter().map(|&w| S::of_f64(w)).collect();
@@ -196,21 +247,8 @@ pub fn resume<S: Scalar>(
         outcome.states += problem.evaluations().saturating_mul(training.len());
         outcome.history.extend(refined.history);
         outcome.refined = true;
-        if hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed) {
-            stop = StopReason::Interrupted;
-        }
+        Ok(self.hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed))
     }
-    if outcome.validation_loss.is_infinite() {
-        let error = if let StopReason::Failed(error) = stop { Some(error) } else { None };
-        return Err(TrainingError::NothingLearned(error));
-    }
-    if stop == StopReason::Finished && !shooting {
-        keep(&outcome);
-    }
-    let seconds = clock.seconds();
-    let test = objective().loss(&outcome.weights, &data.test);
-    let Outcome { weights, history, validation_loss, steps, states, .. } = outcome;
-    Ok(Trained { weights, history, validation_loss, test, stop, steps, states, seconds })
 }
 
 /// States in double precision, copied only where they are in another.

@@ -45,7 +45,7 @@ pub struct ValidTimes {
 }
 
 /// Root mean square distance of each of `periodic.len()` coordinates from its mean over samples `(samples, n)`. For an angle it is taken on
-/// the circle, and an angle that goes round evenly has at most `pi / sqrt 3`. `NaN` without a finite sample.
+/// the circle, and an angle that rotates evenly has at most `pi / sqrt 3`. `NaN` without a finite sample.
 pub fn spread(samples: &[f64], periodic: &[bool]) -> Vec<f64> {
     let n = periodic.len();
     let column = |i: usize| samples.iter().skip(i).step_by(n.max(1)).copied().filter(|x| x.is_finite());
@@ -65,7 +65,7 @@ pub fn spread(samples: &[f64], periodic: &[bool]) -> Vec<f64> {
     periodic.iter().enumerate().map(of).collect()
 }
 
-/// The error `e` of predicted coordinates; coordinates that stand still have no spread and are left out. `NaN` if the prediction
+/// The error `e` of predicted coordinates; coordinates that do not move have no spread and are left out. `NaN` if the prediction
 /// is not finite or nothing moves.
 pub fn relative_error(exact: &[f64], predicted: &[f64], periodic: &[bool], spread: &[f64]) -> f64 {
     if predicted.iter().any(|x| !x.is_finite()) {
@@ -73,7 +73,7 @@ pub fn relative_error(exact: &[f64], predicted: &[f64], periodic: &[bool], sprea
     }
     let (mut count, mut sum) = (0, 0.0);
     for ((&q, &p), (&angle, &size)) in exact.iter().zip(predicted).zip(periodic.iter().zip(spread)) {
-        // Rounding errors are no motion.
+        // Rounding errors do not count as motion.
         if size > ROUNDING_SPREAD * q.abs() {
             let difference = if angle { angle_difference(q, p) } else { p - q };
             (count, sum) = (count + 1, sum + (difference / size).powi(2));
@@ -82,8 +82,8 @@ pub fn relative_error(exact: &[f64], predicted: &[f64], periodic: &[bool], sprea
     if count == 0 { f64::NAN } else { (sum / f64::from(count)).sqrt() }
 }
 
-/// Time for which a prediction with these errors was valid. `complete` says that the prediction did not give up: the true motion then ends
-/// with the last sample, and the time after it is unknown.
+/// Time for which a prediction with these errors was valid. `complete` says that the prediction reached the last sample: its error after
+/// that is unknown.
 pub fn valid_time(times: &[f64], errors: impl IntoIterator<Item = f64>, complete: bool) -> ValidTime {
     let mut wrong = times.iter().zip(errors).filter(|(_, error)| error.is_nan() || *error > VALID);
     match wrong.next() {

@@ -1,5 +1,5 @@
-//! Errors of the energy and of other quantities that the exact motion conserves; the steady loss of energy in recorded motion, the mark of
-//! friction.
+//! Errors of the energy and of other quantities that the exact motion conserves; the steady loss of energy in recorded motion, which
+//! indicates friction.
 
 use super::thresholds::{
     FRICTION_SIGNIFICANCE, LEAST_LOSING, LEAST_LOSS, LEAST_STRETCH_ENERGIES, LEAST_STRETCH_SAMPLES, LEAST_STRETCHES,
@@ -93,7 +93,7 @@ pub struct EnergyLoss {
 }
 
 impl EnergyLoss {
-    /// `true` if motion loses energy steadily: nearly everywhere, by more than chance, and enough to matter.
+    /// `true` if motion loses energy steadily: in nearly all stretches, significantly, and by a relevant amount.
     pub(crate) fn is_steady(&self) -> bool {
         let lost = self.per_second * self.seconds;
         let significant = self.per_second > FRICTION_SIGNIFICANCE * self.error;

@@ -229,11 +229,11 @@ pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Ve
 pub(crate) fn grid_points(point: &[f64], axes: [Axis; 2]) -> ([Vec<f64>; 2], Vec<f64>) {
     let [x, y] = axes.map(|axis| axis.values());
     let mut q = Vec::with_capacity(x.len() * y.len() * point.len());
-    let mut moved = point.to_vec();
+    let mut point_of_grid = point.to_vec();
     for second in &y {
         for first in &x {
-            (moved[axes[0].component], moved[axes[1].component]) = (*first, *second);
-            q.extend_from_slice(&moved);
+            (point_of_grid[axes[0].component], point_of_grid[axes[1].component]) = (*first, *second);
+            q.extend_from_slice(&point_of_grid);
         }
     }
     ([x, y], q)

@@ -6,12 +6,12 @@ use crate::linalg::{Workspace, dot, eigh, inertia, inverse};
 use crate::rollout::{Domain, Integrable, RolloutError, RolloutOptions, rollout};
 use serde::{Deserialize, Serialize};
 
-/// Rate at which neighbouring motions part.
+/// Rate at which neighbouring motions separate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lyapunov {
     /// Largest finite-time exponent, per unit of time; near 0 or below for regular motion.
     pub exponent: f64,
-    /// Time over which it was taken.
+    /// Time span over which it was estimated.
     pub time: f64,
 }
 
@@ -65,7 +65,7 @@ pub fn lyapunov<S: Integrable>(
         let shifted: Vec<S> = flat(k).iter().zip(&offset).map(|(x, d)| S::of_f64(x + d)).collect();
         let (t, t_end) = (main.t[k], main.t[k + 1]);
         let leap = options.clone().t0(t).t_end(t_end).dt(t_end - t).energy(false).domain(None::<Domain<S>>);
-        // Both start afresh for each leap: errors of earlier leaps do not count as growth.
+        // Both restart at each sample, so that earlier errors do not count as growth.
         let ends: Vec<Vec<f64>> = [flat(k).iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>(), shifted]
             .into_iter()
             .map(|start| {
@@ -74,9 +74,9 @@ pub fn lyapunov<S: Integrable>(
                 Ok(q.iter().chain(v).map(|x| x.to_f64()).collect())
             })
             .collect::<Result<_, RolloutError>>()?;
-        let here = Separation::new(model, &ends[0]);
+        let separation = Separation::new(model, &ends[0]);
         offset = ends[1].iter().zip(&ends[0]).map(|(a, b)| a - b).collect();
-        let now = here.size(&offset);
+        let now = separation.size(&offset);
         if now > 0.0 && now.is_finite() && before > 0.0 {
             growth += (now / before).ln();
             let shrink = (now / unit).max(size(&offset) / (WIDEST_SEPARATION * distance));
@@ -84,7 +84,7 @@ pub fn lyapunov<S: Integrable>(
             before = now / shrink;
         } else {
             offset = vec![distance / (2.0 * n as f64).sqrt(); 2 * n];
-            before = here.size(&offset);
+            before = separation.size(&offset);
         }
     }
     let time = (options.t_end - options.t0).abs().to_f64();

@@ -1,4 +1,4 @@
-//! Predictions of recorded motion that a model has not seen: how far off they are and how long they stay valid.
+//! Predictions of recorded motion that a model has not seen: their errors, and the time for which they are valid.
 //!
 //! A recording is cut into windows; every predictor gets an estimated state before a window and predicts the coordinates at the times of
 //! its samples, which are compared with the measured ones. A smoothed estimate has seen samples after its own time, so the window begins
@@ -77,7 +77,7 @@ impl Window {
     }
 }
 
-/// Coordinates at the times of every window's samples, `(samples, n)`; not finite where a predictor gave up.
+/// Coordinates at the times of every window's samples, `(samples, n)`; not finite where a predictor failed.
 pub type Predictions = Vec<Vec<f64>>;
 
 /// The motion of a model under the known forces; `NaN` from where it ends before its time. The result does not depend on `threads`.
@@ -133,7 +133,7 @@ fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64>
     positions
 }
 
-/// Motion continues at the velocity before the window: the least that a model must beat.
+/// Predicts that the velocity before the window continues, as a baseline for models.
 pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
     let prediction = |window: &Window| {
         let times = window.times.iter().map(|t| window.lead + t);

@@ -1,5 +1,5 @@
-//! Terms of a learned Lagrangian against exact ones: accelerations, mass matrix, its signs, and `L` up to the `a L + b`
-//! that motion leaves open.
+//! Terms of a learned Lagrangian against exact ones: accelerations, mass matrix, its signature, and `L` up to the `a L + b`
+//! that motion does not determine.
 
 use super::statistics::ErrorDistribution;
 use super::thresholds::COMPARED_AT_ONCE;

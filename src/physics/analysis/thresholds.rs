@@ -127,8 +127,8 @@ pub(super) const TUBE_KNOTS: usize = 50;
 
 // ---- The test of trajectories, and its pictures ----
 
-/// Steps after which a learned motion is given up: ten times what a healthy one takes over the longest test. A model that learned next to
-/// nothing, and runs into a singular mass matrix, then costs only seconds.
+/// Steps after which a learned motion is abandoned: ten times those of a regular motion over the longest test. The motion of a model with a
+/// singular mass matrix then takes only seconds.
 pub(super) const LEARNED_STEPS: usize = 30_000;
 /// Starts whose motions are computed together.
 pub(super) const RUNS_AT_ONCE: usize = 64;

@@ -1,5 +1,4 @@
-//! The trajectory test: learned motion against exact motion from random starts, and the part of it that an eye
-//! can follow, in dense samples.
+//! The trajectory test: learned motion against exact motion from random starts, and the beginning of it in dense samples, for pictures.
 
 use super::thresholds::{
     DRAWN_BEYOND_VALID, DRAWN_LYAPUNOV_TIMES, DRAWN_SAMPLES, DRAWN_TURNS, LEARNED_STEPS, MOST_DRAWN_TURNS,
@@ -62,7 +61,7 @@ pub struct TrajectoryTest<S> {
     pub rtol: f64,
     /// Absolute tolerance of the learned motion.
     pub atol: f64,
-    /// Steps after which a learned motion is given up.
+    /// Steps after which a learned motion is abandoned.
     pub max_steps: usize,
     /// Where the learned motion must stay; `None` lets it go anywhere.
     pub domain: Option<Domain<S>>,
@@ -122,9 +121,9 @@ pub struct TrajectorySummary {
     pub valid_lyapunov_times: Option<f64>,
     /// Evaluations of the learned acceleration.
     pub evaluations: usize,
-    /// Why the learned motion ended early.
+    /// Reason why the learned motion ended early.
     pub stopped: Option<String>,
-    /// Why the exact motion ended early.
+    /// Reason why the exact motion ended early.
     pub reference_stopped: Option<String>,
 }
 
@@ -233,7 +232,7 @@ impl<S: Integrable> TrajectoryTest<S> {
         pairs.map(|(q, p)| relative_error(q, p, &periodic, &spread)).collect()
     }
 
-    /// Options of the Lyapunov estimate: a hundred renormalisations are plenty.
+    /// Options of the Lyapunov estimate.
     fn leaps(&self, reference: &RolloutOptions<S>) -> RolloutOptions<S> {
         let tolerance = S::max(S::of_f64(SEPARATION_TOLERANCE), reference.rtol);
         reference.clone().dt(S::of_f64(self.t_end.abs() / RENORMALISATIONS)).tolerances(tolerance, tolerance)
@@ -304,7 +303,7 @@ impl<S: Integrable> TrajectoryTest<S> {
         }
     }
 
-    /// Motions of a test once more, up to [`TrajectoryTest::shown_until`], in dense samples.
+    /// Repeats the motions of a test up to [`TrajectoryTest::shown_until`], in dense samples.
     pub fn portraits(
         &self,
         exact: &dyn EulerLagrange<S>,

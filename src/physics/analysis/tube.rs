@@ -48,7 +48,7 @@ pub struct Tube {
     pub motions: [usize; 2],
 }
 
-/// Motions that calibrate a tube at least: of fewer, no score is large enough.
+/// Fewest motions that calibrate a tube: with fewer, no score is large enough.
 fn calibrating(share: f64) -> usize {
     (share / (1.0 - share) - TIME_ROUNDING).ceil().max(1.0) as usize
 }

@@ -241,7 +241,7 @@ impl<S: Scalar> Equator<'_, S> {
     }
 }
 
-/// Free fall in the equator at a turning point, where its radius stands still.
+/// Free fall in the equator at a turning point, where its radius is stationary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurningPoint<S> {
     /// Energy per mass.

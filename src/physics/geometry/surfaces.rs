@@ -121,51 +121,72 @@ pub fn surfaces<S: Scalar>(
     if let Some(found) = block.iter().copied().find(|&i| i >= n).or(block.is_empty().then_some(0)) {
         return Err(GeometryError::Shape { what: "block of the metric", expected: n, found });
     }
-    let point = |s: S| -> Vec<S> { from.iter().zip(to).map(|(&a, &b)| a + s * (b - a)).collect() };
-    let value = |metric: &[S]| {
+    let line = Line { model, block, from, to, velocity };
+    let mut found = Vec::new();
+    for piece in line.sign_changes(steps.max(1))? {
+        found.extend(line.surface(piece)?);
+    }
+    Ok(found)
+}
+
+/// A straight line of coordinates along which the determinant of a block of the metric is examined. Places on it are numbers from 0 to 1.
+struct Line<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    block: &'a [usize],
+    from: &'a [S],
+    to: &'a [S],
+    velocity: &'a [S],
+}
+
+impl<S: Scalar> Line<'_, S> {
+    /// The coordinates of a place.
+    fn point(&self, place: S) -> Vec<S> {
+        self.from.iter().zip(self.to).map(|(&a, &b)| a + place * (b - a)).collect()
+    }
+
+    /// The determinant of the block of a metric.
+    fn determinant(&self, metric: &[S]) -> S {
+        let (n, block) = (self.model.coordinates(), self.block);
         let part: Vec<S> = block.iter().flat_map(|&i| block.iter().map(move |&j| metric[i * n + j])).collect();
         determinant(block.len(), &part)
-    };
-    let steps = steps.max(1);
-    let place = |k: usize| S::of_f64(k as f64) / S::of_f64(steps as f64);
-    let mut found = Vec::new();
-    let zero = <S as Real>::zero();
-    // The last point where the metric is finite: its index and the value there.
-    let mut last: Option<(usize, S)> = None;
-    let mut pieces = Vec::new();
-    for start in (0..=steps).step_by(PLACES) {
-        let end = steps.min(start.saturating_add(PLACES - 1));
-        let points: Vec<S> = (start..=end).flat_map(|k| point(place(k))).collect();
-        let metrics = metrics(model, &points, velocity)?;
-        for (k, metric) in (start..=end).zip(metrics.chunks_exact(n * n)) {
-            let here = value(metric);
-            if !here.is_finite() {
-                continue;
-            }
-            // A single point where the metric is not finite, such as one exactly on a horizon, does not hide a change of sign.
-            let before = last.replace((k, here)).filter(|(before, at)| k - before <= 2 && changes(*at, here));
-            pieces.extend(before.map(|(before, at)| [(place(before), at), (place(k), here)]));
-        }
     }
-    for [(mut low, mut at_low), (mut high, mut at_high)] in pieces {
+
+    /// Pieces of the line, of `steps` equal ones, whose determinants differ in sign at their ends: place and determinant of both ends.
+    fn sign_changes(&self, steps: usize) -> Result<Vec<[(S, S); 2]>, GeometryError> {
+        let n = self.model.coordinates();
+        let place = |k: usize| S::of_f64(k as f64) / S::of_f64(steps as f64);
+        // The last point where the metric is finite: its index and the value there.
+        let mut last: Option<(usize, S)> = None;
+        let mut pieces = Vec::new();
+        for start in (0..=steps).step_by(PLACES) {
+            let end = steps.min(start.saturating_add(PLACES - 1));
+            let points: Vec<S> = (start..=end).flat_map(|k| self.point(place(k))).collect();
+            let metrics = metrics(self.model, &points, self.velocity)?;
+            for (k, metric) in (start..=end).zip(metrics.chunks_exact(n * n)) {
+                let value = self.determinant(metric);
+                if !value.is_finite() {
+                    continue;
+                }
+                // A single point where the metric is not finite, such as one exactly on a horizon, does not hide a change of sign.
+                let before = last.replace((k, value)).filter(|(before, at)| k - before <= 2 && changes(*at, value));
+                pieces.extend(before.map(|(before, at)| [(place(before), at), (place(k), value)]));
+            }
+        }
+        Ok(pieces)
+    }
+
+    /// The surface in a piece, by halving; `None` if the piece has no metric inside.
+    fn surface(
+        &self,
+        [(mut low, mut at_low), (mut high, mut at_high)]: [(S, S); 2],
+    ) -> Result<Option<Surface<S>>, GeometryError> {
+        let zero = <S as Real>::zero();
         // An exact zero belongs to the piece that ends with it.
         if at_high == zero {
-            found.push(Surface { point: point(high), change: Change::Zero });
-            continue;
+            return Ok(Some(Surface { point: self.point(high), change: Change::Zero }));
         }
         let outside = at_low.abs().max(at_high.abs());
-        loop {
-            let within = |part: f64| Some(low + S::of_f64(part) * (high - low)).filter(|s| *s > low && *s < high);
-            let mut at_inside = None;
-            // The metric may be singular on the surface itself but not next to it.
-            for s in [0.5, 0.375, 0.625].into_iter().filter_map(within) {
-                let at = value(&metrics(model, &point(s), velocity)?);
-                if at.is_finite() {
-                    at_inside = Some((s, at));
-                    break;
-                }
-            }
-            let Some((inside, at_inside)) = at_inside else { break };
+        while let Some((inside, at_inside)) = self.inside(low, high)? {
             if at_inside == zero {
                 (low, high, at_low, at_high) = (inside, inside, zero, zero);
                 break;
@@ -178,10 +199,22 @@ pub fn surfaces<S: Scalar>(
         }
         // A stretch without a metric has no surface that can be named.
         if high - low > S::epsilon().ldexp(8) {
-            continue;
+            return Ok(None);
         }
         let change = if at_low.abs().min(at_high.abs()) > outside { Change::Pole } else { Change::Zero };
-        found.push(Surface { point: point((low + high) * <S as Real>::half()), change });
+        Ok(Some(Surface { point: self.point((low + high) * <S as Real>::half()), change }))
     }
-    Ok(found)
+
+    /// A place near the middle of two others and the determinant there; `None` if the two are neighbours or no such place has a metric.
+    fn inside(&self, low: S, high: S) -> Result<Option<(S, S)>, GeometryError> {
+        let within = |part: f64| Some(low + S::of_f64(part) * (high - low)).filter(|s| *s > low && *s < high);
+        // The metric may be singular on the surface itself but not next to it.
+        for place in [0.5, 0.375, 0.625].into_iter().filter_map(within) {
+            let value = self.determinant(&metrics(self.model, &self.point(place), self.velocity)?);
+            if value.is_finite() {
+                return Ok(Some((place, value)));
+            }
+        }
+        Ok(None)
+    }
 }

@@ -1,7 +1,7 @@
 //! The camera: its position and motion, and the direction of every pixel.
 
 use super::coordinates::{Chart, depends_on_time};
-use super::orbits::{along, dot, lower, norm, product, times};
+use super::orbits::{along, dot, lower, norm, product, scaled};
 use super::thresholds::EXAMINED_SPAN;
 use super::{RelativityError, expect};
 use crate::geometry::Metric;
@@ -60,7 +60,7 @@ impl Camera {
         }
     }
 
-    /// Refuses numbers that make no picture.
+    /// Refuses numbers out of range.
     ///
     /// # Errors
     /// [`RelativityError::Invalid`].
@@ -84,7 +84,7 @@ impl Camera {
 
     /// Coordinates of the camera at the time 0.
     pub(crate) fn event(&self) -> [f64; 4] {
-        self.chart.vector(0.0, times(-self.distance, self.axes()[2]))
+        self.chart.vector(0.0, scaled(-self.distance, self.axes()[2]))
     }
 
     /// Direction of a point of the picture: components right, up and forward, a unit vector. Columns and rows are counted from the upper
@@ -93,7 +93,7 @@ impl Camera {
         let (width, height) = (self.width as f64, self.height as f64);
         let scale = 2.0 * (0.5 * self.field_of_view).tan() / width;
         let toward = [scale * (column - 0.5 * width), scale * (0.5 * height - row), 1.0];
-        times(norm(toward).recip(), toward)
+        scaled(norm(toward).recip(), toward)
     }
 }
 
@@ -118,8 +118,8 @@ impl Tetrad {
         camera.check()?;
         camera.chart.check(model.coordinates())?;
         let event = camera.event();
-        let centre = camera.chart.vector(0.0, times(0.5, camera.chart.space_of(event)));
-        let mirrored = camera.chart.vector(0.0, times(-1.0, camera.chart.space_of(event)));
+        let centre = camera.chart.vector(0.0, scaled(0.5, camera.chart.space_of(event)));
+        let mirrored = camera.chart.vector(0.0, scaled(-1.0, camera.chart.space_of(event)));
         let points = [event, centre, mirrored].concat();
         if depends_on_time(model, camera.chart.time, &points, EXAMINED_SPAN * camera.distance)? {
             return Err(RelativityError::DependsOnTime);
@@ -142,7 +142,7 @@ impl Tetrad {
         if square.is_nan() || square <= 0.0 {
             return Err(RelativityError::NothingRests);
         }
-        let mut legs = [times(square.sqrt().recip(), velocity); 4];
+        let mut legs = [scaled(square.sqrt().recip(), velocity); 4];
         let mut done = vec![0];
         for (leg, axis) in [(3, 2), (1, 0), (2, 1)] {
             let mut vector = camera.chart.vector(0.0, camera.axes()[axis]);
@@ -150,7 +150,7 @@ impl Tetrad {
                 let sign = if k == 0 { 1.0 } else { -1.0 };
                 vector = along(vector, sign * product(&metric, vector, legs[k]), legs[k]);
             }
-            legs[leg] = times(product(&metric, vector, vector).sqrt().recip(), vector);
+            legs[leg] = scaled(product(&metric, vector, vector).sqrt().recip(), vector);
             done.push(leg);
         }
         Ok(Self { event, legs, metric, camera: *camera })
@@ -158,7 +158,7 @@ impl Tetrad {
 
     /// Tangent of the ray that shows a direction (parts right, up, forward, a unit vector), backwards in time: `k = -e_0 + n_k e_k`.
     pub fn ray(&self, direction: [f64; 3]) -> [f64; 4] {
-        let start = times(-1.0, self.legs[0]);
+        let start = scaled(-1.0, self.legs[0]);
         direction.iter().zip(&self.legs[1..]).fold(start, |k, (&part, &leg)| along(k, part, leg))
     }
 

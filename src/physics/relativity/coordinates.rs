@@ -373,15 +373,15 @@ mod tests {
         let request = Request::LAGRANGIAN | Request::MOMENTUM | Request::DL_DQ | Request::MASS_MATRIX;
         let found = of(&q, &v, request);
         let step = 1e-5;
-        let moved = |x: &[f64; 4], i: usize, by: f64| {
+        let shifted = |x: &[f64; 4], i: usize, by: f64| {
             let mut x = *x;
             x[i] += by;
             x
         };
         let lagrangian = |q: &[f64], v: &[f64]| of(q, v, Request::LAGRANGIAN).lagrangian[0];
         for i in 0..4 {
-            let by_v = (lagrangian(&q, &moved(&v, i, step)) - lagrangian(&q, &moved(&v, i, -step))) / (2.0 * step);
-            let by_q = (lagrangian(&moved(&q, i, step), &v) - lagrangian(&moved(&q, i, -step), &v)) / (2.0 * step);
+            let by_v = (lagrangian(&q, &shifted(&v, i, step)) - lagrangian(&q, &shifted(&v, i, -step))) / (2.0 * step);
+            let by_q = (lagrangian(&shifted(&q, i, step), &v) - lagrangian(&shifted(&q, i, -step), &v)) / (2.0 * step);
             assert!((found.momentum[i] - by_v).abs() < 1e-8, "p {i}");
             assert!((found.dl_dq[i] - by_q).abs() < 1e-8, "g {i}");
             let row: f64 = (0..4).map(|j| found.mass_matrix[4 * i + j] * v[j]).sum();

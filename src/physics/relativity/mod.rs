@@ -84,7 +84,7 @@ pub enum RelativityError {
         /// Number of positive eigenvalues.
         positive: usize,
     },
-    /// The camera would have to be faster than light.
+    /// A camera at rest would be faster than light.
     #[error(
         "no camera can be at rest here: the position is inside the ergosurface, or the time coordinate is not timelike there"
     )]
@@ -101,7 +101,7 @@ pub enum RelativityError {
         /// Value of the radial coordinate at which the metric is another one.
         radius: f64,
     },
-    /// A number that makes no picture.
+    /// A number out of range.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
         /// Name of the number.

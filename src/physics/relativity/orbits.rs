@@ -133,7 +133,7 @@ pub(super) fn along<const N: usize>(a: [f64; N], s: f64, b: [f64; N]) -> [f64; N
 }
 
 /// `s a`.
-pub(super) fn times<const N: usize>(s: f64, a: [f64; N]) -> [f64; N] {
+pub(super) fn scaled<const N: usize>(s: f64, a: [f64; N]) -> [f64; N] {
     a.map(|a| s * a)
 }
 

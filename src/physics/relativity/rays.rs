@@ -4,7 +4,7 @@
 
 use super::camera::Camera;
 use super::coordinates::Chart;
-use super::orbits::{along, dot, norm, times};
+use super::orbits::{along, dot, norm, scaled};
 use super::thresholds::{
     BEYOND_SKY, BLOCK_SIZES, FIRST_RAY_STEP, LONGEST_RAY_STEP, RAY_BLOCKS, SHORTEST_RAY_STEP, STEP_CHANGES,
     STEP_SAFETY, TOLERANCES,
@@ -90,7 +90,7 @@ impl Tracing {
         Self { tolerance: 1e-6, far, second: 0.0, capture: 0.0, growth: 1e5, most_steps: 2000, threads: 1 }
     }
 
-    /// Refuses numbers that trace nothing: finer steps drown in rounding, coarser ones follow no geodesic.
+    /// Refuses numbers out of range. Rounding dominates finer steps, and coarser ones do not follow geodesics.
     fn check(&self) -> Result<(), RelativityError> {
         let finite_above = |x: f64, least: f64| x.is_finite() && x > least;
         let (least, most) = TOLERANCES;
@@ -145,9 +145,9 @@ pub(super) fn trace_each(
     Ok(rays)
 }
 
-/// A ray on its way.
+/// A ray that is still followed.
 #[derive(Clone, Copy)]
-struct Moving {
+struct ActiveRay {
     /// Place in the batch.
     index: usize,
     q: [f64; 4],
@@ -211,23 +211,23 @@ impl Batch<'_> {
         let (mut places, mut tangents) = (Vec::new(), vec![Vec::new(); STAGES]);
         let mut slopes: Vec<Vec<[f64; 4]>> = vec![Vec::new(); STAGES];
         self.accelerations(&q, &k, &mut slopes[0])?;
-        let mut moving: Vec<Moving> = Vec::with_capacity(starts.len());
+        let mut active: Vec<ActiveRay> = Vec::with_capacity(starts.len());
         for (index, ((&q, &k), &a)) in q.iter().zip(&k).zip(&slopes[0]).enumerate() {
             let distance = norm(self.chart.space_of(q));
             let step = FIRST_RAY_STEP * distance / norm(self.chart.space_of(k));
-            moving.push(Moving { index, q, k, a, step, size: norm(k), steps: 0, refused: false });
+            active.push(ActiveRay { index, q, k, a, step, size: norm(k), steps: 0, refused: false });
         }
-        self.sort_out(&mut moving, ended);
-        while !moving.is_empty() {
-            moving.iter_mut().for_each(|ray| ray.step = ray.step.min(self.longest(ray)));
+        self.move_finished(&mut active, ended);
+        while !active.is_empty() {
+            active.iter_mut().for_each(|ray| ray.step = ray.step.min(self.longest(ray)));
             tangents[0].clear();
-            tangents[0].extend(moving.iter().map(|ray| ray.k));
+            tangents[0].extend(active.iter().map(|ray| ray.k));
             slopes[0].clear();
-            slopes[0].extend(moving.iter().map(|ray| ray.a));
+            slopes[0].extend(active.iter().map(|ray| ray.a));
             for (stage, row) in A.iter().enumerate() {
                 q.clear();
                 k.clear();
-                for (at, ray) in moving.iter().enumerate() {
+                for (at, ray) in active.iter().enumerate() {
                     let (mut place, mut tangent) = (ray.q, ray.k);
                     for (j, a) in row[..=stage].iter().enumerate().filter(|(_, a)| **a != 0.0) {
                         place = along(place, ray.step * a, tangents[j][at]);
@@ -240,7 +240,7 @@ impl Batch<'_> {
                 tangents[stage + 1].clone_from(&k);
             }
             places.clone_from(&q);
-            for (at, ray) in moving.iter_mut().enumerate() {
+            for (at, ray) in active.iter_mut().enumerate() {
                 let of = |from: &[Vec<[f64; 4]>]| {
                     ERROR.iter().zip(from).fold([0.0; 4], |sum, (e, stage)| along(sum, ray.step * e, stage[at]))
                 };
@@ -260,13 +260,13 @@ impl Batch<'_> {
                 }
                 ray.refused = !(fine && error <= 1.0);
             }
-            self.sort_out(&mut moving, ended);
+            self.move_finished(&mut active, ended);
         }
         Ok(())
     }
 
     /// Longest step: in proportion to the distance from the centre, and hardly beyond the distance of the sky.
-    fn longest(&self, ray: &Moving) -> f64 {
+    fn longest(&self, ray: &ActiveRay) -> f64 {
         let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
         let (distance, speed, far) = (norm(place), norm(tangent), self.tracing.far);
         let toward = dot(place, tangent) / speed;
@@ -276,9 +276,9 @@ impl Batch<'_> {
         most.min(LONGEST_RAY_STEP * distance) / speed
     }
 
-    /// Moves the rays that have ended from `moving` to `ended`.
-    fn sort_out(&self, moving: &mut Vec<Moving>, ended: &mut [FinishedRay]) {
-        moving.retain(|ray| {
+    /// Moves the rays that have ended from `active` to `ended`.
+    fn move_finished(&self, active: &mut Vec<ActiveRay>, ended: &mut [FinishedRay]) {
+        active.retain(|ray| {
             let Some(fate) = self.fate(ray) else { return true };
             ended[ray.index] = FinishedRay { fate, steps: ray.steps, q: ray.q, k: ray.k };
             false
@@ -286,14 +286,14 @@ impl Batch<'_> {
     }
 
     /// Its end, if a ray has ended.
-    fn fate(&self, ray: &Moving) -> Option<RayOutcome> {
+    fn fate(&self, ray: &ActiveRay) -> Option<RayOutcome> {
         let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
         let (distance, speed) = (norm(place), norm(tangent));
         if distance < self.tracing.capture || norm(ray.k) > self.tracing.growth * ray.size {
             return Some(RayOutcome::Captured);
         }
         if distance >= self.tracing.far && dot(place, tangent) > 0.0 {
-            return Some(RayOutcome::Escaped(times(speed.recip(), tangent)));
+            return Some(RayOutcome::Escaped(scaled(speed.recip(), tangent)));
         }
         if distance <= self.tracing.second && dot(place, tangent) < 0.0 {
             return Some(RayOutcome::Crossed(beyond(place, tangent)));

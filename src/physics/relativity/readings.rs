@@ -79,7 +79,7 @@ impl LearnedHole<'_> {
         Ok(-0.5 * metric.first[0] * MASS_DISTANCE * MASS_DISTANCE)
     }
 
-    /// All quantities that can be read, with lengths in units of the mass.
+    /// All quantities that the metrics have, with lengths in units of the mass.
     ///
     /// # Errors
     /// Those of the exact metric; where the learned one refuses, the reading has no value.
@@ -221,7 +221,7 @@ impl LearnedHole<'_> {
         let points = self.around.points(METRIC_POINTS / 8, self.within(mass, (1.5, 20.0)));
         let symbols = self.system.system.parameters.iter().map(|p| p.symbol.to_string());
         let exact: Vec<(String, f64)> = symbols.zip(self.system.parameters.iter().copied()).collect();
-        // From values that are far off.
+        // From values far from the true ones.
         let start = exact.iter().map(|(symbol, value)| (symbol.clone(), FIRST_PARAMETERS * value)).collect();
         let found = nearest_parameters(self.system, self.learned, &points, &start);
         for (symbol, value) in exact.into_iter().filter(|(_, value)| *value != 0.0) {
@@ -362,12 +362,12 @@ pub fn nearest_parameters(
         let mut columns = Vec::with_capacity(count);
         for symbol in &symbols {
             let step = PARAMETER_DIFFERENCE * (1.0 + values[symbol].abs());
-            let moved = |by: f64| {
+            let shifted = |by: f64| {
                 let mut values = values.clone();
                 values.entry(symbol.clone()).and_modify(|x| *x += by);
                 of(&values)
             };
-            let (more, less) = (moved(step)?, moved(-step)?);
+            let (more, less) = (shifted(step)?, shifted(-step)?);
             columns.push(more.iter().zip(&less).map(|(a, b)| (a - b) / (2.0 * step)).collect::<Vec<f64>>());
         }
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

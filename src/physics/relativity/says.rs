@@ -93,7 +93,7 @@ pub struct ViewSummary {
     pub bottom: Option<f64>,
     /// Above.
     pub top: Option<f64>,
-    /// Rays that neither were captured nor came from the sky.
+    /// Rays that were neither captured nor came from the sky.
     pub unfinished: usize,
     /// Largest `g(k, k)` at the end of a ray, relative.
     pub drift: f64,
@@ -101,7 +101,7 @@ pub struct ViewSummary {
     pub steps: usize,
     /// Seconds.
     pub seconds: f64,
-    /// Rays over time.
+    /// Rays per second.
     pub rays_per_second: f64,
     /// Share of the pixels that show the second region; none for a metric with one region.
     #[serde(skip_serializing_if = "Option::is_none")]

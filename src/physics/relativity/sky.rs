@@ -171,7 +171,7 @@ mod tests {
         let [right, up, forward] = camera.axes();
         let toward = |u: f64, v: f64| {
             let vector: [f64; 3] = std::array::from_fn(|i| forward[i] + u * right[i] + v * up[i]);
-            super::super::orbits::times(super::super::orbits::norm(vector).recip(), vector)
+            super::super::orbits::scaled(super::super::orbits::norm(vector).recip(), vector)
         };
         assert_eq!(sky.colour(forward), [255; 3]);
         let same = |found: [u8; 3], of: [u8; 3]| found == of || found == between([0; 3], of, DARK);

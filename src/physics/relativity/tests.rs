@@ -1,7 +1,7 @@
 //! Rays, shadows and pictures against closed forms.
 
 use super::camera::Tetrad;
-use super::orbits::{norm, product, times};
+use super::orbits::{norm, product, scaled};
 use super::rays::{RayOutcome, trace};
 use super::*;
 use crate::lagrangian::{EulerLagrange, Interruptible, Lagrangian, Mechanics, MechanicsError, build};
@@ -229,7 +229,7 @@ fn rays_that_do_not_end_are_unfinished() {
     let seen = shadow(&*model, &camera, &Tracing { most_steps: 2, ..Tracing::of(&camera) }, &|_| ()).unwrap();
     assert_eq!((seen.unfinished(), seen.share()), (600, 0.0));
     // At the origin of the coordinates there is no valid metric.
-    let start = ([0.0; 4], times(2.0, [0.0, 1.0, 0.0, 0.0]));
+    let start = ([0.0; 4], scaled(2.0, [0.0, 1.0, 0.0, 0.0]));
     let tracing = Tracing::of(&camera);
     let rays =
         trace(&*model, &camera.chart, &[start, ([0.0, 30.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0])], &tracing, &|_| ());

@@ -1,7 +1,7 @@
 //! Metrics with two asymptotic regions, such as wormholes: their radial coordinate goes to minus and to plus infinity.
 
 use super::RelativityError;
-use super::orbits::{along, dot, norm, times};
+use super::orbits::{along, dot, norm, scaled};
 use super::thresholds::{EXAMINED_PLACES, LEAST_AXIS_SINE, MOST_AREA_DEVIATION};
 use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
@@ -155,7 +155,7 @@ impl<M: EulerLagrange<f64>> EulerLagrange<f64> for TwoSided<M> {
         }
         for (found, place) in terms.mass_matrix.chunks_exact_mut(16).zip(&places) {
             let lengths = [self.stretch(place.rho), place.rho.recip(), (place.rho * place.sine).recip()];
-            let slopes: [[f64; 3]; 3] = std::array::from_fn(|k| times(lengths[k], place.legs[k]));
+            let slopes: [[f64; 3]; 3] = std::array::from_fn(|k| scaled(lengths[k], place.legs[k]));
             // Columns of the Jacobian: the model's velocities per velocity of `t`, `x`, `y` or `z`.
             let columns: [[f64; 4]; 4] = std::array::from_fn(|j| match j {
                 0 => self.vector(1.0, [0.0; 3]),
@@ -172,7 +172,7 @@ impl<M: EulerLagrange<f64>> EulerLagrange<f64> for TwoSided<M> {
 /// The direction in the other region of a ray that has the direction `k` at `x`: that of its image under `x s^2/(4 rho^2)`.
 pub(super) fn beyond(x: [f64; 3], k: [f64; 3]) -> [f64; 3] {
     let turned = along(k, -2.0 * dot(x, k) / dot(x, x), x);
-    times(norm(turned).recip(), turned)
+    scaled(norm(turned).recip(), turned)
 }
 
 #[cfg(test)]
@@ -196,12 +196,12 @@ mod tests {
             let found = of(&q, &v);
             let step = 1e-5;
             let slope = |k: usize| {
-                let moved = |by: f64| {
+                let shifted = |by: f64| {
                     let mut q = q;
                     q[k] += by;
                     of(&q, &v).mass_matrix
                 };
-                let (more, less) = (moved(step), moved(-step));
+                let (more, less) = (shifted(step), shifted(-step));
                 more.iter().zip(less).map(|(a, b)| (a - b) / (2.0 * step)).collect::<Vec<f64>>()
             };
             let slopes: Vec<Vec<f64>> = (0..4).map(slope).collect();

@@ -104,7 +104,7 @@ impl Algebra {
 }
 
 /// Fields at a state, every coordinate in units of its spread.
-struct At {
+struct FieldsAt {
     /// The fields, `(n)` each.
     vectors: Vec<Vec<f64>>,
     /// Their derivatives, `(n, n)` each.
@@ -112,7 +112,7 @@ struct At {
 }
 
 /// Fields at about this many states, spread over the sample.
-fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> Vec<At> {
+fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> Vec<FieldsAt> {
     let (n, spread) = (sample.n, sample.spread());
     let step = (sample.len() / states).max(1);
     let mut at = Values::default();
@@ -126,7 +126,7 @@ fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> V
     states
         .map(|q| {
             basis.evaluate(q, &mut at);
-            At {
+            FieldsAt {
                 vectors: fields.iter().map(|field| vector(field, &at)).collect(),
                 slopes: fields.iter().map(|field| slopes(field, &at)).collect(),
             }

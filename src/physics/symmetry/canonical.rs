@@ -1,4 +1,4 @@
-//! Canonical form of a Lagrangian: fixes at one state the factor and the gauge that motion leaves open.
+//! Canonical form of a Lagrangian: fixes at one state the factor and the gauge that motion does not determine.
 
 use super::SymmetryError;
 use crate::lagrangian::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms};
@@ -152,7 +152,7 @@ impl<M, S> Canonical<M, S> {
         Self { model, form }
     }
 
-    /// The model as it was.
+    /// The original model.
     pub fn model(&self) -> &M {
         &self.model
     }

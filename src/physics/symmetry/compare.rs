@@ -1,7 +1,7 @@
-//! What two Lagrangians of the same coordinates have in common: the motion, and more.
+//! Comparison of two Lagrangians of the same coordinates: values, motion, mass matrices and energies.
 
 use super::basis::{Basis, Values, unknowns};
-use super::find::room;
+use super::find::check_size;
 use super::null_space::{add, dot, norm, orthonormal};
 use super::sample::Sample;
 use super::thresholds::{INDEPENDENT_COLUMN, METRIC_POWERS, ROUNDING_TERM};
@@ -44,7 +44,7 @@ pub struct Comparison {
     pub energy: f64,
 }
 
-/// Compares two Lagrangians at states `(q, v)`, `(states, n)`: what they have in common beyond the freedom that `L` has.
+/// Compares two Lagrangians at states `(q, v)`, `(states, n)`, apart from the freedom that `L` has.
 ///
 /// At best, motion determines `L` up to a factor for each group of coordinates that act on each other, a total derivative, `L -> s L +
 /// dF(q)/dt`, and a constant. For geodesics, along which `L` is the energy, it does so up to a function `f(L)`, where `B` is the metric.
@@ -66,7 +66,7 @@ pub fn compare(
         let found = if a.coordinates() == b.coordinates() { basis.names().len() } else { a.coordinates() };
         return Err(SymmetryError::Basis { expected: b.coordinates(), found });
     }
-    room(b.coordinates(), unknowns(b.coordinates(), basis.len()), q.len() / b.coordinates().max(1))?;
+    check_size(b.coordinates(), unknowns(b.coordinates(), basis.len()), q.len() / b.coordinates().max(1))?;
     let regrouped = Regrouped::nearest(b, a, (q, v));
     let b = regrouped.as_ref().map_or(b, |regrouped| regrouped as &dyn EulerLagrange<f64>);
     // States at which both are finite.
@@ -151,7 +151,7 @@ impl Fit {
         let mut gauge = plain.given(&plain.along(&rest), columns.len());
         let mut known_gauge = null_space::significant(&columns, &rest, INDEPENDENT_COLUMN);
         let whole = norm(&target);
-        // Roundings are not terms.
+        // Rounding errors are not terms.
         for (k, column) in columns.iter().enumerate() {
             for c in [&mut gauge[k], &mut known_gauge[k]] {
                 if (*c * norm(column)).abs() <= ROUNDING_TERM * whole {
@@ -292,7 +292,7 @@ impl Frames {
     }
 }
 
-/// Takes the part along `p p^T` out of a matrix `(n, n)`.
+/// Removes the part along `p p^T` from a matrix `(n, n)`.
 fn without(matrix: &mut [f64], p: &[f64]) {
     let n = p.len();
     let part: f64 = matrix.chunks_exact(n).zip(p).map(|(row, x)| x * dot(row, p)).sum();
@@ -335,7 +335,7 @@ fn factors(
     let plain = orthonormal(&columns, INDEPENDENT_COLUMN);
     let mut solution = plain.given(&plain.along(&target), columns.len());
     let whole = norm(&target);
-    // Roundings are not terms.
+    // Rounding errors are not terms.
     for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
         if (*c * norm(column)).abs() <= ROUNDING_TERM * whole {
             *c = 0.0;

@@ -2,7 +2,7 @@
 
 use super::basis::{Basis, Values};
 use super::field::{join, sum};
-use super::find::{FunctionColumns, room};
+use super::find::{FunctionColumns, check_size};
 use super::null_space::{Separation, check, dot, norm, orthonormal, reduce};
 use super::sample::Sample;
 use super::thresholds::{ENTRY_NOISE, ENTRY_NOISES, INDEPENDENT_COLUMN, INDEPENDENT_FUNCTION, NEW_PART};
@@ -125,7 +125,7 @@ pub fn quadratic(
     }
     // 1, the energy, its square, charges, their products with the energy and with each other.
     let products = 3 + 2 * fields.len() + fields.len() * (fields.len() + 1) / 2;
-    room(n, products, q.len() / n.max(1))?;
+    check_size(n, products, q.len() / n.max(1))?;
     let sample = Sample::new(model, q, v)?;
     let known = known(&sample, basis, fields);
     let cyclic = sample.cyclic();
@@ -192,7 +192,7 @@ fn search(
     if !sample.homogeneous {
         monomials.push(Monomial::One);
     }
-    room(n, monomials.len() * basis.len(), states)?;
+    check_size(n, monomials.len() * basis.len(), states)?;
     let functions = FunctionColumns::new(basis, sample)?;
     let (mut places, mut values, mut rates) = (Vec::new(), Vec::new(), Vec::new());
     for f in 0..basis.len() {

@@ -73,7 +73,7 @@ impl Field {
     }
 
     /// Turns the field so that its last term has a positive factor: `-y d_x + x d_y`.
-    pub(crate) fn turn(&mut self) {
+    pub(crate) fn normalise_sign(&mut self) {
         if self.coefficients.iter().rev().find(|c| **c != 0.0).is_some_and(|c| *c < 0.0) {
             self.coefficients.iter_mut().chain(&mut self.gauge).for_each(|c| *c = if *c == 0.0 { 0.0 } else { -*c });
         }
@@ -206,7 +206,7 @@ pub fn charges(
             basis.evaluate(q, &mut at);
             for (field, (values, rates)) in fields.iter().zip(&mut series[1..]) {
                 values.push(field.charge(&at, p));
-                // Friction turns momenta besides.
+                // Friction changes momenta too.
                 let force = terms.force.get(one.clone()).unwrap_or(&[]);
                 let pull: f64 = field.vector(&at, n).iter().zip(force).map(|(x, f)| x * f).sum();
                 rates.push(field.breaking(&at, v, p, g) + pull);

@@ -89,7 +89,7 @@ pub fn symmetries(
     if basis.names().len() != n {
         return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
     }
-    room(n, unknowns(n, basis.len()), q.len() / n.max(1))?;
+    check_size(n, unknowns(n, basis.len()), q.len() / n.max(1))?;
     search(&Sample::new(model, q, v)?, basis, tolerance)
 }
 
@@ -97,7 +97,7 @@ pub fn symmetries(
 ///
 /// # Errors
 /// [`SymmetryError::TooMany`], [`SymmetryError::TooManyStates`].
-pub(super) fn room(n: usize, unknowns: usize, states: usize) -> Result<(), SymmetryError> {
+pub(super) fn check_size(n: usize, unknowns: usize, states: usize) -> Result<(), SymmetryError> {
     if unknowns > MOST_UNKNOWNS {
         return Err(SymmetryError::TooMany { unknowns, most: MOST_UNKNOWNS });
     }
@@ -161,7 +161,7 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
             let gauge = row.split_off(n * functions);
             let mut field = Field { coefficients: row, gauge };
             field.clean_gauge(sample, &columns.values, noise);
-            field.turn();
+            field.normalise_sign();
             field
         })
         .collect();

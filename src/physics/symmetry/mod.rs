@@ -69,11 +69,11 @@ pub use {
 
 use crate::lagrangian::MechanicsError;
 
-/// Why nothing could be found out.
+/// Why a search or a comparison failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SymmetryError {
-    /// Slices of states of unfit lengths.
+    /// Slices of states of the wrong length.
     #[error("expected whole states of {coordinates} coordinates and as many velocities, found {q} and {v} numbers")]
     Shape {
         /// Number of coordinates of the model.
@@ -106,7 +106,7 @@ pub enum SymmetryError {
     TooMany {
         /// Unknowns.
         unknowns: usize,
-        /// Unknowns that there may be.
+        /// Largest number of unknowns.
         most: usize,
     },
     /// More states than a search has room for.
@@ -116,10 +116,10 @@ pub enum SymmetryError {
         states: usize,
         /// Unknowns.
         unknowns: usize,
-        /// States that there may be.
+        /// Largest number of states.
         most: usize,
     },
-    /// A tolerance at which nothing can be decided.
+    /// A tolerance out of range.
     #[error("a tolerance of {found:e}: expected one from {least:e} to {most:e}")]
     Tolerance {
         /// The tolerance.
@@ -143,7 +143,7 @@ pub enum SymmetryError {
     /// Numbers of a decomposition that are not finite.
     #[error("{what} is not finite")]
     NotFinite {
-        /// Which.
+        /// Name of the quantity.
         what: &'static str,
     },
 }

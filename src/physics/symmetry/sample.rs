@@ -54,13 +54,13 @@ pub enum Invariant {
     /// `p.v - L` of another Lagrangian with a time among its coordinates.
     #[serde(rename = "p.v - L")]
     Legendre,
-    /// Nothing, for there is friction.
+    /// Nothing, because of friction.
     #[serde(rename = "nothing")]
     Nothing,
 }
 
 impl Invariant {
-    /// What the motions of a model conserve, judged by its terms at states `(states, n)`.
+    /// The quantity that the motions of a model conserve, according to its terms at states `(states, n)`.
     ///
     /// # Errors
     /// [`SymmetryError::Shape`] for slices of wrong length, [`SymmetryError::States`] if fewer than half of the states have finite terms.
@@ -82,7 +82,7 @@ impl Sample {
     /// The terms of `model` at states where they are finite.
     ///
     /// # Errors
-    /// [`SymmetryError::Shape`] for slices of unfit lengths, [`SymmetryError::States`] if fewer than half of the states have
+    /// [`SymmetryError::Shape`] for slices of the wrong length, [`SymmetryError::States`] if fewer than half of the states have
     /// finite terms.
     pub fn new(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Result<Self, SymmetryError> {
         let n = model.coordinates();

@@ -238,7 +238,7 @@ pub struct ComparisonSummary {
     pub first: String,
     /// Name of `B`.
     pub second: String,
-    /// What they have in common.
+    /// Their differences.
     #[serde(flatten)]
     pub comparison: Comparison,
     /// States that were examined.
@@ -270,7 +270,7 @@ impl ComparisonSummary {
         findings
     }
 
-    /// The fit, and its undetermined parts, a sentence each.
+    /// The fit and its undetermined parts, one sentence each.
     fn fit(&self) -> Vec<String> {
         let found = &self.comparison;
         let powers = found.factors.iter().enumerate().map(|(k, factor)| {

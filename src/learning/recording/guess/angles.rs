@@ -1,4 +1,4 @@
-//! Which coordinates are angles, and in which unit.
+//! Recognises angles and their units.
 
 use super::names::{in_degrees, is_angle};
 use super::thresholds::{MOST_TURNS_IN_RADIANS, SAMPLES_PER_JUMP, TURN_TOLERANCE, WRAPPED_RANGE};
@@ -20,7 +20,7 @@ impl Angle {
     }
 }
 
-/// Whether a coordinate is an angle: it jumps by a turn, or its name says so. `restarts` are rows at which a trajectory begins.
+/// Recognises an angle by its jumps by a full turn, or by its name. `restarts` are the rows at which a trajectory begins.
 pub fn angle(name: &str, values: &[f64], restarts: &[usize]) -> Option<Angle> {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let steps = || (1..values.len()).filter(|k| !restarts.contains(k)).map(|k| (values[k] - values[k - 1]).abs());

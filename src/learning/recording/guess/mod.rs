@@ -1,4 +1,4 @@
-//! A guess at the meaning of the columns of recorded motion: time, trajectories, coordinates, angles, velocities, accelerations and forces.
+//! Guesses the meaning of the columns of recorded motion: time, trajectories, coordinates, angles, velocities, accelerations and forces.
 //!
 //! Names decide first, then the numbers: a time increases, a velocity is the derivative of a position, an angle jumps by a turn.
 

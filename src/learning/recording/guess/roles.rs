@@ -1,4 +1,4 @@
-//! The meaning of all columns of a table together.
+//! The roles of all columns of a table.
 
 use super::angles::{Angle, angle};
 use super::names::{is_acceleration, is_force, is_index, is_position, is_torque, is_trajectory, is_velocity};
@@ -73,7 +73,7 @@ impl Roles<'_> {
         self.time.as_ref().map_or(&[], |time| &time.restarts)
     }
 
-    /// Takes the roles that options give.
+    /// Assigns the roles that options give.
     fn take_given(&mut self) {
         let place = |name: &String| self.table.names.iter().position(|known| known == name);
         let made_of = |text: &String| formula_in(text)?.parse::<NamedFormula>().ok();
@@ -139,10 +139,11 @@ impl Roles<'_> {
         let labels = self.open().into_iter().filter(|&k| self.labels(k)).collect::<Vec<_>>();
         let (first, others): (Vec<usize>, Vec<usize>) =
             labels.into_iter().partition(|&k| is_trajectory(&self.table.names[k]));
-        let anew = !self.restarts().is_empty();
-        let found = first.iter().copied().chain(others.into_iter().filter(|_| anew)).find(|&k| self.in_order(k, file));
+        let restarts = !self.restarts().is_empty();
+        let found =
+            first.iter().copied().chain(others.into_iter().filter(|_| restarts)).find(|&k| self.in_order(k, file));
         if let Some(k) = found {
-            let because = if first.contains(&k) { "its name" } else { "its value changes where the time begins anew" };
+            let because = if first.contains(&k) { "its name" } else { "its value changes where the time restarts" };
             self.set(k, Role::Trajectory, because);
         }
         for k in self.open() {
@@ -152,7 +153,7 @@ impl Roles<'_> {
         }
     }
 
-    /// `true` for text, and for whole numbers of few values.
+    /// `true` for text, and for whole numbers with few distinct values.
     fn labels(&self, k: usize) -> bool {
         let Ok(values) = &self.table.numbers[k] else { return true };
         let mut distinct: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
@@ -219,10 +220,10 @@ impl Roles<'_> {
                     ((named && correlation > NAMED_CORRELATION) || alike).then_some((j, correlation))
                 };
                 // On a circle each coordinate is nearly the derivative of the other, so matching names decide.
-                let together =
+                let is_named_after =
                     |j: usize| name.starts_with(&*self.table.names[j]) || name.ends_with(&*self.table.names[j]);
                 let best = sources.filter_map(of);
-                let best = best.max_by(|a, b| together(a.0).cmp(&together(b.0)).then(a.1.total_cmp(&b.1)));
+                let best = best.max_by(|a, b| is_named_after(a.0).cmp(&is_named_after(b.0)).then(a.1.total_cmp(&b.1)));
                 match best {
                     Some((j, _)) => {
                         let because =
@@ -231,7 +232,11 @@ impl Roles<'_> {
                     }
                     None if named => {
                         let what = ["", "velocity", "acceleration"][order];
-                        self.set(k, Role::Unused, format!("its name says {what}, but it is of no other column"));
+                        self.set(
+                            k,
+                            Role::Unused,
+                            format!("its name says {what}, but it is not that of any other column"),
+                        );
                     }
                     None => {}
                 }
@@ -286,7 +291,7 @@ impl Roles<'_> {
                 let because = if sources.contains(&k) { "another column is its derivative" } else { "it varies" };
                 self.set(k, Role::Coordinate, because);
             } else {
-                self.set(k, Role::Unused, "no other column is its derivative, while other coordinates have theirs");
+                self.set(k, Role::Unused, "no column is its derivative, but other coordinates have one");
             }
         }
         // One force for each coordinate, and one derivative for each, or none.
@@ -332,7 +337,7 @@ impl Roles<'_> {
         };
         let fixed: Vec<usize> = coordinates.into_iter().filter(fixed).collect();
         for k in fixed {
-            let because = format!("it hardly moves beside {}, like a fixed point", self.table.names[widest]);
+            let because = format!("it hardly moves compared with {}, like a fixed point", self.table.names[widest]);
             self.set(k, Role::Unused, because);
         }
     }
@@ -375,16 +380,16 @@ impl Roles<'_> {
         let varies =
             |k: &usize| self.table.numbers[*k].as_ref().is_ok_and(|values| values.iter().any(|x| *x != values[0]));
         let unused = names(self.of(&Role::Unused).into_iter().filter(varies).collect());
-        let some = |given: Vec<String>, found: Vec<String>| if given.is_empty() { found } else { given };
+        let given_or = |given: Vec<String>, found: Vec<String>| if given.is_empty() { found } else { given };
         let columns = Columns {
             coords: names(coordinates.clone()),
-            velocity: some(given.velocity, derivative(1)),
-            acceleration: some(given.acceleration, derivative(2)),
-            force: some(given.force, names(self.of(&Role::Force))),
-            input: some(given.input, unused),
+            velocity: given_or(given.velocity, derivative(1)),
+            acceleration: given_or(given.acceleration, derivative(2)),
+            force: given_or(given.force, names(self.of(&Role::Force))),
+            input: given_or(given.input, unused),
             time: self.time.as_ref().map(|time| self.table.names[time.column].clone()),
             trajectory: names(self.of(&Role::Trajectory)).pop(),
-            periodic: some(given.periodic, names(angles.iter().map(|(k, _)| *k).collect())),
+            periodic: given_or(given.periodic, names(angles.iter().map(|(k, _)| *k).collect())),
             units: given.units.into_iter().chain(guessed).collect(),
             ..given
         };

@@ -1,4 +1,4 @@
-//! Which column is the time, and where it restarts.
+//! Finds the column of time and the rows at which it restarts.
 
 use super::names::{is_index, is_time, unit_of_time};
 use super::thresholds::{EVEN_STEP, ROWS_PER_RESTART, STEPS_PER_UNEVEN_ONE, SUSPICIOUS_STEP};
@@ -18,7 +18,7 @@ pub struct Time {
     pub because: String,
 }
 
-/// Rows at which a column decreases; none if it stands still somewhere, or decreases too often for a time.
+/// Rows at which a column decreases; none if it decreases or repeats a value too often for a time.
 pub fn restarts(values: &[f64]) -> Option<Vec<usize>> {
     let falls: Vec<usize> = (1..values.len()).filter(|&k| values[k] < values[k - 1]).collect();
     let still = values.windows(2).filter(|pair| pair[0] == pair[1]).count();

@@ -1,4 +1,4 @@
-//! ZIP archives, and how much packed bytes may become.
+//! ZIP archives, and the size that packed bytes may unpack to.
 
 use super::Problem;
 use super::shared::Shared;
@@ -43,7 +43,7 @@ pub fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = 
     }
     if size > most_unpacked(compressed) {
         return Err(Problem::Array(format!(
-            "the archive promises {size} bytes from {compressed}, more than {MOST_EXPANSION} times as many: save it \
+            "the archive says that {compressed} bytes unpack to {size}, more than {MOST_EXPANSION} times as many: save it \
              without compression"
         )));
     }

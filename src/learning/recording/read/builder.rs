@@ -73,94 +73,58 @@ impl<'a> Builder<'a> {
     }
 
     /// The columns as the file calls them.
-    pub fn called(&self) -> Columns {
+    pub fn columns_in_file(&self) -> Columns {
         self.selection.called(self.columns)
     }
 
     /// Adds a row: the unprocessed values of the used columns in the order of the selection, and the value that distinguishes trajectories
     /// if there is such a column.
     pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {
-        if self.lacks(row, values) {
+        if self.is_incomplete(row, values) {
             return Ok(());
         }
-        self.turn_to(row, label)?;
-        let Some(open) = self.tracks.get_mut(self.current) else { return Ok(()) };
-        let timed = usize::from(self.selection.timed);
-        // A negative factor of time turns its order around.
-        let sign = self.selection.values[0].factor.signum();
-        if self.selection.timed && !open.last.is_empty() && values[0] * sign <= open.last[0] * sign {
-            if values == open.last {
-                self.duplicates += 1;
-                return Ok(());
-            }
-            if !(self.columns.whole && values[0] == open.last[0]) {
-                let hint = match (values[0] == open.last[0], label.is_none()) {
-                    (true, _) => " with other values",
-                    (false, true) => " (another trajectory? give it a file or a column of its own)",
-                    (false, false) => "",
-                };
-                let column = self.selection.values[0].name.clone();
-                let (before_row, before) = (open.last_row, open.last[0]);
-                return Err(Problem::Order { row, column, before_row, before, found: values[0], hint });
-            }
+        self.select_trajectory(row, label)?;
+        if self.is_duplicate(row, values, label)? {
+            self.duplicates += 1;
+            return Ok(());
         }
+        let Self { columns, selection, periodic, .. } = self;
+        let Some(open) = self.tracks.get_mut(self.current) else { return Ok(()) };
         open.last.clear();
         open.last.extend_from_slice(values);
         open.last_row = row;
+        open.append(row, values, (columns, selection, periodic))
+    }
 
-        let (sample, track) = (open.track.times.len(), &mut open.track);
-        open.rows.note(sample, row);
-        let n = self.columns.coords.len();
-        let mut scaled = values.iter().zip(&self.selection.values).map(|(x, used)| {
-            let y = x * used.factor;
-            if y.is_finite() || x.is_nan() {
-                Ok(y)
-            } else {
-                Err(Problem::Field { row, column: used.name.clone(), found: format!("{x} times {:e}", used.factor) })
-            }
-        });
-        match (timed, self.columns.rate) {
-            (0, rate) => track.times.push(sample as f64 / rate.unwrap_or(1.0)),
-            _ => {
-                for time in scaled.by_ref().take(1) {
-                    track.times.push(time?);
-                }
-            }
+    /// `true` if a row repeats the row before in its trajectory.
+    ///
+    /// # Errors
+    /// [`Problem::Order`] for a row that is not later than the row before.
+    fn is_duplicate(&self, row: u64, values: &[f64], label: Option<&str>) -> Result<bool, Problem> {
+        let Some(open) = self.tracks.get(self.current) else { return Ok(false) };
+        // A negative factor of time turns its order around.
+        let sign = self.selection.values[0].factor.signum();
+        if !self.selection.timed || open.last.is_empty() || values[0] * sign > open.last[0] * sign {
+            return Ok(false);
         }
-        for (i, q) in scaled.by_ref().take(n).enumerate() {
-            let q = q?;
-            // An angle continues from its last reading.
-            let last = || track.q.iter().skip(i).step_by(n).rev().find(|q| !q.is_nan());
-            let turns = match self.periodic[i] && !q.is_nan() {
-                true => last().map_or(0.0, |last| ((last - q) / TAU).round()),
-                false => 0.0,
-            };
-            track.q.push(if turns == 0.0 { q } else { q + TAU * turns });
+        if values == open.last {
+            return Ok(true);
         }
-        for (names, part) in [
-            (&self.columns.velocity, &mut track.v),
-            (&self.columns.acceleration, &mut track.a),
-            (&self.columns.force, &mut track.force),
-        ] {
-            for value in scaled.by_ref().take(names.len()) {
-                part.push(value?);
-            }
+        if self.columns.whole && values[0] == open.last[0] {
+            return Ok(false);
         }
-        for (name, error) in self.columns.error.iter().zip(scaled.by_ref()) {
-            let error = error?;
-            if error <= 0.0 {
-                return Err(Problem::Error { row, column: name.clone(), found: error });
-            }
-            open.error.push(error);
-        }
-        for value in scaled {
-            open.input.push(value?);
-        }
-        Ok(())
+        let hint = match (values[0] == open.last[0], label.is_none()) {
+            (true, _) => " with other values",
+            (false, true) => " (another trajectory? give it a file or a column of its own)",
+            (false, false) => "",
+        };
+        let column = self.selection.values[0].name.clone();
+        let (before_row, before) = (open.last_row, open.last[0]);
+        Err(Problem::Order { row, column, before_row, before, found: values[0], hint })
     }
 
     /// Notes a row that is left out because a reading is missing. A trajectory that stays whole keeps rows with some of the positions.
-    fn lacks(&mut self, row: u64, values: &[f64]) -> bool {
+    fn is_incomplete(&mut self, row: u64, values: &[f64]) -> bool {
         let lacking = |x: &&f64| x.is_nan();
         let Some(first) = values.iter().position(|x| x.is_nan()) else { return false };
         let (start, n) = (usize::from(self.selection.timed), self.columns.coords.len());
@@ -176,7 +140,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Finds or begins the trajectory of a label.
-    fn turn_to(&mut self, row: u64, label: Option<&str>) -> Result<(), Problem> {
+    fn select_trajectory(&mut self, row: u64, label: Option<&str>) -> Result<(), Problem> {
         if self.tracks.get(self.current).is_some_and(|open| open.label.as_deref() == label) {
             return Ok(());
         }
@@ -205,6 +169,64 @@ impl<'a> Builder<'a> {
         };
         let (rows, error, input, last) = (Rows::default(), Vec::new(), Vec::new(), Vec::new());
         self.tracks.push(TrackBuilder { label, rows, track, error, input, missing: Vec::new(), last, last_row: 0 });
+        Ok(())
+    }
+}
+
+impl TrackBuilder {
+    /// Appends the values of a row in SI, angles unwrapped.
+    fn append(
+        &mut self,
+        row: u64,
+        values: &[f64],
+        (columns, selection, periodic): (&Columns, &Selection, &[bool]),
+    ) -> Result<(), Problem> {
+        let (sample, track, n) = (self.track.times.len(), &mut self.track, columns.coords.len());
+        self.rows.note(sample, row);
+        let mut scaled = values.iter().zip(&selection.values).map(|(x, used)| {
+            let y = x * used.factor;
+            if y.is_finite() || x.is_nan() {
+                Ok(y)
+            } else {
+                Err(Problem::Field { row, column: used.name.clone(), found: format!("{x} times {:e}", used.factor) })
+            }
+        });
+        if selection.timed {
+            for time in scaled.by_ref().take(1) {
+                track.times.push(time?);
+            }
+        } else {
+            track.times.push(sample as f64 / columns.rate.unwrap_or(1.0));
+        }
+        for (i, q) in scaled.by_ref().take(n).enumerate() {
+            let q = q?;
+            // An angle continues from its last reading.
+            let last = || track.q.iter().skip(i).step_by(n).rev().find(|q| !q.is_nan());
+            let turns = match periodic[i] && !q.is_nan() {
+                true => last().map_or(0.0, |last| ((last - q) / TAU).round()),
+                false => 0.0,
+            };
+            track.q.push(if turns == 0.0 { q } else { q + TAU * turns });
+        }
+        for (names, quantity) in [
+            (&columns.velocity, &mut track.v),
+            (&columns.acceleration, &mut track.a),
+            (&columns.force, &mut track.force),
+        ] {
+            for value in scaled.by_ref().take(names.len()) {
+                quantity.push(value?);
+            }
+        }
+        for (name, error) in columns.error.iter().zip(scaled.by_ref()) {
+            let error = error?;
+            if error <= 0.0 {
+                return Err(Problem::Error { row, column: name.clone(), found: error });
+            }
+            self.error.push(error);
+        }
+        for value in scaled {
+            self.input.push(value?);
+        }
         Ok(())
     }
 }

@@ -13,7 +13,7 @@ use crate::recording::Columns;
 use std::io::{BufRead, Read};
 
 /// The trajectories of a text while its lines are read, and the recognised format.
-pub struct Text<'a> {
+pub struct TextReader<'a> {
     /// One trajectory, several that a column distinguishes, or several side by side.
     lanes: Vec<Lane<'a>>,
     /// `true` if trajectories are side by side.
@@ -25,7 +25,7 @@ pub struct Text<'a> {
     faults: Faults,
     /// Mark of the decimals.
     pub numbers: Numbers,
-    /// Encoding of what is not a number.
+    /// Encoding of the text that is not a number.
     pub encoding: Encoding,
     /// Separator of the fields.
     pub separator: Separator,
@@ -41,10 +41,10 @@ pub fn read<'a>(
     mut input: impl BufRead,
     columns: &'a Columns,
     known: Option<Separator>,
-) -> Result<(Text<'a>, Vec<Builder<'a>>), Problem> {
+) -> Result<(TextReader<'a>, Vec<Builder<'a>>), Problem> {
     let (mut line, mut row) = (Vec::new(), 0);
-    let mut begun: Option<Text<'a>> = None;
-    let mut remark = None;
+    let mut reader: Option<TextReader<'a>> = None;
+    let mut last_comment = None;
     let end = line_end(input.fill_buf()?);
     loop {
         line.clear();
@@ -64,25 +64,25 @@ pub fn read<'a>(
             continue;
         }
         if let Some(said) = comment(text) {
-            if begun.is_none() {
-                remark = decode(said).map(|(said, _)| (row, said.to_string()));
+            if reader.is_none() {
+                last_comment = decode(said).map(|(said, _)| (row, said.to_string()));
             }
             continue;
         }
-        match &mut begun {
+        match &mut reader {
             Some(known) => known.take(whole, text, row)?,
             None if text.strip_prefix(b"sep=").is_some_and(|mark| mark.len() <= 1) => {}
             None if is_title(text, input.fill_buf()?) => {}
             None => {
-                let (first, header) = Text::begin(whole, row, columns, remark.take(), known)?;
-                let first = begun.insert(first);
+                let (first, header) = TextReader::begin(whole, row, columns, last_comment.take(), known)?;
+                let first = reader.insert(first);
                 if !header {
                     first.take(whole, text, row)?;
                 }
             }
         }
     }
-    let mut text = begun.ok_or(Problem::Empty)?;
+    let mut text = reader.ok_or(Problem::Empty)?;
     std::mem::take(&mut text.faults).end()?;
     let builders = std::mem::take(&mut text.lanes).into_iter().map(|lane| lane.builder).collect();
     Ok((text, builders))
@@ -100,13 +100,13 @@ fn is_title(line: &[u8], rest: &[u8]) -> bool {
     names(&title) == Some(1) && names(&next).is_some_and(|count| count > 1)
 }
 
-impl<'a> Text<'a> {
+impl<'a> TextReader<'a> {
     /// Finds the columns by the first line, or by the comment above it; says whether the line is a header.
     fn begin(
         line: &[u8],
         row: u64,
         columns: &'a Columns,
-        remark: Option<(u64, String)>,
+        last_comment: Option<(u64, String)>,
         known: Option<Separator>,
     ) -> Result<(Self, bool), Problem> {
         let (text, encoding) = decode(line).ok_or(Problem::NotText(row))?;
@@ -124,7 +124,7 @@ impl<'a> Text<'a> {
             }
             (Some(names), false) => select(Some(names), row)?,
             (None, true) => select(Some(&first.iter().map(ToString::to_string).collect::<Vec<_>>()), row)?,
-            (None, false) => match remark.and_then(|(row, said)| Some((row, names_in(&said, width)?))) {
+            (None, false) => match last_comment.and_then(|(row, said)| Some((row, names_in(&said, width)?))) {
                 Some((row, names)) => select(Some(&names), row)?,
                 None => select(None, row)?,
             },
@@ -168,7 +168,7 @@ impl<'a> Text<'a> {
             found += 1;
         }
         if !good || found != self.slots.len() {
-            self.examine(text, row);
+            self.note_mistakes(text, row);
             return Ok(());
         }
         // After a mistake the rest is only searched for further mistakes, and nothing is kept.
@@ -187,14 +187,14 @@ impl<'a> Text<'a> {
     fn take_wide(&mut self, text: &[u8], row: u64) -> Result<(), Problem> {
         let fields: Vec<&[u8]> = self.separator.fields(text).collect();
         if fields.len() != self.slots.len() {
-            self.examine(text, row);
+            self.note_mistakes(text, row);
             return Ok(());
         }
         self.lanes.iter_mut().try_for_each(|lane| lane.take(&fields, row, &mut self.numbers, &mut self.faults))
     }
 
     /// Notes every mistake of a line.
-    fn examine(&mut self, text: &[u8], row: u64) {
+    fn note_mistakes(&mut self, text: &[u8], row: u64) {
         let (expected, found) = (self.slots.len(), self.separator.fields(text).count());
         if found != expected {
             return self.faults.add(Problem::Ragged { row, expected, separated: self.separator.named(), found });

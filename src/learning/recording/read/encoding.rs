@@ -71,7 +71,12 @@ impl<R: Read> Utf16<R> {
     fn more(&mut self) -> io::Result<()> {
         let mut bytes = Vec::new();
         (&mut self.input).take(1 << 16).read_to_end(&mut bytes)?;
-        let wrong = || io::Error::new(io::ErrorKind::InvalidData, "the text is not what its mark of UTF-16 says");
+        let wrong = || {
+            io::Error::new(
+                io::ErrorKind::InvalidData,
+                "the text begins with the mark of UTF-16 but is not valid UTF-16",
+            )
+        };
         let big = *self.big_endian.get_or_insert(bytes.starts_with(b"\xfe\xff"));
         if bytes.len() % 2 == 1 || (bytes.is_empty() && self.high.is_some()) {
             return Err(wrong());

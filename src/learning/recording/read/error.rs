@@ -6,7 +6,7 @@ use crate::recording::ColumnsError;
 use crate::storage::ReadError;
 use thiserror::Error;
 
-/// Why files do not make a recording.
+/// Why files cannot be read as a recording.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DataError {
@@ -16,7 +16,7 @@ pub enum DataError {
     /// No files.
     #[error("expected at least one file of data")]
     NoFiles,
-    /// A file.
+    /// A problem of a file.
     #[error("{}", one_line(&format!("{file}: {problem}")))]
     File {
         /// Its path.
@@ -36,17 +36,17 @@ pub enum Problem {
     /// Given as two of the files.
     #[error("the file is given twice")]
     Again,
-    /// Nothing in it.
+    /// The file is empty.
     #[error("the file is empty")]
     Empty,
     /// No coordinates are given; the columns of the file, by name or by number.
-    #[error("the coordinates are not named; the columns are {}", .0.join(", "))]
+    #[error("no coordinates are given; the columns are {}", .0.join(", "))]
     Names(Vec<String>),
     /// Bytes that are not text.
     #[error("row {0}: bytes that are not text")]
     NotText(u64),
     /// A file in a foreign format, and how to convert it.
-    #[error("{name}, which is not read: {cure}")]
+    #[error("{name}, a format that is not supported: {cure}")]
     Foreign {
         /// The format.
         name: &'static str,
@@ -77,7 +77,7 @@ pub enum Problem {
         /// Its name.
         name: String,
     },
-    /// A column that is not there, with the nearest name.
+    /// A missing column, with the nearest name.
     #[error("row {row}: missing {what}: {problem}")]
     Missing {
         /// Row of the header.
@@ -126,8 +126,8 @@ pub enum Problem {
         /// Fields of the row.
         found: usize,
     },
-    /// More rows lack a reading than do not.
-    #[error("row {row}, column {column}: no reading; {incomplete} rows lack one, and {whole} do not")]
+    /// More rows are incomplete than complete.
+    #[error("row {row}, column {column}: no reading; {incomplete} rows are incomplete and {whole} are complete")]
     Missings {
         /// The first of them.
         row: u64,

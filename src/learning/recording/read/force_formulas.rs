@@ -8,14 +8,14 @@ use crate::recording::{Columns, ColumnsError};
 /// The forces on the coordinates; some of them are formulas.
 pub struct ForceFormulas {
     /// A formula for each coordinate; for a column, its name.
-    formulas: Vec<Given>,
+    formulas: Vec<ForceSource>,
     /// Inputs that are read only for the formulas, after the requested ones.
-    read: Vec<String>,
-    asked: usize,
+    for_formulas: Vec<String>,
+    requested: usize,
 }
 
 /// Where a force comes from.
-enum Given {
+enum ForceSource {
     Column(String),
     Formula(String, NamedFormula),
 }
@@ -31,22 +31,22 @@ impl ForceFormulas {
         }
         columns.count_faults()?;
         let given = |text: &String| match formula_in(text) {
-            None => Ok(Given::Column(text.clone())),
+            None => Ok(ForceSource::Column(text.clone())),
             Some(formula) => match formula.parse() {
-                Ok(parsed) => Ok(Given::Formula(text.clone(), parsed)),
+                Ok(parsed) => Ok(ForceSource::Formula(text.clone(), parsed)),
                 Err(error) => Err(ColumnsError(vec![format!("force: {text}: {error}")])),
             },
         };
         let formulas = columns.force.iter().map(given).collect::<Result<Vec<_>, _>>()?;
-        let (mut plain, mut read) = (Columns { force: Vec::new(), ..columns.clone() }, Vec::new());
-        for name in formulas.iter().flat_map(Given::names).filter(|name| name.as_str() != TIME) {
+        let (mut plain, mut for_formulas) = (Columns { force: Vec::new(), ..columns.clone() }, Vec::new());
+        for name in formulas.iter().flat_map(ForceSource::names).filter(|name| name.as_str() != TIME) {
             if !plain.input.contains(name) {
                 plain.input.push(name.clone());
-                read.push(name.clone());
+                for_formulas.push(name.clone());
             }
         }
-        let asked = plain.input.len() - read.len();
-        Ok(Some((Self { formulas, read, asked }, plain)))
+        let requested = plain.input.len() - for_formulas.len();
+        Ok(Some((Self { formulas, for_formulas, requested }, plain)))
     }
 
     /// Evaluates the forces at the samples of a recording, which has the inputs of its description and then those of the formulas.
@@ -54,8 +54,8 @@ impl ForceFormulas {
     /// # Errors
     /// [`ColumnsError`] for a force that is not finite.
     pub fn apply(&self, columns: &Columns, reading: &mut LoadedRecording) -> Result<(), ColumnsError> {
-        let count = self.asked + self.read.len();
-        let names = || columns.input[..self.asked].iter().chain(&self.read);
+        let count = self.requested + self.for_formulas.len();
+        let names = || columns.input[..self.requested].iter().chain(&self.for_formulas);
         let place = |name: &String| names().position(|own| own == name);
         for (k, track) in reading.recording.tracks.iter_mut().enumerate() {
             for (sample, t) in track.times.iter().enumerate() {
@@ -63,8 +63,8 @@ impl ForceFormulas {
                 let value = |name: &String| place(name).map_or(*t, |at| inputs[at]);
                 for given in &self.formulas {
                     let (text, force) = match given {
-                        Given::Column(name) => (name, value(name)),
-                        Given::Formula(text, formula) => {
+                        ForceSource::Column(name) => (name, value(name)),
+                        ForceSource::Formula(text, formula) => {
                             let values: Vec<f64> = formula.names.iter().map(value).collect();
                             (text, formula.value(&values))
                         }
@@ -78,18 +78,18 @@ impl ForceFormulas {
             }
         }
         for inputs in &mut reading.inputs {
-            *inputs = inputs.chunks_exact(count).flat_map(|row| &row[..self.asked]).copied().collect();
+            *inputs = inputs.chunks_exact(count).flat_map(|row| &row[..self.requested]).copied().collect();
         }
-        if self.asked == 0 {
+        if self.requested == 0 {
             reading.inputs.clear();
         }
-        reading.columns.input.truncate(self.asked);
+        reading.columns.input.truncate(self.requested);
         reading.columns.force.clone_from(&columns.force);
         Ok(())
     }
 }
 
-impl Given {
+impl ForceSource {
     /// The columns and the time it is made of.
     fn names(&self) -> &[String] {
         match self {

@@ -2,7 +2,7 @@
 
 use super::Problem;
 
-/// Bytes from the beginning of a file that are looked at.
+/// Bytes at the beginning of a file that are examined.
 pub const LOOKED_AT: u64 = 520;
 
 /// How to convert workbooks and frames to a readable file.

@@ -39,7 +39,7 @@ impl<R: Read> Read for Gzip<R> {
             }
         }
         self.left = self.left.checked_sub(done as u64).ok_or_else(|| {
-            io::Error::other("the gzip data unpack to more than 100 times their bytes, which no measured numbers do")
+            io::Error::other("the gzip data unpack to more than 100 times their size, which measured numbers never do")
         })?;
         Ok(done)
     }

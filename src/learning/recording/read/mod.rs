@@ -95,7 +95,7 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
         reading.duplicates += builder.duplicates;
         let (incomplete, first) = builder.incomplete.clone();
         let whole: usize = builder.tracks.iter().map(|track| track.track.len()).sum();
-        // Most rows lack something where a file is read wrongly.
+        // If most rows are incomplete, the file was probably misread.
         if let Some((row, column)) = first.filter(|_| incomplete > whole) {
             return Err(Problem::Missings { row, column, incomplete, whole });
         }
@@ -105,7 +105,7 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Re
             units.extend(used.unit.clone().map(|unit| (name.unwrap_or(&used.name).to_string(), unit)));
         }
         if reading.formats.is_empty() {
-            reading.columns = builder.called();
+            reading.columns = builder.columns_in_file();
         }
         for mut track in builder.tracks {
             track.missing = track.track.fill_missing(columns.coords.len()).map_err(|i| {

@@ -68,7 +68,7 @@ impl Header {
         if bytes != u128::from(behind) {
             let (rows, columns) = (header.rows, header.columns);
             return Err(Problem::Array(format!(
-                "the header promises {rows} x {columns} numbers ({bytes} bytes), {behind} bytes follow it"
+                "the header states {rows} x {columns} numbers ({bytes} bytes), but {behind} bytes follow it"
             )));
         }
         Ok(header)

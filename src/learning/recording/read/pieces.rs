@@ -90,7 +90,7 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
 /// before and after; none if that is ambiguous.
 fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize) -> Option<Vec<f64>> {
     let (n, gap) = (periodic.len(), track.times[k + 1] - track.times[k]);
-    let pace = |i: usize, before: Option<usize>| {
+    let speed = |i: usize, before: Option<usize>| {
         let at = before?;
         let step = track.times.get(at + 1)? - track.times[at];
         (step <= clock.longest).then(|| (track.q[(at + 1) * n + i] - track.q[at * n + i]) / step)
@@ -99,12 +99,12 @@ fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize)
         if !periodic[i] {
             return Some(0.0);
         }
-        let way = match (pace(i, k.checked_sub(1)), pace(i, Some(k + 1))) {
+        let travel = match (speed(i, k.checked_sub(1)), speed(i, Some(k + 1))) {
             (Some(a), Some(b)) if (a - b).abs() * gap > AMBIGUOUS_TURN => return None,
             (Some(a), Some(b)) => 0.5 * (a + b) * gap,
             (a, b) => a.or(b)? * gap,
         };
-        let turns = ((way - (track.q[(k + 1) * n + i] - track.q[k * n + i])) / TAU).round();
+        let turns = ((travel - (track.q[(k + 1) * n + i] - track.q[k * n + i])) / TAU).round();
         turns.is_finite().then_some(turns)
     };
     (0..n).map(of).collect()

@@ -1,4 +1,4 @@
-//! Which column of a file is which.
+//! Finds the columns of a file that a description names.
 
 use super::Problem;
 use super::error::Faults;

@@ -266,9 +266,9 @@ fn arrays_that_are_refused() {
         let text = refusal(npy(descr, false, shape, &data), &numbered);
         assert!(text.contains(part), "{text}");
     };
-    says("'<f8'", "(99999999999, 99999999999)", "the header promises 99999999999 x 99999999999 numbers");
-    says("'<f8'", "(61,)", "the header promises 61 x 1 numbers (488 bytes), 480 bytes follow it");
-    says("'<f8'", "(59,)", "the header promises 59 x 1 numbers (472 bytes), 480 bytes follow it");
+    says("'<f8'", "(99999999999, 99999999999)", "the header states 99999999999 x 99999999999 numbers");
+    says("'<f8'", "(61,)", "the header states 61 x 1 numbers (488 bytes), but 480 bytes follow it");
+    says("'<f8'", "(59,)", "the header states 59 x 1 numbers (472 bytes), but 480 bytes follow it");
     says("'|O'", "(60,)", "Python objects");
     says("'<c16'", "(30,)", "complex numbers");
     says("'<U4'", "(30,)", "text");

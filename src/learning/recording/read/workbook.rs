@@ -29,14 +29,14 @@ pub fn text(mut archive: ZipArchive<Shared>) -> Result<String, Problem> {
     })?;
     let target = sheet.ok_or_else(damaged)?;
     let sheet = target.strip_prefix('/').map_or_else(|| format!("xl/{target}"), str::to_string);
-    let mut texts = Texts::default();
+    let mut texts = SharedStrings::default();
     if archive.index_for_name("xl/sharedStrings.xml").is_some() {
         each_tag(&mut archive, "xl/sharedStrings.xml", |tag| {
             texts.take(&tag);
             Ok(())
         })?;
     }
-    let mut cells = Cells { texts: texts.done, ..Cells::default() };
+    let mut cells = Cells { texts: texts.all, ..Cells::default() };
     each_tag(&mut archive, &sheet, |tag| cells.take(&tag))?;
     Ok(cells.lines)
 }
@@ -56,21 +56,21 @@ fn each_tag(
     Ok(())
 }
 
-/// Texts that cells share.
+/// Strings that cells share.
 #[derive(Default)]
-struct Texts {
-    done: Vec<String>,
+struct SharedStrings {
+    all: Vec<String>,
     current: String,
     /// Inside of a text's pronunciation.
     aside: bool,
 }
 
-impl Texts {
+impl SharedStrings {
     fn take(&mut self, tag: &Tag) {
         match (tag.name.as_str(), tag.end) {
             ("rPh", _) => self.aside = !tag.end,
             ("t", true) if !self.aside => self.current += &tag.text,
-            ("si", true) => self.done.push(std::mem::take(&mut self.current)),
+            ("si", true) => self.all.push(std::mem::take(&mut self.current)),
             _ => {}
         }
     }

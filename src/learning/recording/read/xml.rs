@@ -37,7 +37,7 @@ impl Tag {
 
 /// Reads the next tag; none at the end.
 pub fn next(input: &mut impl BufRead) -> Result<Option<Tag>, Problem> {
-    let mut part = |mark: u8| -> Result<Option<String>, Problem> {
+    let mut until = |mark: u8| -> Result<Option<String>, Problem> {
         let mut bytes = Vec::new();
         input.by_ref().take(LONGEST_TAG).read_until(mark, &mut bytes)?;
         let long = bytes.len() as u64 == LONGEST_TAG;
@@ -50,9 +50,9 @@ pub fn next(input: &mut impl BufRead) -> Result<Option<Tag>, Problem> {
     };
     let mut tag = Tag::default();
     loop {
-        let Some(text) = part(b'<')? else { return Ok(None) };
+        let Some(text) = until(b'<')? else { return Ok(None) };
         tag.text += &unescaped(&text);
-        let inside = part(b'>')?.ok_or_else(damaged)?;
+        let inside = until(b'>')?.ok_or_else(damaged)?;
         if inside.starts_with(['!', '?']) {
             continue;
         }
@@ -79,8 +79,8 @@ fn local(name: &str) -> &str {
 fn unescaped(text: &str) -> String {
     let mut parts = text.split('&');
     let mut plain = parts.next().unwrap_or_default().to_string();
-    for part in parts {
-        let (escape, rest) = part.split_once(';').unwrap_or(("", part));
+    for until in parts {
+        let (escape, rest) = until.split_once(';').unwrap_or(("", until));
         let code = |digits: &str, radix| u32::from_str_radix(digits, radix).ok().and_then(char::from_u32);
         let letter = match escape {
             "lt" => Some('<'),

@@ -43,7 +43,7 @@ impl Default for SmoothOptions {
     }
 }
 
-/// Why no derivatives can be taken.
+/// Why derivatives cannot be estimated.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SmoothError {
@@ -98,8 +98,8 @@ pub struct Smoothing {
     /// Every coordinate.
     #[doc(hidden)]
     pub coordinates: Vec<Chosen>,
-    /// Windows in samples of every coordinate on every trajectory of the recording, `(coordinates)(trajectories)`: the usual one but
-    /// where another is plainly better. Qualities are means over these.
+    /// Windows in samples of every coordinate on every trajectory of the recording, `(coordinates)(trajectories)`: the typical one
+    /// except where another is clearly better. Qualities are means over these.
     pub own: Vec<Vec<usize>>,
     /// Median step in s.
     pub step: f64,
@@ -140,7 +140,7 @@ pub struct Smoothed {
     pub reach: Vec<usize>,
     /// Numbers of samples at the left and right end without a full window: their errors are several times larger.
     pub margins: [usize; 2],
-    /// Samples between the margins that a gap leaves without enough others around them, ascending.
+    /// Samples between the margins with too few others around them because of a gap, ascending.
     pub lacking: Vec<usize>,
 }
 
@@ -172,7 +172,7 @@ impl Smoothed {
         before.min(end)..end
     }
 
-    /// `true` for a sample with a full window that no gap spoils.
+    /// `true` for a sample with a full window without too long a gap.
     pub fn is_full(&self, sample: usize) -> bool {
         self.interior().contains(&sample) && self.lacking.binary_search(&sample).is_err()
     }
@@ -278,7 +278,7 @@ impl Smoothing {
         (samples | 1).clamp(least, most.max(least))
     }
 
-    /// Takes the derivatives of a trajectory. Near its ends windows are one-sided.
+    /// Estimates the derivatives of a trajectory. Near its ends windows are one-sided.
     ///
     /// # Errors
     /// [`SmoothError`] for a trajectory of fewer samples than coefficients, or of another shape than the recording's.
@@ -360,8 +360,8 @@ fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoot
                 (changes[k] / sigmas[at]).powi(2) / fit.variance[k] - fit.change_variance[k] / fit.variance[k];
         }
     }
-    // A single change is no more than a sign of the bias: the mean of its square over a window to either side is. One-sided windows
-    // count only for each other.
+    // A single change indicates the bias only roughly, so its square is averaged over a window to either side. One-sided windows are not
+    // averaged with full ones.
     for (excess, [_, error, bias]) in excess.iter().zip(smoothed.arrays()) {
         let counted = |at: &usize| full[*at];
         for (at, window) in windows.iter().enumerate() {

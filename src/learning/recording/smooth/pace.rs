@@ -4,7 +4,7 @@ use super::thresholds::{
     HOPELESS_SQUARED_ERROR, INDEPENDENT_PLACES, KEPT_SQUARED_ERROR, PLACES_PER_WINDOW, WINDOW_FACTORS,
 };
 use crate::recording::smooth::signal::{Fits, Signal};
-use crate::recording::smooth::window::Missed;
+use crate::recording::smooth::window::BiasBound;
 
 /// A coordinate of one trajectory with its usual window in samples.
 pub struct Typical<'a> {
@@ -23,15 +23,15 @@ fn scaled(window: usize, k: f64) -> usize {
     ((window as f64 * (k / 3.0).exp2()).round() as usize) | 1
 }
 
-/// Errors of the accelerations by one window at places along the trajectory.
-struct Tried {
+/// Errors of the accelerations for one length of the window, at places along the trajectory.
+struct TriedWindow {
     first: usize,
     stride: usize,
     /// Variance, squared bias and the variance of its estimate's change.
     squares: Vec<[f64; 3]>,
 }
 
-impl Tried {
+impl TriedWindow {
     /// Tries a window at evenly spaced samples; none if it is longer than half the trajectory, or too short for the polynomials.
     fn new(Typical { signal, sigmas, .. }: &Typical<'_>, window: usize) -> Option<Self> {
         let track = &signal.tracks[0];
@@ -78,17 +78,17 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
     let (length, least) = (track.len(), (first.signal.degree + 3) | 1);
     let most = (length - (length + 1) % 2).max(least);
     let of = |u: &Typical<'_>, k: f64| scaled(u.window, k).clamp(least, most);
-    let told: Vec<&Typical<'_>> = usual.iter().filter(|u| u.error > 0.0).collect();
-    let tried: Vec<(i32, Vec<Tried>)> = (WINDOW_FACTORS[0]..=WINDOW_FACTORS[1])
+    let compared: Vec<&Typical<'_>> = usual.iter().filter(|u| u.error > 0.0).collect();
+    let tried: Vec<(i32, Vec<TriedWindow>)> = (WINDOW_FACTORS[0]..=WINDOW_FACTORS[1])
         .filter_map(|k| {
             // Windows are clamped to the smallest one; factors for which all would be below it are skipped.
-            let shortest = told.iter().any(|u| scaled(u.window, f64::from(k)) >= least);
-            let all = told.iter().map(|u| Tried::new(u, of(u, f64::from(k)))).collect::<Option<Vec<_>>>()?;
+            let shortest = compared.iter().any(|u| scaled(u.window, f64::from(k)) >= least);
+            let all = compared.iter().map(|u| TriedWindow::new(u, of(u, f64::from(k)))).collect::<Option<Vec<_>>>()?;
             (shortest && !all.is_empty()).then_some((k, all))
         })
         .collect();
     let grid = (first.window / (4 * PLACES_PER_WINDOW)).max(1);
-    let chosen: Vec<i32> = (0..length.div_ceil(grid)).map(|place| choose(&tried, &told, place * grid)).collect();
+    let chosen: Vec<i32> = (0..length.div_ceil(grid)).map(|place| choose(&tried, &compared, place * grid)).collect();
     let factors: Vec<i32> = (0..length)
         .map(|sample| {
             let place = sample / grid;
@@ -102,14 +102,14 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
 }
 
 /// The factor at a sample.
-fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Typical<'_>], sample: usize) -> i32 {
+fn choose(tried: &[(i32, Vec<TriedWindow>)], compared: &[&Typical<'_>], sample: usize) -> i32 {
     let mut squares: Vec<(i32, f64)> = Vec::with_capacity(tried.len());
     let mut best = f64::INFINITY;
-    let mut missed = vec![Missed::default(); told.len()];
+    let mut bound = vec![BiasBound::default(); compared.len()];
     for (k, all) in tried {
-        let errors = all.iter().zip(told).zip(&mut missed).map(|((tried, usual), missed)| {
+        let errors = all.iter().zip(compared).zip(&mut bound).map(|((tried, usual), bound)| {
             let [variance, bias, change] = tried.at(sample);
-            (variance + missed.bias([variance, bias], change, INDEPENDENT_PLACES)) / (usual.error * usual.error)
+            (variance + bound.bias([variance, bias], change, INDEPENDENT_PLACES)) / (usual.error * usual.error)
         });
         let square: f64 = errors.sum();
         if square > HOPELESS_SQUARED_ERROR * best {

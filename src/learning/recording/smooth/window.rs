@@ -1,4 +1,4 @@
-//! Length of the window: as long as noise demands, as short as the motion allows.
+//! Length of the window: long against noise, short against bias.
 
 use super::thresholds::{
     BIAS_SIGNIFICANCE, HOPELESS_SQUARED_ERROR, KEPT_SQUARED_ERROR, LEAST_COVERED, LONGEST_WINDOW, RISEN_SQUARED_ERROR,
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// The significant part of an estimated squared bias: `square` is the mean, over `independent` samples, of the square of a number less its
 /// noise variance.
-fn sure(square: f64, variance: f64, independent: f64) -> f64 {
+fn significant(square: f64, variance: f64, independent: f64) -> f64 {
     (square - BIAS_SIGNIFICANCE * variance * (2.0 / independent.max(1.0)).sqrt()).max(0.0)
 }
 
@@ -51,27 +51,27 @@ impl Quality {
 /// from window to window. A supposed bias that falls with the error itself, before that has clearly risen, was correlated noise, such as an
 /// encoder's marks.
 #[derive(Clone, Copy, Debug)]
-pub struct Missed {
+pub struct BiasBound {
     square: f64,
     least: f64,
     risen: bool,
 }
 
-impl Default for Missed {
+impl Default for BiasBound {
     fn default() -> Self {
         Self { square: 0.0, least: f64::INFINITY, risen: false }
     }
 }
 
-impl Missed {
-    /// Squared bias of the next longer window, whose variance and squared bias by the change are `error`, see [`sure`].
+impl BiasBound {
+    /// Squared bias of the next longer window, whose variance and squared bias by the change are `error`, see [`significant`].
     pub fn bias(&mut self, error: [f64; 2], variance: f64, independent: f64) -> f64 {
         let [own, square] = error;
         self.risen |= own + square > RISEN_SQUARED_ERROR * self.least;
         if self.falls(own + square) {
             *self = Self { square: 0.0, least: own + square, risen: false };
         }
-        self.at_least(sure(square, variance, independent));
+        self.raise(significant(square, variance, independent));
         square.max(self.square)
     }
 
@@ -81,7 +81,7 @@ impl Missed {
     }
 
     /// This window and all longer ones have at least this squared bias.
-    fn at_least(&mut self, square: f64) {
+    fn raise(&mut self, square: f64) {
         self.square = self.square.max(square);
     }
 }
@@ -112,35 +112,35 @@ impl Accelerations {
             return 0.0;
         }
         let variance = (self.variance - longer.variance).max(0.0);
-        sure(sum / count - variance, variance, self.independent * count / self.values.len() as f64)
+        significant(sum / count - variance, variance, self.independent * count / self.values.len() as f64)
     }
 }
 
 /// Errors of the accelerations on one trajectory, by window.
 #[derive(Clone, Debug, Default)]
-struct Course {
+struct WindowErrors {
     /// Squared errors, bias and variance together, of the windows in order, up to the longest that fits the trajectory.
     squares: Vec<f64>,
     /// The significant part of each.
-    sure: Vec<f64>,
-    /// Number of the window with the least error, up to where the error is plainly larger again.
+    significant: Vec<f64>,
+    /// Number of the window with the least error, before the error clearly rises again.
     best: usize,
     /// The accelerations by it.
     finest: Accelerations,
     past: bool,
-    missed: Missed,
+    bound: BiasBound,
 }
 
-impl Course {
+impl WindowErrors {
     /// Adds the accelerations by the next longer window, their squared bias estimated by the change of degree, and the variance of that change.
     fn push(&mut self, found: Accelerations, square: f64, change: f64) {
         let Accelerations { variance, independent, .. } = found;
-        let beside = self.finest.missed_by(&found);
-        if !self.missed.falls(variance + square) {
-            self.missed.at_least(beside);
+        let additional = self.finest.missed_by(&found);
+        if !self.bound.falls(variance + square) {
+            self.bound.raise(additional);
         }
-        self.squares.push(variance + self.missed.bias([variance, square], change, independent));
-        self.sure.push(variance + self.missed.square);
+        self.squares.push(variance + self.bound.bias([variance, square], change, independent));
+        self.significant.push(variance + self.bound.square);
         let (last, least) = (self.squares[self.squares.len() - 1], self.squares[self.best]);
         self.past |= last > HOPELESS_SQUARED_ERROR * least;
         if !self.past && last <= least {
@@ -155,7 +155,7 @@ impl Course {
 
     /// Number of its own window, given the typical one.
     fn own(&self, usual: usize) -> usize {
-        match (self.squares.get(self.best), self.sure.get(usual).or(self.sure.last())) {
+        match (self.squares.get(self.best), self.significant.get(usual).or(self.significant.last())) {
             (Some(least), Some(kept)) if *kept > KEPT_SQUARED_ERROR * least => self.best,
             _ => usual,
         }
@@ -214,7 +214,7 @@ impl Signal<'_> {
 struct Search<'a> {
     signal: &'a Signal<'a>,
     /// Errors of the trajectories.
-    courses: Vec<Course>,
+    tracks_errors: Vec<WindowErrors>,
     /// Number of the usual window with the least mean so far, and that mean.
     best: Option<(usize, f64)>,
     past: bool,
@@ -222,8 +222,8 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(signal: &'a Signal<'a>) -> Self {
-        let courses = vec![Course::default(); signal.tracks.len()];
-        Self { signal, courses, best: None, past: false }
+        let tracks_errors = vec![WindowErrors::default(); signal.tracks.len()];
+        Self { signal, tracks_errors, best: None, past: false }
     }
 
     /// Adds the errors of a window on the trajectories that are long enough, for signals with the same ratio of noises; `false` if these
@@ -253,13 +253,13 @@ impl<'a> Search<'a> {
             return false;
         }
         for (search, (signal, sums)) in alike.iter_mut().zip(sums) {
-            let tracks = sums.into_iter().zip(&mut search.courses).zip(signal.tracks);
-            for ((sums, course), track) in tracks.filter(|((s, _), _)| s.count > 0.0) {
+            let tracks = sums.into_iter().zip(&mut search.tracks_errors).zip(signal.tracks);
+            for ((sums, errors), track) in tracks.filter(|((s, _), _)| s.count > 0.0) {
                 let [variance, square, change] =
                     [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
                 // Samples within half a window share their errors.
                 let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
-                course.push(Accelerations { values: sums.values, variance, independent }, square - change, change);
+                errors.push(Accelerations { values: sums.values, variance, independent }, square - change, change);
             }
         }
         true
@@ -268,8 +268,8 @@ impl<'a> Search<'a> {
     /// Mean over the samples of the logarithm of the squared error by window number `k`.
     fn mean(&self, k: usize) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for (course, track) in self.courses.iter().zip(self.signal.tracks) {
-            if let Some(square) = course.at(k) {
+        for (errors, track) in self.tracks_errors.iter().zip(self.signal.tracks) {
+            if let Some(square) = errors.at(k) {
                 (sum, count) = (sum + track.len() as f64 * square.ln(), count + track.len() as f64);
             }
         }
@@ -287,7 +287,7 @@ impl<'a> Search<'a> {
 
     /// `true` if no window beyond this number is useful.
     fn has_ended(&self, windows: usize) -> bool {
-        self.past && self.courses.iter().all(|course| course.past || course.squares.len() < windows)
+        self.past && self.tracks_errors.iter().all(|errors| errors.past || errors.squares.len() < windows)
     }
 }
 
@@ -315,7 +315,7 @@ pub fn best(signals: &[Signal<'_>]) -> Option<Vec<(usize, Vec<usize>)>> {
     }
     let windows = |search: &Search<'_>| {
         let (usual, _) = search.best?;
-        Some((tried[usual], search.courses.iter().map(|course| tried[course.own(usual)]).collect()))
+        Some((tried[usual], search.tracks_errors.iter().map(|errors| tried[errors.own(usual)]).collect()))
     };
     searches.iter().map(windows).collect()
 }

@@ -48,7 +48,7 @@ pub struct CoordinateSurvey {
     pub measured_velocity: Option<Consistency>,
     /// Measured accelerations against second derivatives of positions.
     pub measured_acceleration: Option<Consistency>,
-    /// Steps between samples of more than 2 rad, of an angle: which way it went is a guess.
+    /// Steps of an angle by more than 2 rad, whose direction is ambiguous.
     pub ambiguous_turns: usize,
     /// Row and trajectory of the first such step.
     pub first_ambiguous: Option<(String, u64)>,
@@ -63,8 +63,8 @@ impl CoordinateSurvey {
         let Chosen { noise, quality, seconds, .. } = *planned;
         let period = TAU * quality.velocity_deviation / quality.acceleration;
         let measured = |derivative: usize| {
-            let there = if derivative == 1 { recording.has_velocities() } else { recording.has_accelerations() };
-            there.then(|| compare(recording, i, derivative, alone))
+            let is_measured = if derivative == 1 { recording.has_velocities() } else { recording.has_accelerations() };
+            is_measured.then(|| compare(recording, i, derivative, alone))
         };
         Self {
             name: recording.coordinates[i].clone(),

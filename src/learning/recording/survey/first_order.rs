@@ -1,5 +1,5 @@
-//! Whether velocities are functions of positions and other measured quantities, as for tanks and circuits: such motion is of first order,
-//! and no Lagrangian with a kinetic energy describes it.
+//! Recognises motion of first order, such as that of tanks and circuits: velocities are functions of positions and other measured
+//! quantities, and no Lagrangian with a kinetic energy describes the motion.
 
 use super::thresholds::{
     ACCEPTED_RESIDUAL, FIRST_ORDER_DEGREE, FIRST_ORDER_RIDGE, FIRST_ORDER_TERMS, GAIN_BY_OTHERS, LEAST_WINDOWS,
@@ -84,8 +84,8 @@ impl<'a> Equation<'a> {
         mean
     }
 
-    /// `true` if column `k` varies and is no measurement of this velocity.
-    fn is_other(&self, k: usize) -> bool {
+    /// `true` if column `k` varies and does not measure this velocity.
+    fn is_independent(&self, k: usize) -> bool {
         let alone = Monomials::new(1, 1);
         let column: Vec<f64> = self.windows.iter().map(|window| self.mean(window, &[k], &alone)[1]).collect();
         let (mean, spread) = (column.iter().sum::<f64>() / column.len() as f64, deviation(column.iter()));
@@ -197,8 +197,8 @@ impl FirstOrder {
     /// Whether the velocities are determined, to within their errors, by the positions and the inputs of a recording, and not by the
     /// positions alone.
     ///
-    /// A polynomial of both is fitted to one half of the motion and tested on the other half. Periodic motion under a single tone also
-    /// looks like this.
+    /// A polynomial of both is fitted to one half of the motion and tested on the other half. Periodic motion driven at a single
+    /// frequency also looks like this.
     pub(super) fn of(reading: &LoadedRecording, smoothing: &Smoothing) -> Option<Self> {
         let (recording, n, inputs) = (&reading.recording, reading.recording.n(), &reading.columns.input);
         if inputs.is_empty() || reading.inputs.len() != recording.tracks.len() || recording.is_driven() {
@@ -208,9 +208,9 @@ impl FirstOrder {
         let equations: Vec<Equation<'_>> =
             (0..n).map(|i| Equation::of(reading, &known, columns, smoothing, i)).collect();
         let positions: Vec<usize> = (0..n).collect();
-        let others: Vec<usize> = (n..columns).filter(|&k| equations.iter().all(|own| own.is_other(k))).collect();
+        let others: Vec<usize> = (n..columns).filter(|&k| equations.iter().all(|own| own.is_independent(k))).collect();
         let all = [positions.as_slice(), &others].concat();
-        let (mut matter, mut residual) = (false, 0f64);
+        let (mut others_matter, mut residual) = (false, 0f64);
         for equation in &equations {
             let spread = equation.spread();
             let (with, without) = (equation.residual(&all)?, equation.residual(&positions)?);
@@ -223,19 +223,19 @@ impl FirstOrder {
             {
                 return None;
             }
-            matter |= without > GAIN_BY_OTHERS * with;
+            others_matter |= without > GAIN_BY_OTHERS * with;
             residual = residual.max(with / spread);
         }
         let from = others.iter().map(|k| inputs[k - n].clone()).collect();
-        matter.then_some(Self { from, residual })
+        others_matter.then_some(Self { from, residual })
     }
 
     /// The warning.
-    pub(super) fn text(&self) -> String {
+    pub(super) fn warning(&self) -> String {
         format!(
             "the velocities follow from the positions and {} to within {} of their spread: motion of first order, as of \
-             tanks and circuits, has no Lagrangian with a kinetic energy. Motion under a single tone looks alike: record \
-             it under others",
+             tanks and circuits, has no Lagrangian with a kinetic energy. Motion driven at a single frequency looks the \
+             same: record motion driven at other frequencies",
             self.from.join(", "),
             percent(self.residual)
         )

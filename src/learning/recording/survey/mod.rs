@@ -55,11 +55,11 @@ pub(crate) struct TrajectorySurvey {
     pub end: f64,
     /// Samples per second, from the typical step.
     pub rate: f64,
-    /// Standard deviation of the steps that are not gaps over the usual one.
+    /// Standard deviation of the steps that are not gaps, over the typical step.
     pub jitter: f64,
 }
 
-/// The full report.
+/// What a survey found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Survey {
     /// Files read.
@@ -86,31 +86,31 @@ pub struct Survey {
     pub dropped: Vec<Dropped>,
     /// The coordinates.
     pub(crate) coordinates: Vec<CoordinateSurvey>,
-    /// Places that do not look like smooth motion with noise; of very many the first.
+    /// Places that do not look like smooth motion with noise; if there are very many, the first.
     pub(crate) suspicious: Vec<Warning>,
     /// Number of suspicious places.
     pub suspicious_count: usize,
     /// Degree of the polynomials of smoothing.
     pub degree: usize,
-    /// The advised way to learn.
+    /// The quantity that a fit should learn from.
     pub targets: Targets,
     /// Part that would be held out for validation.
     pub(crate) held_out: Option<HeldOut>,
     /// The held-out data in words.
     pub held_out_text: String,
-    /// `true` if a coordinate leaves uniform motion by more than its noise.
+    /// `true` if a coordinate deviates from uniform motion by more than its noise.
     pub accelerates: bool,
-    /// Names of coordinates that stand still: nothing can be learned about them.
+    /// Names of coordinates that do not move: nothing can be learned about them.
     pub motionless: Vec<String>,
     /// Names of coordinates that are functions of those before them: nothing can be learned about both.
     pub copies: Vec<String>,
-    /// Whether the motion is of first order, if other columns were read.
+    /// Set if the motion is of first order, which needs other columns to be recognised.
     pub first_order: Option<FirstOrder>,
-    /// Facts to know before learning.
+    /// Problems of the data that matter for learning.
     pub warnings: Vec<String>,
 }
 
-/// Smoothings of positions alone, and as a fit uses them. Measured velocities take part only if they agree with the positions.
+/// The smoothing of positions alone, and the one that a fit uses: it includes measured velocities if they agree with the positions.
 ///
 /// # Errors
 /// [`SmoothError`] for options out of range, or trajectories too short for any window.
@@ -122,8 +122,8 @@ pub(crate) fn plan(recording: &Recording, options: &SmoothOptions) -> Result<(Sm
     Ok((alone, planned))
 }
 
-/// Looks at a recording. Every sample is examined once; windows of smoothing are tried at places spread evenly, so that
-/// ten million samples take seconds.
+/// Surveys a recording. Every sample is examined once, but windows of smoothing are tried only at evenly spaced places, so that ten
+/// million samples take seconds.
 ///
 /// # Errors
 /// [`SmoothError`] for options out of range, or trajectories too short for any window.
@@ -138,7 +138,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     for (i, coordinate) in coordinates.iter_mut().enumerate() {
         suspicious_count += find_suspicious(recording, &row, (i, coordinate.noise), &mut suspicious);
         if coordinate.periodic {
-            guesses(reading, i, coordinate);
+            count_ambiguous_turns(reading, i, coordinate);
         }
     }
     let tracks = recording.tracks.iter().zip(&reading.rows).filter(|(track, _)| !track.is_empty());
@@ -193,8 +193,8 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     Ok(survey)
 }
 
-/// Counts steps of an angle between samples that are too long to be unwrapped; gaps have been examined where trajectories are cut.
-fn guesses(reading: &LoadedRecording, i: usize, coordinate: &mut CoordinateSurvey) {
+/// Counts the steps of an angle that are too long to be unwrapped. Steps across gaps are left out: they decide where trajectories are cut.
+fn count_ambiguous_turns(reading: &LoadedRecording, i: usize, coordinate: &mut CoordinateSurvey) {
     let n = reading.recording.n();
     for (track, rows) in reading.recording.tracks.iter().zip(&reading.rows) {
         let clock = Clock::of(&track.times);

@@ -1,4 +1,4 @@
-//! Coordinates that stand still, individually or relative to others, and those that move uniformly.
+//! Coordinates that do not move, that are copies of others, or that move uniformly.
 
 use super::thresholds::{
     COPY_SAMPLES, GRID_ROUNDING, MOST_DECIMAL_PLACES, MOVING_SCATTER, ROUNDING_REMAINDER, SHOWN_TERM,
@@ -7,7 +7,7 @@ use crate::names::number;
 use crate::recording::smooth::Smoothing;
 use crate::recording::{RecordedTrajectory, Recording};
 
-/// How a coordinate stands still.
+/// Why nothing can be learned about a coordinate.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Stillness {
@@ -32,7 +32,7 @@ impl std::fmt::Display for Stillness {
     }
 }
 
-/// Coordinates that stand still, and copies of others, in order, each with the reason.
+/// Coordinates that do not move or are copies of others, in order, each with the reason.
 pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let alone = |i: usize| standing(recording, i, smoothing);
     let mut found: Vec<_> = (0..recording.n()).filter_map(|i| Some((i, alone(i)?))).collect();
@@ -60,13 +60,13 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
     still.then_some(Stillness::Noise(noise.sigma))
 }
 
-/// `true` if coordinate `i` moves uniformly, or not at all, in every trajectory: it leaves a straight line over time by no more than its
-/// noise, or than the rounding of its digits.
+/// `true` if coordinate `i` moves uniformly, or not at all, in every trajectory: it deviates from a straight line over time by no more
+/// than its noise, or than the rounding of its digits.
 pub fn is_uniform(recording: &Recording, i: usize, smoothing: &Smoothing) -> bool {
     let noise = smoothing.coordinates[i].noise;
     let noise = if noise.resolved { noise.sigma.max(rounding(recording, i)) } else { rounding(recording, i) };
-    let beside = scatter(recording, i, true);
-    beside <= MOVING_SCATTER * noise || beside <= ROUNDING_REMAINDER * scatter(recording, i, false)
+    let deviation = scatter(recording, i, true);
+    deviation <= MOVING_SCATTER * noise || deviation <= ROUNDING_REMAINDER * scatter(recording, i, false)
 }
 
 /// Standard deviation of the rounding of coordinate `i` to the digits after the point that all its values have; 0 of more than nine digits.
@@ -100,7 +100,7 @@ fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
 }
 
 /// Coordinates among `moving` that are, up to a constant per trajectory and within the noise, linear functions of those before them:
-/// modified Gram-Schmidt leaves nothing of them.
+/// found by modified Gram-Schmidt.
 fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let n = recording.n();
     let stride = recording.samples().div_ceil(COPY_SAMPLES).max(1);
@@ -126,9 +126,9 @@ fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec
         coefficients[i] = 1.0;
         let whole = size(&rest);
         for (other, combination) in &kept {
-            let part = rest.iter().zip(other).map(|(x, y)| x * y).sum::<f64>() / rest.len() as f64;
-            rest.iter_mut().zip(other).for_each(|(x, y)| *x -= part * y);
-            coefficients.iter_mut().zip(combination).for_each(|(c, k)| *c -= part * k);
+            let projection = rest.iter().zip(other).map(|(x, y)| x * y).sum::<f64>() / rest.len() as f64;
+            rest.iter_mut().zip(other).for_each(|(x, y)| *x -= projection * y);
+            coefficients.iter_mut().zip(combination).for_each(|(c, k)| *c -= projection * k);
         }
         let noises = coefficients.iter().zip(&smoothing.coordinates).filter(|(c, _)| **c != 0.0);
         let resolved = noises.clone().all(|(_, chosen)| chosen.noise.resolved);

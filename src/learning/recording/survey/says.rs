@@ -49,7 +49,7 @@ impl Survey {
         findings
     }
 
-    /// A sentence about how well a fit can learn.
+    /// States in a sentence how well a fit can learn.
     pub fn headline(&self) -> String {
         let worst = self.worst();
         let lost = self.coordinates.iter().filter(|c| c.acceleration_error_relative >= 1.0);
@@ -57,7 +57,7 @@ impl Survey {
         let looked = match (self.warnings.len(), self.suspicious_count) {
             (0, 0) => "no problem was found".to_string(),
             (0, places) => format!("look at {} first", pluralize(places, "suspicious place", "suspicious places")),
-            (warnings, _) => format!("read {} at the end first", pluralize(warnings, "warning", "warnings")),
+            (warnings, _) => format!("read the {} at the end first", pluralize(warnings, "warning", "warnings")),
         };
         let good = match self.targets {
             Targets::Measured => "the accelerations are measured".to_string(),

@@ -49,14 +49,14 @@ pub struct Warning {
     pub size: f64,
 }
 
-/// The alternating binomials that one sample, a jump and a kink leave in sixth differences.
+/// The alternating binomial coefficients that an outlier, a jump and a kink leave in sixth differences.
 const PATTERNS: [(Kind, &[f64]); 3] = [
     (Kind::Outlier, &[1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]),
     (Kind::Jump, &[1.0, -5.0, 10.0, -10.0, 5.0, -1.0]),
     (Kind::Kink, &[1.0, -4.0, 6.0, -4.0, 1.0]),
 ];
 
-/// All suspicions of coordinate `i`, the first of them in detail, and how many there are.
+/// Finds the suspicious places of coordinate `i`, describes the first of them and returns their number.
 ///
 /// Sixth differences, scaled to the noise of one sample, contain only noise where motion is smooth. Where one exceeds six standard
 /// deviations (robust, from their median) and its neighbours have the opposite sign (in coarsely sampled motion they have the same one),
@@ -85,8 +85,8 @@ pub fn find(
         }
         differences(&track.times, q, &mut z);
         let stride = (z.len() / SCALE_SAMPLES).max(1);
-        let mut some: Vec<f64> = z.iter().step_by(stride).copied().collect();
-        let limit = SUSPICIOUS_CONTRAST * robust_deviation(&mut some).max(sigma);
+        let mut sampled: Vec<f64> = z.iter().step_by(stride).copied().collect();
+        let limit = SUSPICIOUS_CONTRAST * robust_deviation(&mut sampled).max(sigma);
         let mut quiet_from = 0;
         for k in 1..z.len() - 1 {
             let far = z[k].abs() > limit && z[k] * z[k - 1] < 0.0 && z[k] * z[k + 1] < 0.0;
@@ -121,7 +121,7 @@ fn differences(times: &[f64], q: impl Fn(usize) -> f64, z: &mut Vec<f64>) {
     }
 }
 
-/// Which pattern explains most of the contrasts around the peak `k`, the first sample concerned, and the size.
+/// The pattern that explains most of the contrasts around the peak `k`, its first sample, and its size.
 fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
     // Contrast `j` concerns samples `j..j + 7`; scaled by the norm of the seven weights of equal steps.
     let norm = PATTERNS[0].1.iter().map(|x| x * x).sum::<f64>().sqrt();

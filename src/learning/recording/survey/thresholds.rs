@@ -30,7 +30,7 @@ pub(super) const LEAST_CORRELATION: f64 = 0.9;
 /// Largest relative deviation of the ratio from that of a common mistake, such as a wrong unit.
 pub(super) const MISTAKE_TOLERANCE: f64 = 0.05;
 
-// ---- Coordinates that stand still, move uniformly, or are copies ----
+// ---- Coordinates that do not move, move uniformly, or are copies ----
 
 /// Scatter over the noise above which a coordinate moves: motion of two thirds of the noise, added in squares. The noise itself is estimated
 /// to a few per cent.

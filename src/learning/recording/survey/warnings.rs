@@ -1,4 +1,4 @@
-//! Warnings that a reader should know before learning from the data.
+//! Warnings to read before learning from the data.
 
 use super::suspicious::Kind;
 use super::thresholds::{
@@ -12,9 +12,9 @@ use crate::recording::smooth::Smoothing;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// One sentence each.
+/// The warnings, one sentence each.
 pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
-    let mut all: Vec<String> = survey.first_order.iter().map(FirstOrder::text).collect();
+    let mut all: Vec<String> = survey.first_order.iter().map(FirstOrder::warning).collect();
     for (i, c) in survey.coordinates.iter().enumerate() {
         let name = &c.name;
         if let Some((_, how)) = still.iter().find(|(still, _)| *still == i) {
@@ -23,13 +23,15 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
         }
         if let Some((track, row)) = &c.first_ambiguous {
             all.push(format!(
-                "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: the direction is a \
-                 guess",
+                "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: the direction of \
+                 the turn is ambiguous",
                 pluralize(c.ambiguous_turns, "time", "times")
             ));
         }
         if !c.noise_resolved {
-            all.push(format!("{name}: motion and noise cannot be separated, the noise given is an upper bound"));
+            all.push(format!(
+                "{name}: motion and noise cannot be separated, so that the estimated noise is an upper bound"
+            ));
         }
         if c.samples_per_period < LEAST_SAMPLES_PER_PERIOD {
             all.push(format!(
@@ -68,11 +70,11 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
     let share = |rows: usize| rows as f64 / (survey.samples + dropped + missing) as f64;
     if share(missing) > MANY_LOST_ROWS {
         let rows = pluralize(missing, "row is", "rows are");
-        all.push(format!("{rows} missing in {gaps} ({}): smoothing reaches across them", percent(share(missing))));
+        all.push(format!("{rows} missing in {gaps} ({}): smoothing interpolates across them", percent(share(missing))));
     }
     if share(dropped) > MANY_LOST_ROWS {
         let rows = pluralize(dropped, "row is", "rows are");
-        all.push(format!("{rows} left out ({}): between gaps there are too few to be used", percent(share(dropped))));
+        all.push(format!("{rows} left out ({}): too few lie between two gaps to be used", percent(share(dropped))));
     }
     if survey.suspicious_count > 0 {
         let places = pluralize(survey.suspicious_count, "place does", "places do");
@@ -102,7 +104,7 @@ impl Consistency {
         (self.factor - 1.0).abs() <= doubt && self.correlation >= LEAST_CORRELATION - self.uncertainty
     }
 
-    /// A likely mistake, if the factor is one of the common ones.
+    /// The likely mistake, if the factor is that of a common one.
     pub fn mistake(&self, step: f64) -> Option<&'static str> {
         let known = [
             (180.0 / PI, "degrees where radians are expected?"),

@@ -1,4 +1,4 @@
-//! Identity of the training that a checkpoint is of.
+//! Identity of the training that a checkpoint belongs to.
 
 use serde::{Deserialize, Serialize};
 

@@ -6,13 +6,12 @@ use crate::learning::state;
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
 use crate::storage::container::{FileKind, Tensor, pack, unpack};
+use crate::training::thresholds::LARGEST_COUNT;
 use serde::{Deserialize, Serialize};
 
 const CHECKPOINT: FileKind = FileKind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
 /// The only tensor: the state as serde writes it.
 const STATE: &str = "state";
-/// Larger counts are rejected: no training reaches them, and sums of smaller ones cannot overflow.
-const MOST: u64 = 1 << 52;
 
 /// Summary of a checkpoint, read without its state.
 #[derive(Debug, Serialize, Deserialize)]
@@ -75,7 +74,7 @@ pub(crate) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
 
 /// Checks that no count is beyond any training.
 fn check_counts(counts: impl IntoIterator<Item = u64>) -> Result<(), &'static str> {
-    if counts.into_iter().any(|count| count > MOST) { Err("a count is beyond any training") } else { Ok(()) }
+    if counts.into_iter().any(|count| count > LARGEST_COUNT) { Err("a count is beyond any training") } else { Ok(()) }
 }
 
 impl<S> Outcome<S> {
@@ -95,7 +94,7 @@ impl<S: Scalar> PhaseState<S> {
             self.optimizer_state.batch,
         ];
         check_counts(counts.into_iter().chain(means.counts()).map(|count| count as u64).chain([*iteration]))?;
-        // A learner with a state of its own may average nothing.
+        // A learner with a state of its own may have no average.
         let averaged = average.len() == parameters || (self.learner.is_some() && average.is_empty());
         if [weights, &self.best].iter().any(|numbers| numbers.len() != parameters) || !averaged {
             return Err("the weights of a step are not those of the network");

@@ -6,6 +6,7 @@ use super::{Outcome, PhaseState, Snapshot};
 use crate::network::file::ModelFileError;
 use crate::scalar::Scalar;
 use crate::storage::{Files, ReadError, replace};
+use crate::training::thresholds::{LARGEST_CHECKPOINT, TRAINING_PER_WRITING};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -15,10 +16,6 @@ use thiserror::Error;
 pub const LATEST: &str = "checkpoint.safetensors";
 /// Name of the one before it.
 pub const PREVIOUS: &str = "checkpoint.previous.safetensors";
-/// Largest checkpoint that is read, in bytes.
-const MAX_BYTES: u64 = 1 << 34;
-/// Writing takes at most one part in this many of the time between two checkpoints.
-const COST: u32 = 100;
 
 /// Time between two checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +27,7 @@ pub enum CheckpointInterval {
     Seconds(f64),
 }
 
-/// Why there is nothing to continue from.
+/// Why no checkpoint can be resumed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
@@ -64,7 +61,7 @@ pub enum CheckpointError {
 pub struct Restored<T> {
     /// Content of the checkpoint.
     pub content: T,
-    /// Problem of the newest checkpoint, if the one before it had to serve.
+    /// Problem of the newest checkpoint, if the previous one was used.
     pub fallback: Option<String>,
 }
 
@@ -82,7 +79,7 @@ struct State {
     last: Option<(Instant, usize)>,
     /// Duration.
     cost: Duration,
-    /// `true` if the newest checkpoint deserves to become the previous one.
+    /// `true` if the newest checkpoint is intact and may become the previous one.
     keep: bool,
 }
 
@@ -99,7 +96,7 @@ impl CheckpointManager {
         match (self.every, state.last) {
             (CheckpointInterval::Seconds(seconds), Some((last, _))) => {
                 let elapsed = last.elapsed();
-                elapsed.as_secs_f64() >= seconds && elapsed >= state.cost.saturating_mul(COST)
+                elapsed.as_secs_f64() >= seconds && elapsed >= state.cost.saturating_mul(TRAINING_PER_WRITING)
             }
             (_, None) => true,
             (CheckpointInterval::Epochs(_), Some(_)) => false,
@@ -204,7 +201,7 @@ fn newest_whole<T>(
     directory: &Path,
     decode: impl Fn(&[u8]) -> Result<T, ModelFileError>,
 ) -> Result<Restored<T>, CheckpointError> {
-    let read = |name: &str| decode(&files.read(&directory.join(name), MAX_BYTES)?);
+    let read = |name: &str| decode(&files.read(&directory.join(name), LARGEST_CHECKPOINT)?);
     let newest = match read(LATEST) {
         Ok(content) => return Ok(Restored { content, fallback: None }),
         Err(error @ ModelFileError::Version { .. }) => return Err(CheckpointError::Version(Box::new(error))),

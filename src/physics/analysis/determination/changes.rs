@@ -18,7 +18,7 @@ enum VelocityFactor {
     Dry(usize, f64),
 }
 
-/// One way.
+/// One change.
 #[derive(Clone, Debug)]
 struct Change {
     kind: VelocityFactor,
@@ -38,7 +38,7 @@ pub struct Typical {
     pub acceleration: Vec<f64>,
 }
 
-/// All ways that are considered.
+/// All changes that are considered.
 #[derive(Clone, Debug)]
 pub struct Changes {
     n: usize,
@@ -114,7 +114,7 @@ impl Changes {
                     let size = 0.25 * inertia([i, j]) / (velocity[a] * velocity[b]);
                     let mut product = vec![i, j, a, b];
                     product.sort_unstable();
-                    if size.is_finite() && !all_has(&all, &product) {
+                    if size.is_finite() && !contains_product(&all, &product) {
                         all.push(Change { kind: VelocityFactor::Product(product), function: 0, size });
                     }
                 }
@@ -184,7 +184,7 @@ impl Changes {
     }
 }
 
-fn all_has(all: &[Change], product: &[usize]) -> bool {
+fn contains_product(all: &[Change], product: &[usize]) -> bool {
     all.iter().any(|change| change.function == 0 && matches!(&change.kind, VelocityFactor::Product(p) if p == product))
 }
 

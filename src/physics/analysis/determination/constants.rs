@@ -2,7 +2,7 @@
 //!
 //! One Gauss-Newton step from the fit: the positions of the training trajectories, cut into stretches, are predicted from the best start of
 //! each. The residuals depend on the constants, on the starts, which are eliminated, and on the weights of the network and the friction. An
-//! effect that network and constants share stays open: a weight may differ from the learned one by the typical size of weights of its kind.
+//! effect that network and constants share is not determined: a weight may differ from the learned one by the typical size of its kind.
 //! The error of the step is found as for all ranges, see the [module](super).
 
 use super::Estimate;
@@ -42,9 +42,9 @@ pub fn constants(
     let (mean, covariance, without) = (sums.solve(trust)?, sums.covariance(trust)?, sums.without(&parts, trust)?);
     let count = columns.len();
     let at = |theta: &[f64]| {
-        let mut moved = weights.to_vec();
-        moved[layout.known.clone()].copy_from_slice(theta);
-        architecture.known_constants(&moved)
+        let mut shifted = weights.to_vec();
+        shifted[layout.known.clone()].copy_from_slice(theta);
+        architecture.known_constants(&shifted)
     };
     let theta = &weights[layout.known.clone()];
     let [mut low, mut high] = [theta.to_vec(), theta.to_vec()];
@@ -135,22 +135,22 @@ impl Stretches {
         let by_start: Vec<Vec<f64>> = (0..width)
             .map(|k| {
                 let by = PARAMETER_STEP.sqrt() * self.segments.tolerance(k);
-                let moved = self.starts.iter().enumerate().map(|(at, x)| if at % width == k { x + by } else { *x });
-                self.residuals(weights, &moved.collect::<Vec<_>>())
+                let shifted = self.starts.iter().enumerate().map(|(at, x)| if at % width == k { x + by } else { *x });
+                self.residuals(weights, &shifted.collect::<Vec<_>>())
             })
-            .map(|moved| moved.iter().zip(&base).map(|(a, b)| a - b).collect())
+            .map(|shifted| shifted.iter().zip(&base).map(|(a, b)| a - b).collect())
             .collect();
         let by_parameter: Vec<Vec<f64>> = columns
             .iter()
             .map(|&(k, size)| {
-                let moved = |by: f64| {
-                    let mut moved = weights.to_vec();
-                    moved[k] += by;
-                    self.residuals(&moved, &self.starts)
+                let shifted = |by: f64| {
+                    let mut shifted = weights.to_vec();
+                    shifted[k] += by;
+                    self.residuals(&shifted, &self.starts)
                 };
                 let by = PARAMETER_STEP * size;
                 // The column has the sign of the residuals, measured minus predicted, which a change of the parameters has to explain.
-                moved(by).iter().zip(moved(-by)).map(|(up, down)| (down - up) * (0.5 / PARAMETER_STEP)).collect()
+                shifted(by).iter().zip(shifted(-by)).map(|(up, down)| (down - up) * (0.5 / PARAMETER_STEP)).collect()
             })
             .collect();
         let mut ends = Vec::with_capacity(self.rows.len());

@@ -1,7 +1,7 @@
 //! Decay of the motion of one coordinate: the part of its acceleration that changes its sign with the velocity.
 //!
-//! Every motion of one coordinate has a Lagrangian, damped motion too, so a model cannot tell friction from the forces of `L`. A mechanical
-//! one, `M(q) v^2/2 - V(q)`, is symmetric under time reversal: `a = f(q) + h(q) v^2`, plus a known force over `M`. Friction adds `-r v`.
+//! Every motion of one coordinate has a Lagrangian, damped motion too, so a model cannot separate friction from the forces of `L`. A mechanical
+//! Lagrangian, `M(q) v^2/2 - V(q)`, is symmetric under time reversal: `a = f(q) + h(q) v^2`, plus a known force over `M`. Friction adds `-r v`.
 
 use super::changes::{Functions, Values};
 use super::observed::Observed;
@@ -64,7 +64,8 @@ pub fn decay(periodic: &[bool], observed: &Observed) -> Option<Decay> {
     let sums = Sums::of(&parts);
     let factors = sums.solve(DECAY_TRUST)?;
     let without = sums.without(&parts, DECAY_TRUST)?;
-    let left: f64 = parts.iter().zip(&without).map(|(part, factors)| part.left(factors)).sum::<f64>() / states as f64;
+    let left: f64 =
+        parts.iter().zip(&without).map(|(part, factors)| part.residual_square(factors)).sum::<f64>() / states as f64;
     let error = observed.error.first().map_or(0.0, |error| error / size);
     let variance = jackknife(factors[0], without.iter().map(|factors| factors[0]));
     let decay = Decay {

@@ -1,8 +1,8 @@
 //! Ranges in which motion determines the learned mass matrix, friction and energy.
 //!
 //! Two Lagrangians may give the same motion on all recorded states and still differ in `M`: where a momentum is conserved, any function of
-//! it may be added to `L`. What the data leave open is therefore read off the curvature of the likelihood around the learned model, in all
-//! directions in which a Lagrangian can change. The equations of motion are linear in `L` and in the dissipation `D`: a change `dL + dD`
+//! it may be added to `L`. What the data do not determine is therefore read off the curvature of the likelihood around the learned model,
+//! in all directions in which a Lagrangian can change. The equations of motion are linear in `L` and in the dissipation `D`: a change `dL + dD`
 //! changes the acceleration of a state by
 //!
 //! ```text
@@ -13,7 +13,7 @@
 //! own size), follow from a linear regression, `C = (1 + A^T W A)^-1`, `x = C A^T W e`. Here `A` holds the changes of the accelerations,
 //! and `e` the residuals of the accelerations. Every quantity that is linear in `L` and `D` follows.
 //!
-//! Its error has four parts. What the data leave open keeps its prior size, `C C`. The effect of noise is read off the scatter of `x` when
+//! Its error has four parts. What the data do not determine keeps its prior size, `C C`. The effect of noise is read off the scatter of `x` when
 //! one of twenty groups of consecutive states is left out (the jackknife); this does not assume that samples are independent, and needs no
 //! model of the noise. The effect of smoothing bias is the shift of `x` when accelerations come from polynomials two degrees higher.
 //! Finally, the share of the accelerations that neither the model nor any change of it explains, beyond their expected error, counts as a
@@ -71,7 +71,7 @@ impl Estimate {
         let half = RANGE * deviation.hypot(0.5 * shift);
         Self { value, low: value.min(value + shift - half), high: value.max(value + shift + half) }
     }
-    /// A value that the data leave open.
+    /// A value that the data do not determine.
     fn open(value: f64) -> Self {
         Self { value, low: f64::NEG_INFINITY, high: f64::INFINITY }
     }
@@ -108,11 +108,11 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
     let data = Data::new(model, observed)?;
     let changes = Changes::new(periodic, &ranges(n, &data.q), &data.typical()?, !model.conserves_energy())?;
     let posterior = data.posterior(&changes)?;
-    let wanted = Wanted::new(model, &changes, (&data.q, &data.v))?;
+    let quantities = Quantities::new(model, &changes, (&data.q, &data.v))?;
     let absolute = !observed.force.is_empty();
-    let unit = if absolute { None } else { wanted.mass.first().cloned() };
-    let over = |linear: &Linear| linear.over(unit.as_ref());
-    let mass: Vec<Linear> = wanted.mass.iter().map(over).collect();
+    let unit = if absolute { None } else { quantities.mass.first().cloned() };
+    let over = |linear: &LinearQuantity| linear.over(unit.as_ref());
+    let mass: Vec<LinearQuantity> = quantities.mass.iter().map(over).collect();
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
     let own: Vec<f64> = pairs.iter().zip(&mass).filter(|((i, j), _)| i == j).map(|(_, mass)| mass.value).collect();
     let floor = &posterior.floor;
@@ -124,19 +124,19 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
     });
     let groups: Vec<(Vec<usize>, bool)> = groups.collect();
     let known = |i: usize| groups.iter().any(|(group, known)| *known && group.contains(&i));
-    let mass_of = |(mass, pair): (&Linear, &(usize, usize))| {
+    let mass_of = |(mass, pair): (&LinearQuantity, &(usize, usize))| {
         let &(i, j) = pair;
         // Without known forces the first element is the unit, and not open itself.
         let moves_on = if absolute { conserved[i] } else { i > 0 && (conserved[0] || conserved[i]) };
         let open = (moves_on && i == j) || !known(i) || !known(j);
         if open { Estimate::open(mass.value) } else { posterior.estimate(mass, mass_floor(pair)) }
     };
-    let energy = wanted.energy(&posterior, unit.as_ref());
+    let energy = quantities.energy(&posterior, unit.as_ref());
     let all_known = groups.iter().all(|(_, known)| *known);
     let result = Determination {
         absolute,
         mass_matrix: mass.iter().zip(&pairs).map(mass_of).collect(),
-        friction: wanted
+        friction: quantities
             .friction
             .iter()
             .map(over)
@@ -155,7 +155,7 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
     finite.then_some(result)
 }
 
-/// Whether the momentum of each coordinate is conserved: whether `M a` and the change of the momentum with the position cancel.
+/// For each coordinate, whether its momentum is conserved, that is, whether `M a` and the change of the momentum with the position cancel.
 fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
     let n = model.coordinates();
     let mut terms = Terms::default();
@@ -174,11 +174,11 @@ fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
     Some(squares.into_iter().map(|[rate, parts]| rate < CONSERVED_RATE * CONSERVED_RATE * parts).collect())
 }
 
-/// Root mean square residual of the accelerations of each coordinate beyond their expected error, over their size: 0 where only noise is
-/// left, 1 for a model that explains nothing. `None` where the model is not finite.
+/// Root mean square residual of the accelerations of each coordinate beyond their expected error, over their size: 0 where only noise
+/// remains, 1 for a model that explains nothing. `None` where the model is not finite.
 ///
-/// This is also the test of whether the remainder is noise. Whiteness says nothing: smoothing correlates the errors within a window even
-/// for the true model, and the jackknife allows for that.
+/// This is also the test of whether the residuals are noise. Their autocorrelation shows nothing, because smoothing correlates the errors
+/// within a window even for the true model; the jackknife allows for that.
 pub fn misfit(model: &dyn EulerLagrange<f64>, observed: &Observed) -> Option<Vec<f64>> {
     let data = Data::new(model, observed)?;
     // A model that fails on states does not explain them.
@@ -188,12 +188,12 @@ pub fn misfit(model: &dyn EulerLagrange<f64>, observed: &Observed) -> Option<Vec
 
 /// A number of the model and its change by every change.
 #[derive(Clone, Debug)]
-struct Linear {
+struct LinearQuantity {
     value: f64,
     slopes: Vec<f64>,
 }
 
-impl Linear {
+impl LinearQuantity {
     fn zero(changes: usize) -> Self {
         Self { value: 0.0, slopes: vec![0.0; changes] }
     }
@@ -210,22 +210,22 @@ impl Linear {
     }
 }
 
-/// Numbers of the model that are requested.
-struct Wanted {
-    mass: Vec<Linear>,
-    friction: Vec<Linear>,
-    energy: Vec<Linear>,
+/// Quantities of the model whose ranges are sought.
+struct Quantities {
+    mass: Vec<LinearQuantity>,
+    friction: Vec<LinearQuantity>,
+    energy: Vec<LinearQuantity>,
 }
 
-impl Wanted {
+impl Quantities {
     fn new(model: &dyn EulerLagrange<f64>, changes: &Changes, (q, v): (&[f64], &[f64])) -> Option<Self> {
         let (n, count) = (model.coordinates(), changes.len());
         let request = Request::MASS_MATRIX | Request::ENERGY | Request::FORCE;
         let mut terms = Terms::default();
         let mut row = Row::default();
-        let mut wanted = Self {
-            mass: vec![Linear::zero(count); n * (n + 1) / 2],
-            friction: vec![Linear::zero(count); if model.conserves_energy() { 0 } else { n }],
+        let mut quantities = Self {
+            mass: vec![LinearQuantity::zero(count); n * (n + 1) / 2],
+            friction: vec![LinearQuantity::zero(count); if model.conserves_energy() { 0 } else { n }],
             energy: Vec::new(),
         };
         let states = q.len() / n;
@@ -240,29 +240,29 @@ impl Wanted {
             used += 1.0;
             changes.evaluate(q, v, &none, &mut row);
             let pairs = (0..n).flat_map(|i| (i..n).map(move |j| i * n + j));
-            for (sum, at) in wanted.mass.iter_mut().zip(pairs) {
+            for (sum, at) in quantities.mass.iter_mut().zip(pairs) {
                 sum.add(terms.mass_matrix[at], &row.mass[at * count..(at + 1) * count], 1.0);
             }
-            for (i, sum) in wanted.friction.iter_mut().enumerate() {
+            for (i, sum) in quantities.friction.iter_mut().enumerate() {
                 let force = terms.force.get(i).map_or(0.0, |force| -force);
                 sum.add(force, &row.friction[i * count..(i + 1) * count], v[i]);
             }
             squares.iter_mut().zip(v).for_each(|(sum, v)| *sum += v * v);
             if k % stride == 0 {
-                wanted.energy.push(Linear { value: terms.energy[0], slopes: row.energy.clone() });
+                quantities.energy.push(LinearQuantity { value: terms.energy[0], slopes: row.energy.clone() });
             }
         }
-        let scale = |linear: &mut Linear, by: f64| {
+        let scale = |linear: &mut LinearQuantity, by: f64| {
             linear.value *= by;
             linear.slopes.iter_mut().for_each(|s| *s *= by);
         };
-        wanted.mass.iter_mut().for_each(|mass| scale(mass, 1.0 / used));
-        wanted.friction.iter_mut().zip(&squares).for_each(|(friction, square)| scale(friction, 1.0 / square));
-        (used > 0.0 && !wanted.energy.is_empty()).then_some(wanted)
+        quantities.mass.iter_mut().for_each(|mass| scale(mass, 1.0 / used));
+        quantities.friction.iter_mut().zip(&squares).for_each(|(friction, square)| scale(friction, 1.0 / square));
+        (used > 0.0 && !quantities.energy.is_empty()).then_some(quantities)
     }
 
     /// Energy about its mean, root mean square, and its error.
-    fn energy(&self, posterior: &Posterior, unit: Option<&Linear>) -> Estimate {
+    fn energy(&self, posterior: &Posterior, unit: Option<&LinearQuantity>) -> Estimate {
         let mean = self.mean_energy();
         let (mut value, mut square) = (0.0, 0.0);
         for energy in &self.energy {
@@ -279,8 +279,8 @@ impl Wanted {
         Estimate { value, low: value - half, high: value + half }
     }
 
-    fn mean_energy(&self) -> Linear {
-        let mut mean = Linear::zero(self.energy[0].slopes.len());
+    fn mean_energy(&self) -> LinearQuantity {
+        let mut mean = LinearQuantity::zero(self.energy[0].slopes.len());
         self.energy.iter().for_each(|e| mean.add(e.value, &e.slopes, 1.0 / self.energy.len() as f64));
         mean
     }

@@ -34,7 +34,8 @@ impl Observed {
     pub fn new(measured: &RecordingSplit, targets: Targets) -> Result<Self, RecordingSplitError> {
         let data = measured.datasets::<f64>(targets)?.training.remove(0);
         let finer = if is_derived(measured, targets) { measured.finer_accelerations() } else { None };
-        let finer = finer.filter(|finer| finer.len() == data.a().len()).map(|finer| some(data.coordinates(), &finer));
+        let finer =
+            finer.filter(|finer| finer.len() == data.a().len()).map(|finer| thinned(data.coordinates(), &finer));
         Ok(Self { finer: finer.unwrap_or_default(), ..Self::of(&data, measured, targets) })
     }
 
@@ -53,7 +54,7 @@ impl Observed {
     /// swing. Samples within half the fast period therefore count as one.
     fn of(data: &Dataset<f64>, measured: &RecordingSplit, targets: Targets) -> Self {
         let n = data.coordinates();
-        let some = |values: &[f64]| some(n, values);
+        let thinned = |values: &[f64]| thinned(n, values);
         let quality = || measured.smoothing.coordinates.iter().map(|c| &c.quality);
         let derived = is_derived(measured, targets);
         let samples = measured.training.recording.samples() as f64;
@@ -64,10 +65,10 @@ impl Observed {
         });
         let independent = independent.collect();
         Self {
-            q: some(data.q()),
-            v: some(data.v()),
-            a: some(data.a()),
-            force: some(data.force()),
+            q: thinned(data.q()),
+            v: thinned(data.v()),
+            a: thinned(data.a()),
+            force: thinned(data.force()),
             error: quality().map(|quality| if derived { quality.total(2) } else { 0.0 }).collect(),
             finer: Vec::new(),
             independent,
@@ -107,7 +108,7 @@ fn is_derived(measured: &RecordingSplit, targets: Targets) -> bool {
 }
 
 /// Evenly spaced rows of `n` numbers, at most about [`EXAMINED_STATES`].
-fn some(n: usize, values: &[f64]) -> Vec<f64> {
+fn thinned(n: usize, values: &[f64]) -> Vec<f64> {
     let stride = (values.len() / n).div_ceil(EXAMINED_STATES).max(1);
     values.chunks_exact(n).step_by(stride).flatten().copied().collect()
 }

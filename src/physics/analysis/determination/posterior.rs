@@ -3,7 +3,7 @@
 
 use super::changes::{Changes, Row, Typical};
 use super::observed::Observed;
-use super::{Estimate, Linear};
+use super::{Estimate, LinearQuantity};
 use crate::analysis::thresholds::{
     INFLUENCE_STATES, JACKKNIFE_GROUPS, LEAST_GROUP_STATES, LEAST_GROUPS, LEAST_INFLUENCE, LEAST_SQUARE_RESIDUAL,
     OPEN_SHARE,
@@ -112,8 +112,8 @@ impl Data {
     /// acceleration.
     pub fn groups(&self, model: &dyn EulerLagrange<f64>) -> Vec<Vec<usize>> {
         let (n, stride) = (self.n, self.states().div_ceil(INFLUENCE_STATES).max(1));
-        let some = |x: &[f64]| -> Vec<f64> { x.chunks_exact(n).step_by(stride).flatten().copied().collect() };
-        let (q, v, force) = (some(&self.q), some(&self.v), some(&self.force));
+        let thinned = |x: &[f64]| -> Vec<f64> { x.chunks_exact(n).step_by(stride).flatten().copied().collect() };
+        let (q, v, force) = (thinned(&self.q), thinned(&self.v), thinned(&self.force));
         let squares = mean_squares(n, &self.missed);
         let noise = self.observed.iter().zip(&squares).enumerate().map(|(i, ([size, error, independent], square))| {
             let beyond = (square - error).max(0.0) + 2.0 * square * (2.0 / independent).sqrt();
@@ -162,7 +162,7 @@ impl Data {
         }
     }
 
-    /// The changes that explain the residuals.
+    /// The distribution of the changes that explain the residuals.
     pub fn posterior(&self, changes: &Changes) -> Option<Posterior> {
         let (n, count) = (self.n, changes.len());
         let groups = groups(self.states(), LEAST_GROUP_STATES)?;
@@ -219,7 +219,7 @@ fn mean_squares(n: usize, values: &[f64]) -> Vec<f64> {
     (0..n).map(|i| values.iter().skip(i).step_by(n).map(|x| x * x).sum::<f64>() / count).collect()
 }
 
-/// Sizes of the changes after the data.
+/// Posterior distribution of the sizes of the changes.
 pub(super) struct Posterior {
     /// `C`.
     covariance: Vec<f64>,
@@ -234,8 +234,8 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// Prior variance of a linear function that the data leave open.
-    fn believed(&self, slopes: &[f64]) -> f64 {
+    /// Prior variance of a linear function that the data do not reduce.
+    fn prior_variance(&self, slopes: &[f64]) -> f64 {
         self.covariance.chunks_exact(slopes.len()).map(|row| dot(row, slopes).powi(2)).sum()
     }
 
@@ -243,13 +243,13 @@ impl Posterior {
     fn middle(&self, slopes: &[f64]) -> (f64, f64) {
         let middle = dot(slopes, &self.mean);
         let noise = jackknife(middle, self.without.iter().map(|sizes| dot(slopes, sizes)));
-        (middle, self.believed(slopes) + noise + dot(slopes, &self.bias).powi(2))
+        (middle, self.prior_variance(slopes) + noise + dot(slopes, &self.bias).powi(2))
     }
 
     /// The range of a number whose systematic error is `floor`; without ends where it would reflect the prior and not the data.
-    pub fn estimate(&self, linear: &Linear, floor: f64) -> Estimate {
+    pub fn estimate(&self, linear: &LinearQuantity, floor: f64) -> Estimate {
         let before = dot(&linear.slopes, &linear.slopes);
-        if self.believed(&linear.slopes) > OPEN_SHARE * OPEN_SHARE * before {
+        if self.prior_variance(&linear.slopes) > OPEN_SHARE * OPEN_SHARE * before {
             return Estimate::open(linear.value);
         }
         let (middle, variance) = self.middle(&linear.slopes);
@@ -353,7 +353,7 @@ impl Sums {
     }
 
     /// Sum of squared residuals with these factors.
-    pub fn left(&self, sizes: &[f64]) -> f64 {
+    pub fn residual_square(&self, sizes: &[f64]) -> f64 {
         let rows = self.precision.chunks_exact(sizes.len());
         let square: f64 = rows.zip(sizes).map(|(row, s)| s * dot(row, sizes)).sum();
         self.square - 2.0 * dot(&self.pull, sizes) + square
