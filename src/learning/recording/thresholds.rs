@@ -1,5 +1,5 @@
-//! Every number that decides how times, held readings and targets of a recording are judged. The numbers of a survey, of the guess of columns,
-//! of smoothing and of reading are in tables of their own.
+//! Every number that decides how times, held readings and targets of a recording are judged. The numbers of a survey, of the guess of
+//! columns, of smoothing and of reading are in tables of their own.
 
 // ---- Targets of a fit ----
 

@@ -22,8 +22,8 @@ pub(super) const SEGMENTS_PER_LEFT_OUT: usize = 20;
 
 /// Gauss-Newton steps of all starts before the first epoch.
 pub(super) const FIRST_STEPS: usize = 3;
-/// Weight, relative to the observations, of keeping an initial state unchanged: it keeps the curvature regular where the data do not determine
-/// the state.
+/// Weight, relative to the observations, of keeping an initial state unchanged: it keeps the curvature regular where the data do not
+/// determine the state.
 pub(super) const START_DAMPING: f64 = 1e-2;
 /// Largest correction over the range of a state.
 pub(super) const LONGEST_CORRECTION: f64 = 1e-2;

@@ -85,7 +85,8 @@ pub(super) const METRIC_POWERS: usize = 3;
 
 // ---- Functions and columns that depend on others ----
 
-/// Smallest independent part of a function, or of a quantity: less counts as a combination of the others, as `sin^2` given `1` and `cos 2x`.
+/// Smallest independent part of a function, or of a quantity: less counts as a combination of the others, as `sin^2` given `1` and `cos
+/// 2x`.
 pub(super) const INDEPENDENT_FUNCTION: f64 = 1e-7;
 /// Smallest independent part of a column of a comparison, or of a known quantity.
 pub(super) const INDEPENDENT_COLUMN: f64 = 1e-9;

@@ -6,8 +6,8 @@
 
 /// Fewest rows between two restarts of a time on average, and for each repeated time.
 pub(super) const ROWS_PER_RESTART: usize = 16;
-/// Largest relative deviation of a step from the median step, for all but one of [`STEPS_PER_UNEVEN_ONE`], of a time that is not recognised by
-/// its name.
+/// Largest relative deviation of a step from the median step, for all but one of [`STEPS_PER_UNEVEN_ONE`], of a time that is not recognised
+/// by its name.
 pub(super) const EVEN_STEP: f64 = 0.5;
 pub(super) const STEPS_PER_UNEVEN_ONE: usize = 10;
 /// Step of whole numbers, in s, from which they may be milliseconds: motion is hardly ever recorded more slowly.
@@ -30,7 +30,8 @@ pub(super) const UNNAMED_DIFFERENCE: f64 = 0.03;
 /// The same two limits once another velocity was found: the remaining velocities are then probably present too, perhaps with more noise.
 pub(super) const FURTHER_CORRELATION: f64 = 0.9;
 pub(super) const FURTHER_DIFFERENCE: f64 = 0.2;
-/// Largest difference in size, in units of [`UNNAMED_DIFFERENCE`], at which a position is the derivative of its own velocity, as on a circle.
+/// Largest difference in size, in units of [`UNNAMED_DIFFERENCE`], at which a position is the derivative of its own velocity, as on a
+/// circle.
 pub(super) const MUTUAL_DIFFERENCE: f64 = 3.0;
 /// Difference of correlations up to which the shorter of two differences is preferred.
 pub(super) const EQUAL_CORRELATION: f64 = 1e-3;

@@ -4,7 +4,7 @@ use super::builder::{TrackBuilder, empty};
 use super::thresholds::{AMBIGUOUS_TURN, LEAST_SAMPLES};
 use crate::recording::RecordedTrajectory;
 use crate::recording::clock::Clock;
-use crate::recording::reading::{Cut, Dropped, LoadedRecording};
+use crate::recording::reading::{Cut, Dropped, LoadedRecording, Rows};
 use std::f64::consts::TAU;
 
 /// Adds the stretches of a trajectory between long gaps, except those of few samples; returns the samples of the longest.
@@ -13,30 +13,8 @@ use std::f64::consts::TAU;
 /// is ambiguous, or a gap is longer, it is cut unless it has to stay whole.
 pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedRecording) -> usize {
     let TrackBuilder { label, rows, mut track, error, input, missing, .. } = builder;
-    let clock = Clock::of(&track.times);
-    let mut bounds = vec![0];
-    let mut turned = Vec::new();
-    for (k, pair) in track.times.windows(2).enumerate() {
-        let seconds = pair[1] - pair[0];
-        if seconds <= clock.longest {
-            continue;
-        }
-        let turns =
-            clock.reaches_across(seconds).then(|| turns(&track, &reading.recording.periodic, &clock, k)).flatten();
-        if let Some(turns) = turns {
-            let missing = clock.missing(seconds);
-            reading.bridged.gaps += 1;
-            reading.bridged.rows += missing;
-            reading.bridged.longest = reading.bridged.longest.max(missing);
-            turned.push((k + 1, turns));
-        } else if !whole {
-            let (before, after) = (rows.row(k), rows.row(k + 1));
-            reading.cuts.push(Cut { file: file.to_string(), before, after, seconds, steps: seconds / clock.step });
-            bounds.push(k + 1);
-        }
-    }
+    let (bounds, turned) = cross_gaps(file, &track, &rows, whole, reading);
     turn(&mut track, &turned);
-    bounds.push(track.len());
     let name = match &label {
         Some(label) => format!("{file} trajectory {label}"),
         None => file.to_string(),
@@ -84,6 +62,40 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
         reading.takes.push(take);
     }
     most
+}
+
+/// Notes the gaps of a trajectory; returns the bounds of the stretches that it is cut into, the first and the last bound included, and the
+/// samples from which on angles have to be moved by full turns.
+fn cross_gaps(
+    file: &str,
+    track: &RecordedTrajectory,
+    rows: &Rows,
+    whole: bool,
+    reading: &mut LoadedRecording,
+) -> (Vec<usize>, Vec<(usize, Vec<f64>)>) {
+    let clock = Clock::of(&track.times);
+    let (mut bounds, mut turned) = (vec![0], Vec::new());
+    for (k, pair) in track.times.windows(2).enumerate() {
+        let seconds = pair[1] - pair[0];
+        if seconds <= clock.longest {
+            continue;
+        }
+        let turns =
+            clock.reaches_across(seconds).then(|| turns(track, &reading.recording.periodic, &clock, k)).flatten();
+        if let Some(turns) = turns {
+            let missing = clock.missing(seconds);
+            reading.bridged.gaps += 1;
+            reading.bridged.rows += missing;
+            reading.bridged.longest = reading.bridged.longest.max(missing);
+            turned.push((k + 1, turns));
+        } else if !whole {
+            let (before, after) = (rows.row(k), rows.row(k + 1));
+            reading.cuts.push(Cut { file: file.to_string(), before, after, seconds, steps: seconds / clock.step });
+            bounds.push(k + 1);
+        }
+    }
+    bounds.push(track.len());
+    (bounds, turned)
 }
 
 /// Full turns by which the coordinates must be moved from sample `k + 1` on so that they continue across the gap before it as they moved

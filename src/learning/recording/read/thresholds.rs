@@ -4,8 +4,8 @@
 
 /// Fewest samples of a trajectory.
 pub(crate) const LEAST_SAMPLES: usize = 16;
-/// Difference in rad, from which neither is used, of the turns that the velocities before and after a gap predict across it: about a quarter of
-/// a turn.
+/// Difference in rad, from which neither is used, of the turns that the velocities before and after a gap predict across it: about a
+/// quarter of a turn.
 pub(super) const AMBIGUOUS_TURN: f64 = 1.5;
 /// Most trajectories of one file.
 pub(super) const MOST_TRAJECTORIES: usize = 100_000;
@@ -14,8 +14,8 @@ pub(super) const MOST_TRAJECTORIES: usize = 100_000;
 
 /// Largest file in bytes.
 pub(super) const LARGEST_FILE: u64 = 1 << 36;
-/// Largest ratio of unpacked to packed bytes. Measured numbers shrink to a tenth at most; data that shrinks to a hundredth contains hardly any
-/// number.
+/// Largest ratio of unpacked to packed bytes. Measured numbers shrink to a tenth at most; data that shrinks to a hundredth contains hardly
+/// any number.
 pub(super) const MOST_EXPANSION: u64 = 100;
 /// Unpacked bytes that are allowed whatever the ratio.
 pub(super) const UNPACKED_ANYWAY: u64 = 1 << 26;

@@ -5,8 +5,8 @@
 
 // ---- Samples near gaps ----
 
-/// Largest variance of an acceleration near a gap, over that of a full window of equal steps, for the sample to be used for learning: twice the
-/// standard error.
+/// Largest variance of an acceleration near a gap, over that of a full window of equal steps, for the sample to be used for learning: twice
+/// the standard error.
 pub(super) const MOST_GAP_VARIANCE: f64 = 4.0;
 /// Largest time span of a window near a gap, over its length, for its sample to be used for learning.
 pub(super) const MOST_GAP_STRETCH: f64 = 1.5;
@@ -39,8 +39,8 @@ pub(super) const NOISE_RATIOS: [f64; 2] = [1e-6, 1e6];
 
 /// Standard deviations by which an estimated squared bias must exceed 0 to be significant.
 pub(super) const BIAS_SIGNIFICANCE: f64 = 3.0;
-/// Largest squared error of the typical window, over the smallest, at which a trajectory or a sample keeps it: an error larger by a factor of
-/// 1.4.
+/// Largest squared error of the typical window, over the smallest, at which a trajectory or a sample keeps it: an error larger by a factor
+/// of 1.4.
 pub(super) const KEPT_SQUARED_ERROR: f64 = 2.0;
 /// Squared error over the smallest that is clearly a rise.
 pub(super) const RISEN_SQUARED_ERROR: f64 = 1.5;

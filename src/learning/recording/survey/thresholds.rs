@@ -1,6 +1,7 @@
 //! Every number that decides a verdict or limits the work of a survey.
 //!
-//! `lnn-studies rates --part check` counts the verdicts of a survey on data whose right answer is known; `docs/verdicts.md` states the rates.
+//! `lnn-studies rates --part check` counts the verdicts of a survey on data whose right answer is known; `docs/verdicts.md` states the
+//! rates.
 
 // ---- Sampling and rows ----
 
@@ -32,8 +33,8 @@ pub(super) const MISTAKE_TOLERANCE: f64 = 0.05;
 
 // ---- Coordinates that do not move, move uniformly, or are copies ----
 
-/// Scatter over the noise above which a coordinate moves: motion of two thirds of the noise, added in squares. The noise itself is estimated
-/// to a few per cent.
+/// Scatter over the noise above which a coordinate moves: motion of two thirds of the noise, added in squares. The noise itself is
+/// estimated to a few per cent.
 pub(super) const MOVING_SCATTER: f64 = 1.2;
 /// Remainder of a coordinate, as a share of its motion, that counts as rounding.
 pub(super) const ROUNDING_REMAINDER: f64 = 1e-9;

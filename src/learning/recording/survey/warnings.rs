@@ -5,7 +5,7 @@ use super::thresholds::{
     LEAST_CORRELATION, LEAST_SAMPLES_PER_PERIOD, MANY_LOST_ROWS, MISTAKE_TOLERANCE, RATIO_PER_SQUARED_ERROR,
     RATIO_TOLERANCE, TURN_TOLERANCE,
 };
-use super::{FirstOrder, Stillness, Survey};
+use super::{CoordinateSurvey, FirstOrder, Stillness, Survey};
 use crate::names::{number, percent, pluralize};
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
@@ -16,53 +16,9 @@ use std::f64::consts::{PI, TAU};
 pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
     let mut all: Vec<String> = survey.first_order.iter().map(FirstOrder::warning).collect();
     for (i, c) in survey.coordinates.iter().enumerate() {
-        let name = &c.name;
-        if let Some((_, how)) = still.iter().find(|(still, _)| *still == i) {
-            all.push(format!("{name} {how}; nothing can be learned about it"));
-            continue;
-        }
-        if let Some((track, row)) = &c.first_ambiguous {
-            all.push(format!(
-                "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: the direction of \
-                 the turn is ambiguous",
-                pluralize(c.ambiguous_turns, "time", "times")
-            ));
-        }
-        if !c.noise_resolved {
-            all.push(format!(
-                "{name}: motion and noise cannot be separated, so that the estimated noise is an upper bound"
-            ));
-        }
-        if c.samples_per_period < LEAST_SAMPLES_PER_PERIOD {
-            all.push(format!(
-                "{name}: {:.1} samples per period of its fast motion ({} s), expected at least {LEAST_SAMPLES_PER_PERIOD}: sample faster",
-                c.samples_per_period,
-                number(c.period)
-            ));
-        }
-        let measured = [("velocity", 1, &c.measured_velocity), ("acceleration", 2, &c.measured_acceleration)];
-        for (what, derivative, consistency) in measured {
-            if let Some(consistency) = consistency.filter(|c| !c.holds()) {
-                let order = ["", "", "second "][derivative];
-                let hint = consistency.mistake(survey.step).map(|text| format!(": {text}")).unwrap_or_default();
-                all.push(format!(
-                    "the measured {what} of {name} is {} times the {order}derivative of its positions (correlation \
-                     {:.3}){hint}",
-                    number(consistency.factor),
-                    consistency.correlation
-                ));
-            }
-        }
-        let wraps = |turn: f64| {
-            let jumps = survey.suspicious.iter().filter(|s| s.kind == Kind::Jump && s.coordinate == *name);
-            jumps.filter(|s| (s.size.abs() / turn - 1.0).abs() < TURN_TOLERANCE).count()
-        };
-        if !c.periodic && wraps(TAU) > 0 {
-            all.push(format!("{name} jumps by a full turn {} times: is it an angle (--periodic {name})?", wraps(TAU)));
-        }
-        if wraps(360.0) > 0 {
-            let count = wraps(360.0);
-            all.push(format!("{name} jumps by 360 {count} times: is it an angle in degrees (--units {name}=deg)?"));
+        match still.iter().find(|(still, _)| *still == i) {
+            Some((_, how)) => all.push(format!("{} {how}; nothing can be learned about it", c.name)),
+            None => all.extend(coordinate_warnings(c, survey)),
         }
     }
     let dropped: usize = survey.dropped.iter().map(|part| part.samples).sum();
@@ -82,6 +38,55 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
     }
     if survey.held_out.is_none() {
         all.push("too few samples to hold out a validation part".to_string());
+    }
+    all
+}
+
+/// Warnings about a coordinate that moves.
+fn coordinate_warnings(c: &CoordinateSurvey, survey: &Survey) -> Vec<String> {
+    let (name, mut all) = (&c.name, Vec::new());
+    if let Some((track, row)) = &c.first_ambiguous {
+        all.push(format!(
+            "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: the direction of \
+             the turn is ambiguous",
+            pluralize(c.ambiguous_turns, "time", "times")
+        ));
+    }
+    if !c.noise_resolved {
+        all.push(format!(
+            "{name}: motion and noise cannot be separated, so that the estimated noise is an upper bound"
+        ));
+    }
+    if c.samples_per_period < LEAST_SAMPLES_PER_PERIOD {
+        all.push(format!(
+            "{name}: {:.1} samples per period of its fast motion ({} s), expected at least {LEAST_SAMPLES_PER_PERIOD}: sample faster",
+            c.samples_per_period,
+            number(c.period)
+        ));
+    }
+    let measured = [("velocity", 1, &c.measured_velocity), ("acceleration", 2, &c.measured_acceleration)];
+    for (what, derivative, consistency) in measured {
+        if let Some(consistency) = consistency.filter(|c| !c.holds()) {
+            let order = ["", "", "second "][derivative];
+            let hint = consistency.mistake(survey.step).map(|text| format!(": {text}")).unwrap_or_default();
+            all.push(format!(
+                "the measured {what} of {name} is {} times the {order}derivative of its positions (correlation \
+                 {:.3}){hint}",
+                number(consistency.factor),
+                consistency.correlation
+            ));
+        }
+    }
+    let wraps = |turn: f64| {
+        let jumps = survey.suspicious.iter().filter(|s| s.kind == Kind::Jump && s.coordinate == *name);
+        jumps.filter(|s| (s.size.abs() / turn - 1.0).abs() < TURN_TOLERANCE).count()
+    };
+    if !c.periodic && wraps(TAU) > 0 {
+        all.push(format!("{name} jumps by a full turn {} times: is it an angle (--periodic {name})?", wraps(TAU)));
+    }
+    if wraps(360.0) > 0 {
+        let count = wraps(360.0);
+        all.push(format!("{name} jumps by 360 {count} times: is it an angle in degrees (--units {name}=deg)?"));
     }
     all
 }
