@@ -128,8 +128,20 @@ impl FormulaChoices {
     /// # Errors
     /// `ValueError` for a choice that is none.
     pub fn read(choices: &str) -> PyResult<(FormulaOptions, String)> {
-        let Self { basis, functions, gyroscopic, friction, drive, noise, scale, bootstraps, seed, threads, name, between } =
-            serde_json::from_str(choices).map_err(value)?;
+        let Self {
+            basis,
+            functions,
+            gyroscopic,
+            friction,
+            drive,
+            noise,
+            scale,
+            bootstraps,
+            seed,
+            threads,
+            name,
+            between,
+        } = serde_json::from_str(choices).map_err(value)?;
         let families = basis.map(|text| text.parse::<Families>()).transpose();
         let families = families.map_err(|problem| value(format_args!("basis: {problem}")))?;
         if !(1..=MOST_BOOTSTRAPS).contains(&bootstraps) {

@@ -4,7 +4,7 @@ use crate::attend::{left, whole};
 use crate::errors::{pipeline, runtime, value};
 use crate::forces::{Forces, Samples};
 use crate::readings::{FormulaChoices, formula_shown, shown};
-use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
+use lnn::certificate::{Certificate, CertificateOptions, Signature, certify_network, certify_system};
 use lnn::constraints::{EXAMINED_STATES, examine};
 use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::{Geometry, GeometryError, geometries};
@@ -730,15 +730,9 @@ impl Subject {
         let usual = Signature::of(self.n(), self.time_like().is_some());
         let signature = signature.map_or(usual, |(positive, negative)| Signature { positive, negative });
         let found: Certificate = whole(py, None, |watch| {
-            let stop = Some(watch.interrupt.as_ref());
-            let options = certificate::Options {
-                condition,
-                seconds,
-                boxes,
-                threads,
-                stop,
-                ..certificate::Options::new(signature)
-            };
+            let mut options = CertificateOptions::new(signature);
+            (options.condition, options.seconds, options.boxes) = (condition, seconds, boxes);
+            (options.threads, options.stop) = (threads, Some(watch.interrupt.as_ref()));
             match &self.kind {
                 Kind::System(configured, _) => certify_system(configured, &region, &options),
                 Kind::Model(_, network, _) => certify_network(network, &region, &options),

@@ -6,7 +6,7 @@ use crate::number::{finite, index_of, range, seconds, thread_count, threads, who
 use crate::source::{SystemOrModel, require_at_most};
 use crate::system_arg::{self, learned_system};
 use crate::{CliError, interrupt};
-use lnn::certificate::{Certificate, CertificateError, Options, Signature, certify_network, certify_system};
+use lnn::certificate::{Certificate, CertificateError, CertificateOptions, Signature, certify_network, certify_system};
 use lnn::lagrangian::configure_system;
 use lnn::lagrangian::system::Bounds;
 use lnn::network::file::{Header, MAX_COORDINATES};
@@ -120,15 +120,11 @@ fn trained(header: &Header) -> Bounds {
 }
 
 impl Args {
-    fn options<'a>(&self, n: usize, time_like: bool, stop: &'a AtomicBool) -> Options<'a> {
-        Options {
-            signature: self.signature.unwrap_or(Signature::of(n, time_like)),
-            condition: self.condition,
-            seconds: self.seconds,
-            boxes: self.boxes,
-            threads: threads(self.threads),
-            stop: Some(stop),
-        }
+    fn options<'a>(&self, n: usize, time_like: bool, stop: &'a AtomicBool) -> CertificateOptions<'a> {
+        let mut options = CertificateOptions::new(self.signature.unwrap_or(Signature::of(n, time_like)));
+        (options.condition, options.seconds, options.boxes) = (self.condition, self.seconds, self.boxes);
+        (options.threads, options.stop) = (threads(self.threads), Some(stop));
+        options
     }
 
     /// The bounds with those of the named columns replaced.

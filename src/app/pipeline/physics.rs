@@ -7,7 +7,7 @@ use crate::analysis::{
     MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, matrices_at_rest,
     metric_components,
 };
-use crate::certificate::{Options, Signature, certify_network};
+use crate::certificate::{CertificateOptions, Signature, certify_network};
 use crate::geometry::MOST_COORDINATES;
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
@@ -369,11 +369,11 @@ impl Physics {
         let n = network.coordinates();
         let signature = Signature::of(n, subject.time_like().is_some());
         let boxes = CERTIFICATE_WORK / (network.weights().len() * n.pow(2)).max(1);
-        let options = Options {
+        let options = CertificateOptions {
             seconds: f64::INFINITY,
             boxes: boxes.clamp(1, CERTIFICATE_BOXES),
             threads: subject.threads,
-            ..Options::new(signature)
+            ..CertificateOptions::new(signature)
         };
         let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
         let bounds = Bounds { positions: pairs(&region.position), velocities: pairs(&region.velocity) };

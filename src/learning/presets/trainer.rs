@@ -3,7 +3,7 @@
 use crate::configuration::{Config, ConfigError, Precision};
 use crate::data::{Dataset, DatasetError, Datasets, Weighting};
 use crate::findings::Findings;
-use crate::lagrangian::{EulerLagrange, FormulaConstraints, FormulaError};
+use crate::lagrangian::{ConstraintFormulaError, EulerLagrange, FormulaConstraints};
 use crate::names::{number, pluralize};
 use crate::network::file::{Header, ModelFile, ModelFileError};
 use crate::network::{NetworkError, NetworkLagrangian, Structure};
@@ -110,7 +110,7 @@ pub enum TrainerError {
     Training(#[from] TrainingError),
     /// Constraints with a mistake, or that contradict each other or leave no motion.
     #[error(transparent)]
-    Constraints(#[from] FormulaError),
+    Constraints(#[from] ConstraintFormulaError),
     /// A constraint that is not finite at a state, or states that are under rows already.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -234,7 +234,7 @@ impl<'a> Trainer<'a> {
         let data = match &constraints {
             None => data,
             Some(constraints) => {
-                held = data.clone().on(&constraints.manifold().map_err(FormulaError::from)?)?;
+                held = data.clone().on(&constraints.manifold().map_err(ConstraintFormulaError::from)?)?;
                 &held
             }
         };

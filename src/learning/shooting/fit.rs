@@ -3,7 +3,7 @@
 use super::thresholds::{INTEGRATION_ERROR, MEASURED_SEGMENTS};
 use crate::configuration::{ConfigError, Penalty};
 use crate::data::{Noise, StateEstimate};
-use crate::lagrangian::{FormulaConstraints, FormulaError, Manifold};
+use crate::lagrangian::{ConstraintFormulaError, FormulaConstraints, Manifold};
 use crate::network::{Architecture, Layout, NetworkError};
 use crate::random::RngStream;
 use crate::recording::TrajectoryError;
@@ -96,7 +96,7 @@ pub enum ShootingError {
     },
     /// Constraints of other coordinates than the network's.
     #[error(transparent)]
-    Constraints(#[from] FormulaError),
+    Constraints(#[from] ConstraintFormulaError),
     /// Training failed.
     #[error(transparent)]
     Training(#[from] TrainingError),
@@ -156,7 +156,7 @@ impl<S: Scalar> Task<'_, S> {
     }
 
     /// The states that the constraints allow.
-    fn manifold(&self) -> Result<Option<Arc<dyn Manifold<S>>>, FormulaError> {
+    fn manifold(&self) -> Result<Option<Arc<dyn Manifold<S>>>, ConstraintFormulaError> {
         let manifold = self.constraints.map(FormulaConstraints::manifold).transpose()?;
         Ok(manifold.map(|manifold| Arc::new(manifold) as _))
     }

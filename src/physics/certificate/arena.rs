@@ -3,13 +3,11 @@
 use super::form::{self, Basis, Expansion};
 use super::function::Function;
 use super::interval::Interval;
+use super::thresholds::LANES;
 use crate::ops::Unary;
 use crate::scalar::vectorized;
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
-
-/// Numbers of a layer that lie side by side, so that one vector instruction works on all.
-pub const LANES: usize = 8;
 
 /// A number of an [`Arena`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

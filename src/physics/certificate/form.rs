@@ -9,17 +9,14 @@
 
 use super::function::Derivatives;
 use super::interval::Interval;
+use super::thresholds::{MOST_POLYNOMIAL_DEGREE, MOST_POLYNOMIAL_DISTANCE, UNDERFLOW};
 
 const EPSILON: f64 = f64::EPSILON;
-/// Largest share of the radius of a range that the distance from a polynomial may have.
-const WORTHWHILE: f64 = 0.7;
-/// Covers losses by underflow.
-pub const TINY: f64 = 1e-290;
 
 /// A sum of numbers that are not negative, rounded up by more than its own rounding lost.
 #[inline(always)]
 fn raised(x: f64) -> f64 {
-    x * (1.0 + 256.0 * EPSILON) + TINY
+    x * (1.0 + 256.0 * EPSILON) + UNDERFLOW
 }
 
 /// Sums of the absolute values, side by side.
@@ -116,7 +113,7 @@ pub fn add_product<const W: usize>(basis: &Basis, out: &mut [[f64; W]], a: &[[f6
         return;
     }
     let (m, degree) = (basis.count(), basis.degree());
-    let (mut of_a, mut of_b) = ([[0.0; W]; MOST_DEGREE + 1], [[0.0; W]; MOST_DEGREE + 1]);
+    let (mut of_a, mut of_b) = ([[0.0; W]; MOST_POLYNOMIAL_DEGREE + 1], [[0.0; W]; MOST_POLYNOMIAL_DEGREE + 1]);
     for p in 0..=degree {
         of_a[p] = size(&a[basis.of_degree(p)]);
         of_b[p] = size(&b[basis.of_degree(p)]);
@@ -149,17 +146,20 @@ pub fn add_product<const W: usize>(basis: &Basis, out: &mut [[f64; W]], a: &[[f6
 /// Taylor's formula for functions side by side: `sum_p c_p w^p`, where `w` is the deviation of the argument from its value in the middle.
 pub struct Expansion<const W: usize> {
     /// Coefficients.
-    value: [[f64; W]; MOST_DEGREE + 1],
+    value: [[f64; W]; MOST_POLYNOMIAL_DEGREE + 1],
     /// Bounds of the errors of the coefficients.
-    spread: [[f64; W]; MOST_DEGREE + 1],
+    spread: [[f64; W]; MOST_POLYNOMIAL_DEGREE + 1],
     /// Everything that the functions can be on the box.
     whole: [Interval; W],
 }
 
 impl<const W: usize> Expansion<W> {
     /// Functions that are 0.
-    pub const ZERO: Self =
-        Self { value: [[0.0; W]; MOST_DEGREE + 1], spread: [[0.0; W]; MOST_DEGREE + 1], whole: [Interval::ZERO; W] };
+    pub const ZERO: Self = Self {
+        value: [[0.0; W]; MOST_POLYNOMIAL_DEGREE + 1],
+        spread: [[0.0; W]; MOST_POLYNOMIAL_DEGREE + 1],
+        whole: [Interval::ZERO; W],
+    };
 
     /// The `order`-th derivative of a function for one of the arguments: `at` are the derivatives in the middle, `over` those over the range of
     /// the argument, which is at most `distance` away from there.
@@ -216,16 +216,13 @@ impl<const W: usize> Expansion<W> {
             // A polynomial keeps the dependences between functions, as long as the distance from it is small relative to the range; `NaN`
             // never is.
             let whole = self.whole[l];
-            let worthwhile = out[m][l] <= WORTHWHILE * whole.radius();
+            let worthwhile = out[m][l] <= MOST_POLYNOMIAL_DISTANCE * whole.radius();
             if whole.is_bounded() && !worthwhile {
                 set_constant(out, l, whole);
             }
         }
     }
 }
-
-/// Largest degree of the polynomials that enclose functions.
-pub const MOST_DEGREE: usize = 3;
 
 /// Monomials in the axes `e_1, .., e_m` up to a degree, in the order of their degrees: 1, then the axes, then their products.
 #[derive(Debug)]
@@ -255,10 +252,10 @@ impl Basis {
         )
     }
 
-    /// All monomials of a degree from 1 to [`MOST_DEGREE`] at most.
+    /// All monomials of a degree from 1 to [`MOST_POLYNOMIAL_DEGREE`] at most.
     pub fn new(axes: usize, degree: usize) -> Self {
         let (mut factors, mut starts) = (vec![Vec::new()], vec![0]);
-        for _ in 0..degree.clamp(1, MOST_DEGREE) {
+        for _ in 0..degree.clamp(1, MOST_POLYNOMIAL_DEGREE) {
             let first = starts[starts.len() - 1];
             starts.push(factors.len());
             for k in first..factors.len() {

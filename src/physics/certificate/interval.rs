@@ -1,9 +1,10 @@
 //! Closed intervals of `f64` with outward rounding, and their elementary functions.
 //!
-//! The functions of the standard library and of `libm` are not correctly rounded. What they return is moved outward by [`MARGIN`], 8
+//! The functions of the standard library and of `libm` are not correctly rounded. What they return is moved outward by [`FUNCTION_ERROR`], 8
 //! units in the last place: the C library of GNU states 2 at most for the functions used here ("Known Maximum Errors in Math
 //! Functions"), `libm` one for `erfc`, and this crate's logistic function and softplus keep 3.
 
+use super::thresholds::{FUNCTION_ERROR, MOST_REDUCED_ANGLE};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -208,16 +209,11 @@ macro_rules! assign {
 }
 assign! { AddAssign add_assign + SubAssign sub_assign - MulAssign mul_assign * DivAssign div_assign / }
 
-/// Relative error that a function is granted: 8 units in the last place.
-const MARGIN: f64 = 8.0 * f64::EPSILON;
-/// Angles beyond it are not reduced: every sine is between -1 and 1.
-const LARGE_ANGLE: f64 = 1e6;
-
 /// Ends as a function returned them, widened by its error.
 #[inline]
 fn widened(low: f64, high: f64) -> Interval {
     // Products with the margin are themselves rounded, which the last step covers; the tiny summand covers subnormal results.
-    let wide = |x: f64| x.abs() * MARGIN + f64::MIN_POSITIVE;
+    let wide = |x: f64| x.abs() * FUNCTION_ERROR + f64::MIN_POSITIVE;
     let (low, high) =
         (low - if low.is_finite() { wide(low) } else { 0.0 }, high + if high.is_finite() { wide(high) } else { 0.0 });
     // An infinite end that came from overflow stands for numbers beyond the largest.
@@ -280,7 +276,7 @@ impl Interval {
     }
     /// A wave that is 1 at `crest * pi` and once every turn from there.
     fn wave(self, f: impl Fn(f64) -> f64, crest: f64) -> Self {
-        if !self.inside(-LARGE_ANGLE, LARGE_ANGLE) || self.high - self.low > 6.0 {
+        if !self.inside(-MOST_REDUCED_ANGLE, MOST_REDUCED_ANGLE) || self.high - self.low > 6.0 {
             return Self { low: -1.0, high: 1.0 };
         }
         let (a, b) = (f(self.low), f(self.high));

@@ -20,13 +20,14 @@
 //! # Example
 //!
 //! ```
-//! use lnn::certificate::{Options, Signature, Verdict, certify_system};
+//! use lnn::certificate::{CertificateOptions, Signature, Verdict, certify_system};
 //! use lnn::lagrangian::configure;
 //! use lnn::lagrangian::Bounds;
 //!
 //! let pendulum = configure::<f64>("double-pendulum", &[])?;
 //! let region = Bounds::uniform(2, (-3.2, 3.2), (-9.0, 9.0)); // rad, rad/s
-//! let options = Options { boxes: 20_000, ..Options::new(Signature { positive: 2, negative: 0 }) };
+//! let mut options = CertificateOptions::new(Signature { positive: 2, negative: 0 });
+//! options.boxes = 20_000;
 //! let found = certify_system(&pendulum, &region, &options)?;
 //! assert_eq!((found.certified, found.refuted, found.open), (1.0, 0.0, 0.0));
 //! // M = [[2, c], [c, 1]] with c = cos(theta1 - theta2): the largest condition number is 6.854, at c = 1.
@@ -45,6 +46,7 @@ mod number;
 mod says;
 mod search;
 mod spectrum;
+mod thresholds;
 
 pub use models::{Guarded, certify_network};
 pub use search::Verdict;
@@ -56,12 +58,10 @@ use search::{Tree, search};
 use spectrum::{Enclose, Source};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-
-/// Largest number of coordinates.
-const MOST_COORDINATES: usize = 32;
+use thresholds::MOST_COORDINATES;
 
 /// Numbers of positive and of negative eigenvalues of a mass matrix.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(into = "[usize; 2]"))]
 pub struct Signature {
     /// Positive eigenvalues.
@@ -84,9 +84,11 @@ impl Signature {
     }
 }
 
-/// Aim and limits of a search.
+/// What a search for a certificate proves, and how long it may take. [`CertificateOptions::new`] sets the signature and usual limits; assign
+/// the other fields afterwards.
 #[derive(Clone, Copy, Debug)]
-pub struct Options<'a> {
+#[non_exhaustive]
+pub struct CertificateOptions<'a> {
     /// Signature to be proven.
     pub signature: Signature,
     /// Largest condition number allowed, `max |eigenvalue| / min |eigenvalue|` of the matrix in the units of the coordinates, at least 1;
@@ -103,9 +105,17 @@ pub struct Options<'a> {
     pub stop: Option<&'a AtomicBool>,
 }
 
-impl Options<'_> {
+impl CertificateOptions<'_> {
     /// Ten seconds on one thread, any condition number, at most 10 million boxes.
     pub fn new(signature: Signature) -> Self {
+        Self { signature, ..Self::default() }
+    }
+}
+
+impl Default for CertificateOptions<'_> {
+    /// The limits of [`CertificateOptions::new`] with the empty signature, which fits no system: set `signature` before a search.
+    fn default() -> Self {
+        let signature = Signature::default();
         Self { signature, condition: None, seconds: 10.0, boxes: 10_000_000, threads: 1, stop: None }
     }
 }
@@ -246,7 +256,7 @@ pub fn certify<L: Lagrangian, S: Scalar>(
     lagrangian: &L,
     parameters: &[S],
     region: &Bounds,
-    options: &Options<'_>,
+    options: &CertificateOptions<'_>,
 ) -> Result<Certificate, CertificateError> {
     let bounds = checked(lagrangian.coordinates(), region, options)?;
     Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
@@ -259,9 +269,9 @@ pub fn certify<L: Lagrangian, S: Scalar>(
 pub fn certify_system<S: Scalar>(
     configured: &SystemInstance<S>,
     region: &Bounds,
-    options: &Options<'_>,
+    options: &CertificateOptions<'_>,
 ) -> Result<Certificate, CertificateError> {
-    struct Certify<'a, S>(&'a [S], &'a Bounds, &'a Options<'a>);
+    struct Certify<'a, S>(&'a [S], &'a Bounds, &'a CertificateOptions<'a>);
     impl<S: Scalar> LagrangianVisitor for Certify<'_, S> {
         type Output = Result<Certificate, CertificateError>;
         fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
@@ -275,7 +285,7 @@ pub fn certify_system<S: Scalar>(
 }
 
 /// The bounds of positions and velocities, one after the other, if everything fits together.
-fn checked(n: usize, region: &Bounds, options: &Options<'_>) -> Result<Vec<(f64, f64)>, CertificateError> {
+fn checked(n: usize, region: &Bounds, options: &CertificateOptions<'_>) -> Result<Vec<(f64, f64)>, CertificateError> {
     if n > MOST_COORDINATES {
         return Err(CertificateError::Coordinates(n));
     }
@@ -302,7 +312,11 @@ fn checked(n: usize, region: &Bounds, options: &Options<'_>) -> Result<Vec<(f64,
 }
 
 /// A search over regions with their shares.
-fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options<'_>) -> Certificate {
+fn certificate(
+    source: &dyn Enclose,
+    regions: Vec<(Vec<(f64, f64)>, f64)>,
+    options: &CertificateOptions<'_>,
+) -> Certificate {
     let start = Instant::now();
     let roots = regions.iter().map(|(bounds, _)| bounds.clone()).collect();
     let found = search(source, regions, options);

@@ -3,7 +3,7 @@
 use super::interval::Interval;
 use super::search::Found;
 use super::spectrum::Source;
-use super::{Certificate, CertificateError, Options, Signature, Verdict, certificate, checked};
+use super::{Certificate, CertificateError, CertificateOptions, Signature, Verdict, certificate, checked};
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Slopes, Terms};
 use crate::network::{Architecture, NetworkLagrangian};
@@ -25,7 +25,7 @@ use std::f64::consts::TAU;
 pub fn certify_network<S: Scalar>(
     network: &NetworkLagrangian<S>,
     region: &Bounds,
-    options: &Options<'_>,
+    options: &CertificateOptions<'_>,
 ) -> Result<Certificate, CertificateError> {
     let architecture = network.architecture();
     let bounds = checked(architecture.coordinates, region, options)?;

@@ -1,10 +1,10 @@
 //! The number that a Lagrangian is evaluated with: its value, its first and its second derivatives along the velocities, each as a
 //! form over a box of states.
 
-use super::arena::{Arena, LANES, Place, width};
-use super::form::TINY;
+use super::arena::{Arena, Place, width};
 use super::function::Function;
 use super::interval::Interval;
+use super::thresholds::{LANES, UNDERFLOW};
 use crate::linalg::{MatMut, MatRef, gemm};
 use crate::ops::Unary;
 use crate::scalar::{Elementary, Real, vectorized};
@@ -301,7 +301,7 @@ fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Interval], x: &[Number
                     form[..lanes].copy_from_slice(&sums[first..first + lanes]);
                 }
                 for (lane, spread) in spreads[part * outputs + first..][..lanes].iter().enumerate() {
-                    form[(stride - 1) * width + lane] = spread * (1.0 + loss) + TINY;
+                    form[(stride - 1) * width + lane] = spread * (1.0 + loss) + UNDERFLOW;
                 }
             }
             for (lane, bias) in bias.iter().skip(first).take(lanes).enumerate() {

@@ -1,7 +1,8 @@
 //! Branch and bound: a region is cut into boxes until each is decided or time is up.
 
 use super::spectrum::{Enclose, Spectrum};
-use super::{Options, Signature, Witness};
+use super::thresholds::{BOXES_AT_A_TIME, HALVING_CAUTION, LARGE_BOX, MOST_HALVINGS};
+use super::{CertificateOptions, Signature, Witness};
 use crate::storage::in_order;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -59,7 +60,7 @@ impl Waiting {
     /// with the largest decided share expected per evaluated box, the smallest of them first, whose neighbours were decided last.
     fn rank(&self) -> (bool, i64, Reverse<i64>, Reverse<usize>) {
         let size = self.share.log2();
-        let large = size > LARGE;
+        let large = size > LARGE_BOX;
         let rate = if large || !self.halvings.is_finite() { size } else { size - self.halvings };
         (large, rate.floor() as i64, Reverse(size.floor() as i64), Reverse(self.node))
     }
@@ -93,17 +94,8 @@ pub struct Found {
     pub witness: Option<Witness>,
 }
 
-/// Boxes that are taken from the queue at a time.
-const CHUNK: usize = 128;
-/// Binary logarithm of the share of the region above which boxes are evaluated in the order of their size.
-const LARGE: f64 = -9.5;
-/// A box is cut at once into parts that are halved so much less often than it probably has to be.
-const CAUTION: f64 = 0.5;
-/// Largest number of halvings at once.
-const MOST_HALVINGS: usize = 6;
-
 /// Cuts boxes whose shares of the region are given with them, until each is decided, or time, the number of boxes or a flag ends the search.
-pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options<'_>) -> Found {
+pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &CertificateOptions<'_>) -> Found {
     let deadline = Instant::now().checked_add(Duration::try_from_secs_f64(options.seconds).unwrap_or(Duration::MAX));
     let goes_on = || {
         let stopped = options.stop.is_some_and(|stop| stop.load(atomic::Ordering::Relaxed));
@@ -118,7 +110,7 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
         queue.push(Waiting { node: found.tree.add(), bounds, share, halvings: f64::INFINITY });
     }
     while !queue.is_empty() && found.boxes < options.boxes {
-        let room = CHUNK.min(options.boxes - found.boxes);
+        let room = BOXES_AT_A_TIME.min(options.boxes - found.boxes);
         let chunk: Vec<Waiting> = std::iter::from_fn(|| queue.pop()).take(room).collect();
         let spectra = evaluate(source, &chunk, options.threads, &goes_on);
         let ended = !goes_on();
@@ -160,7 +152,7 @@ fn evaluate(
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Option<Spectrum>> {
     // A few parts per thread: some are slower than others.
-    let share = chunk.len().div_ceil(threads.clamp(1, CHUNK) * 4).max(1);
+    let share = chunk.len().div_ceil(threads.clamp(1, BOXES_AT_A_TIME) * 4).max(1);
     let parts: Vec<&[Waiting]> = chunk.chunks(share).collect();
     let evaluated = in_order(&parts, threads, |boxes| {
         let mut spectra: Vec<Option<Spectrum>> = boxes.iter().map(|_| None).collect();
@@ -250,10 +242,10 @@ impl<'a> Cut<'a> {
     /// Number of halvings before a part of the box is evaluated.
     fn times(&self, share: f64) -> usize {
         let halvings = self.spectrum.halvings;
-        if share.log2() > LARGE || !halvings.is_finite() {
+        if share.log2() > LARGE_BOX || !halvings.is_finite() {
             1
         } else {
-            ((CAUTION * halvings) as usize).clamp(1, MOST_HALVINGS)
+            ((HALVING_CAUTION * halvings) as usize).clamp(1, MOST_HALVINGS)
         }
     }
 }
@@ -317,7 +309,7 @@ impl Found {
         source: &dyn Enclose,
         waiting: &Waiting,
         spectrum: &Spectrum,
-        options: &Options<'_>,
+        options: &CertificateOptions<'_>,
     ) {
         if self.witness.is_some() {
             return;
@@ -339,7 +331,7 @@ impl Found {
     }
 }
 
-impl Options<'_> {
+impl CertificateOptions<'_> {
     fn verdict(&self, spectrum: &Spectrum) -> Verdict {
         let Some((positive, negative)) = spectrum.inertia else { return Verdict::Open };
         let (least, most) = spectrum.condition;

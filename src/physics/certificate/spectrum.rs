@@ -2,9 +2,10 @@
 
 use super::arena::Arena;
 use super::form;
-use super::form::{Basis, MOST_DEGREE};
+use super::form::Basis;
 use super::interval::Interval;
 use super::number::Number;
+use super::thresholds::MOST_POLYNOMIAL_DEGREE;
 use crate::lagrangian::Lagrangian;
 use crate::linalg::{Workspace, eigh};
 use crate::scalar::Scalar;
@@ -83,9 +84,9 @@ impl MatrixForms {
         let (polynomials, distance) = self.split();
         let whole = self.rotated(&vectors);
         // Growth with the sides, by degree, in the row in which it is largest.
-        let mut growth = [0.0; MOST_DEGREE + 2];
+        let mut growth = [0.0; MOST_POLYNOMIAL_DEGREE + 2];
         for k in 0..n {
-            let mut row = [0.0; MOST_DEGREE + 2];
+            let mut row = [0.0; MOST_POLYNOMIAL_DEGREE + 2];
             for l in 0..n {
                 let (element, scale) = (whole.element(k, l), weights[k] * weights[l]);
                 for monomial in 1..basis.count() {
@@ -148,7 +149,7 @@ impl MatrixForms {
     }
 }
 
-/// H/// Number of halvings of every side of a box until `sum_p growth_p` is below 1, if the summands shrink with their powers of the sides.
+/// Number of halvings of every side of a box until `sum_p growth_p` is below 1, if the summands shrink with their powers of the sides.
 fn halvings(growth: &[f64]) -> f64 {
     let at = |side: f64| growth.iter().rev().fold(0.0, |sum, x| sum * side + x);
     // Not a number is not below.

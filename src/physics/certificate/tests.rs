@@ -142,8 +142,8 @@ pub(super) fn formula(text: &str) -> crate::lagrangian::ExpressionLagrangian {
     crate::lagrangian::ExpressionLagrangian::new(&["x", "y"], &[], text).unwrap()
 }
 
-pub(super) fn limited(signature: Signature, boxes: usize) -> Options<'static> {
-    Options { boxes, seconds: 1e9, ..Options::new(signature) }
+pub(super) fn limited(signature: Signature, boxes: usize) -> CertificateOptions<'static> {
+    CertificateOptions { boxes, seconds: 1e9, ..CertificateOptions::new(signature) }
 }
 
 const DEFINITE: Signature = Signature { positive: 2, negative: 0 };
@@ -161,7 +161,7 @@ fn the_double_pendulum_is_certified_everywhere() {
     assert_eq!(found.verdict(&[4.0, 3.0], &[1.0, -8.0]), Verdict::Open);
     assert_eq!(found.verdict(&[0.1], &[1.0]), Verdict::Open);
     let bounded = |condition| {
-        let options = Options { condition: Some(condition), ..limited(DEFINITE, 20_000) };
+        let options = CertificateOptions { condition: Some(condition), ..limited(DEFINITE, 20_000) };
         certify_system(&configured, &region, &options).unwrap()
     };
     let within = bounded(6.9);
@@ -297,7 +297,7 @@ fn a_raised_flag_ends_a_search_with_what_it_has() {
     let model = network(architecture(ActivationChoice::Gelu, Structure::BlackBox), 17);
     let region = Bounds::uniform(2, (0.0, 6.2), (-2.0, 2.0));
     let stop = AtomicBool::new(true);
-    let options = Options { stop: Some(&stop), threads: 2, ..limited(DEFINITE, usize::MAX) };
+    let options = CertificateOptions { stop: Some(&stop), threads: 2, ..limited(DEFINITE, usize::MAX) };
     let found = certify_network(&model, &region, &options).unwrap();
     assert!(found.boxes <= 2 && found.open > 0.0, "{found:?}");
     assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
@@ -319,7 +319,7 @@ fn structures_are_certified_by_construction() {
         assert_eq!((found.certified, found.open, found.boxes, found.by_construction), (1.0, 0.0, 0, true));
         assert!(matches!(found.verdict(&[1.0, 0.0], &[0.0, 0.0]), Verdict::Certified { .. }));
         // A condition number has to be enclosed.
-        let options = Options { condition: Some(1e4), ..limited(signature, 4000) };
+        let options = CertificateOptions { condition: Some(1e4), ..limited(signature, 4000) };
         let bounded = certify_network(&model, &region, &options).unwrap();
         assert!(bounded.by_construction && bounded.boxes > 0 && bounded.certified > 0.9, "{bounded:?}");
         assert!(bounded.condition.unwrap() <= 1e4);
@@ -337,7 +337,7 @@ fn threads_and_turns_change_nothing() {
     let model = network(shape, 19);
     let certified = |positions: (f64, f64), threads: usize| {
         let region = Bounds { positions: vec![positions, (-0.2, 0.2)], velocities: vec![(-0.2, 0.2); 2] };
-        certify_network(&model, &region, &Options { threads, ..limited(DEFINITE, 3000) }).unwrap()
+        certify_network(&model, &region, &CertificateOptions { threads, ..limited(DEFINITE, 3000) }).unwrap()
     };
     // No more threads are started than there are boxes.
     let many = certified((1.0, 2.0), usize::MAX);
@@ -364,18 +364,23 @@ fn threads_and_turns_change_nothing() {
 fn what_does_not_fit_is_refused() {
     let lagrangian = formula("x_dot^2 + y_dot^2");
     let region = Bounds::uniform(2, (-1.0, 1.0), (-1.0, 1.0));
-    let error = |region: &Bounds, options: Options| certify::<_, f64>(&lagrangian, &[], region, &options).unwrap_err();
-    let options = Options::new(DEFINITE);
+    let error = |region: &Bounds, options: CertificateOptions| {
+        certify::<_, f64>(&lagrangian, &[], region, &options).unwrap_err()
+    };
+    let options = CertificateOptions::new(DEFINITE);
     let short = Bounds { velocities: vec![(0.0, 1.0)], ..region.clone() };
     assert_eq!(error(&short, options).to_string(), "expected bounds of 2 velocities, found 1");
     for bad in [(1.0, -1.0), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
         let wrong = Bounds { positions: vec![(0.0, 1.0), bad], ..region.clone() };
         assert!(matches!(error(&wrong, options), CertificateError::Bounds { what: "coordinate", index: 1, .. }));
     }
-    let three = Options::new(Signature { positive: 2, negative: 1 });
+    let three = CertificateOptions::new(Signature { positive: 2, negative: 1 });
     assert!(matches!(error(&region, three), CertificateError::Signature { expected: 2, .. }));
     for bad in [0.5, f64::NAN] {
-        assert!(matches!(error(&region, Options { condition: Some(bad), ..options }), CertificateError::Condition(_)));
+        assert!(matches!(
+            error(&region, CertificateOptions { condition: Some(bad), ..options }),
+            CertificateError::Condition(_)
+        ));
     }
     // A point is a region.
     let point = Bounds::uniform(2, (0.5, 0.5), (0.0, 0.0));

@@ -9,27 +9,16 @@
 //!
 //! The distances `m` at which the noise is still visible separate the three.
 
+use super::thresholds::{
+    ALLOWED_MISFIT, COLOURED_MISFIT, COMPARED_DISTANCES, EXACT_ROUNDINGS, LEAST_DIFFERENCES, MOST_AUTOCORRELATION,
+    MOST_MOTION_SQUARE,
+};
 use crate::recording::RecordedTrajectory;
 use crate::recording::smooth::Noise;
 
-/// Distances of samples that are compared.
-const DISTANCES: std::ops::RangeInclusive<usize> = 1..=12;
 /// Weights of a fourth difference, and the autocorrelations of its weights.
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const PRODUCTS: [f64; 5] = [70.0, -56.0, 28.0, -8.0, 1.0];
-/// Largest lag-1 autocorrelation of noise; above it, noise and slow motion cannot be separated.
-const MOST: f64 = 0.97;
-/// Decrease of the misfit, in units of its standard deviation, above which noise counts as correlated (`lnn-studies rates --part
-/// constraints`: white noise is called correlated in none of a hundred).
-const PLAIN: f64 = 12.0;
-/// Largest excess of the misfit over the smallest one that is not excluded. The differences at neighbouring distances share samples, so
-/// that the misfit scatters by far more than one unit: with 40 the true variance is included in 15 of 16 recordings with an autocorrelation
-/// of 0.9, with 12 in 11.
-const ALLOWED: f64 = 40.0;
-/// Largest mean square, relative to that at distance 1, at which the noise is visible beside the motion.
-const SEEN: f64 = 40.0;
-/// Smallest number of differences that is used.
-const LEAST: usize = 64;
 
 /// Noise of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,13 +46,13 @@ impl Colour {
             .iter()
             .flat_map(|track| track.q.iter().skip(i).step_by(n))
             .fold(0.0, |most: f64, x| most.max(x.abs()));
-        if !white.resolved || white.sigma <= 16.0 * f64::EPSILON * size {
+        if !white.resolved || white.sigma <= EXACT_ROUNDINGS * f64::EPSILON * size {
             return plain;
         }
         let mut squares: Vec<(usize, f64, f64)> = Vec::new();
-        for m in DISTANCES {
+        for m in COMPARED_DISTANCES {
             let Some((square, count)) = differences(tracks, (n, i), m) else { break };
-            if squares.first().is_some_and(|(_, first, _)| square > SEEN * first) {
+            if squares.first().is_some_and(|(_, first, _)| square > MOST_MOTION_SQUARE * first) {
                 break;
             }
             squares.push((m, square, count));
@@ -72,7 +61,7 @@ impl Colour {
             return plain;
         }
         let white_misfit = fitted(&squares, 0.0).0;
-        let tried: Vec<(f64, f64, f64)> = (1..=(100.0 * MOST) as u32)
+        let tried: Vec<(f64, f64, f64)> = (1..=(100.0 * MOST_AUTOCORRELATION) as u32)
             .map(|k| 0.01 * f64::from(k))
             .map(|rho| {
                 let (misfit, gamma) = fitted(&squares, rho);
@@ -80,11 +69,13 @@ impl Colour {
             })
             .collect();
         let Some(&(least, gamma, rho)) = tried.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return plain };
-        if white_misfit - least <= PLAIN || gamma.sqrt() <= white.sigma {
+        if white_misfit - least <= COLOURED_MISFIT || gamma.sqrt() <= white.sigma {
             return plain;
         }
-        let most =
-            tried.iter().filter(|(misfit, ..)| *misfit <= least + ALLOWED).fold(gamma, |most, tried| most.max(tried.1));
+        let most = tried
+            .iter()
+            .filter(|(misfit, ..)| *misfit <= least + ALLOWED_MISFIT)
+            .fold(gamma, |most, tried| most.max(tried.1));
         Self { sigma: gamma.sqrt(), rho, slack: most / gamma }
     }
 
@@ -105,7 +96,7 @@ fn differences(tracks: &[RecordedTrajectory], (n, i): (usize, usize), m: usize) 
         }
     }
     // White noise has differences whose squares are correlated over about three distances.
-    (count >= LEAST).then(|| (sum / count as f64, count as f64 / 3.0))
+    (count >= LEAST_DIFFERENCES).then(|| (sum / count as f64, count as f64 / 3.0))
 }
 
 /// The misfit of the mean squares for noise with an autocorrelation plus a motion, in units of its standard deviation, and the variance.

@@ -1,15 +1,10 @@
 //! The constraints of a Lagrangian and its degenerate directions.
 
 use super::ConstraintKind;
+use super::thresholds::ZERO_ROUNDINGS;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Usual number of states at which a Lagrangian is examined.
-pub const EXAMINED_STATES: usize = 64;
-
-/// Eigenvalues of a mass matrix within its constraints that are below this many roundings of the largest count as zero.
-const ROUNDINGS: f64 = 1024.0;
 
 /// Constraints and degenerate directions of a Lagrangian.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -83,7 +78,7 @@ pub fn examine(
         }
         let Ok(reduced) = ReducedMass::of(n, &terms.mass_matrix, &terms.constraint_matrix) else { continue };
         examined.states += 1;
-        let open = reduced.null_directions(ROUNDINGS);
+        let open = reduced.null_directions(ZERO_ROUNDINGS);
         examined.open_states += usize::from(!open.is_empty());
         if open.len() > examined.open {
             examined.open = open.len();

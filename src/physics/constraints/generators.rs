@@ -2,6 +2,11 @@
 
 use super::features::Features;
 use super::pencil::{Moments, Pencil};
+use super::thresholds::{
+    HEAVIER_TERM, LEAST_GAP, LEAST_SPARSE_FACTOR, LOWER_DEGREE_PREFERENCE, MOST_HELD_OUT_RATIO, MOST_MULTIPLICATIONS,
+    MOST_TERMS_IN_EIGHTHS, MOST_TERMS_REMOVED_SINGLY, MOST_VARIANCE_RATIO, NOISE_DEVIATIONS, REMOVAL_RISE,
+    REMOVED_SHARES, REWEIGHTING_ROUNDS, STARTS_PER_TERM, UNDETERMINED_FACTOR,
+};
 use super::{ConstraintKind, FoundConstraint, MotionSamples};
 use crate::cancellation::Cancellation;
 use crate::linalg::{Workspace, dot, solve};
@@ -9,26 +14,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A combination whose variance is up to this many times that of its noise counts as vanishing.
-const TAKEN: f64 = 4.0;
-/// Smallest ratio of the deviation of the smallest combination that does not vanish to that of the largest that does.
-const LEAST_GAP: f64 = 2.5;
-/// The same ratio for held-out parts of the data.
-const HOLDS: f64 = 9.0;
-/// A term may be removed if the ratio rises by no more than this over the number of independent samples.
-const RISE: f64 = 30.0;
-/// Shares of the largest weight below which several terms are removed at a time.
-const SHARES: [f64; 5] = [0.1, 0.03, 0.01, 3e-3, 1e-3];
-/// Terms are removed one by one if there are at most this many.
-const FEW: usize = 40;
-/// Preference for pivots of lower degree, which would otherwise not divide terms of higher degree.
-const LOWER: f64 = 1e-3;
-/// Rounds of reweighted least squares, random starts for each term, and largest number of multiplications.
-const REWEIGHTED: usize = 12;
-const FORMS: usize = 4;
-const WORK: usize = 4_000_000_000;
-/// Half-width of the confidence interval of a factor, over the largest factor, above which the factor is not determined.
-const UNDETERMINED: f64 = 0.3;
 /// Quantile of Student's distribution for 95 % and 7 degrees of freedom, from eight parts of the data.
 const STUDENT: f64 = 2.365;
 
@@ -42,20 +27,20 @@ pub struct Limits {
     pub within: f64,
 }
 
-/// Largest deviation of a ratio of variances due to noise alone, in standard deviations.
-const DEVIATIONS: f64 = 3.0;
-
 impl Limits {
     /// Limits for functions of positions, or for rows with measured velocities.
     pub fn of(samples: &MotionSamples) -> Self {
         let (count, independent) = (samples.len().max(1) as f64, samples.independent().max(1.0));
         let scatter = (2.0 / independent + 6.0 / count).sqrt();
-        Self { taken: TAKEN * samples.slack(), within: samples.slack() * (1.0 + DEVIATIONS * scatter) }
+        Self {
+            taken: MOST_VARIANCE_RATIO * samples.slack(),
+            within: samples.slack() * (1.0 + NOISE_DEVIATIONS * scatter),
+        }
     }
 
     /// Limits for rows with smoothed velocities, whose errors are less well known.
     pub fn of_smoothed() -> Self {
-        Self { taken: TAKEN, within: TAKEN }
+        Self { taken: MOST_VARIANCE_RATIO, within: MOST_VARIANCE_RATIO }
     }
 }
 
@@ -118,7 +103,7 @@ impl<'a> Vanishing<'a> {
         (shared, limits): (f64, Limits),
     ) -> Self {
         let p = features.len();
-        let moments = Moments::of(samples, features, if p > 300 { 4 } else { 8 });
+        let moments = Moments::of(samples, features, if p > MOST_TERMS_IN_EIGHTHS { 4 } else { 8 });
         let whole = moments.pencil(centred, |_| true);
         let independent = samples.len() as f64 / shared;
         let (levels, leading) = (Vec::new(), Vec::new());
@@ -155,7 +140,9 @@ impl<'a> Vanishing<'a> {
         let count = if gap.is_some_and(|gap| gap < LEAST_GAP) { 0 } else { count };
         let mut rows: Vec<Vec<f64>> =
             combinations.chunks_exact(terms.len().max(1)).take(count).map(<[f64]>::to_vec).collect();
-        let highest = |&term: &usize| if self.centred || self.features.degree(term) == degree { 1.0 } else { LOWER };
+        let highest = |&term: &usize| {
+            if self.centred || self.features.degree(term) == degree { 1.0 } else { LOWER_DEGREE_PREFERENCE }
+        };
         let pivots = reduce(&mut rows, &terms.iter().map(highest).collect::<Vec<f64>>());
         Level { degree, terms, rows, pivots, gap }
     }
@@ -202,8 +189,8 @@ impl Level {
     /// Starts of the search for combinations of few terms, up to the requested number.
     fn starts(&self) -> [usize; 2] {
         let (size, count) = (self.rows.len(), self.terms.len());
-        let once = REWEIGHTED * size * size * (count + size);
-        [(WORK / once.max(1)).min(FORMS * count), FORMS * count]
+        let once = REWEIGHTING_ROUNDS * size * size * (count + size);
+        [(MOST_MULTIPLICATIONS / once.max(1)).min(STARTS_PER_TERM * count), STARTS_PER_TERM * count]
     }
 
     /// `true` if the search can use all requested starts.
@@ -222,7 +209,7 @@ impl Level {
             let column: Vec<f64> = self.rows.iter().map(|row| row[lead]).collect();
             let mut weights: Vec<f64> = (0..count).map(|_| rng.random_range(-6.0..0.0f64).exp()).collect();
             let mut factors = vec![0.0; count];
-            for round in 1..=REWEIGHTED {
+            for round in 1..=REWEIGHTING_ROUNDS {
                 let weighted = |a: &[f64], b: &[f64]| -> f64 {
                     a.iter().zip(b).zip(&weights).map(|((a, b), weight)| weight * a * b).sum()
                 };
@@ -240,7 +227,7 @@ impl Level {
                 let least = 0.25_f64.powi(round.min(5) as i32);
                 weights = factors.iter().map(|c| (c * c + least * least).recip()).collect();
             }
-            let support: Vec<usize> = (0..count).filter(|&k| factors[k].abs() > 1e-3).collect();
+            let support: Vec<usize> = (0..count).filter(|&k| factors[k].abs() > LEAST_SPARSE_FACTOR).collect();
             if factors.iter().all(|c| c.is_finite()) && !support.is_empty() && known.insert(support) {
                 found.push(self.terms.iter().copied().zip(factors).collect());
             }
@@ -288,14 +275,14 @@ fn needed(pencil: &Pencil, mut support: Combination, independent: f64, taken: f6
     let terms = |support: &[(usize, f64)]| support.iter().map(|(term, _)| *term).collect::<Vec<_>>();
     let all: Vec<f64> = support.iter().map(|(_, weight)| *weight).collect();
     let start = pencil.on(&terms(&support)).ratio(&all);
-    let allowed = (start + RISE / independent * start.max(1.0)).min(taken);
+    let allowed = (start + REMOVAL_RISE / independent * start.max(1.0)).min(taken);
     let most = |support: &[(usize, f64)]| support.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
     let mut refit = |fewer: Combination| -> Option<Combination> {
         let (ratio, weights) = smallest(pencil, &terms(&fewer)).filter(|_| !fewer.is_empty())?;
         let kept = fewer.iter().zip(weights).map(|(&(term, _), weight)| (term, weight)).collect();
         (ratio <= allowed).then_some(kept)
     };
-    for share in SHARES {
+    for share in REMOVED_SHARES {
         let least = share * most(&support);
         let fewer: Combination = support.iter().copied().filter(|(_, weight)| weight.abs() >= least).collect();
         if let Some(fitted) = refit(fewer) {
@@ -303,7 +290,7 @@ fn needed(pencil: &Pencil, mut support: Combination, independent: f64, taken: f6
             break;
         }
     }
-    if support.len() <= FEW {
+    if support.len() <= MOST_TERMS_REMOVED_SINGLY {
         loop {
             support.sort_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
             match support.get(1..).map(<[_]>::to_vec).filter(|rest| !rest.is_empty()).and_then(&mut refit) {
@@ -344,7 +331,7 @@ fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bo
         let Some((_, scaled, raw)) = fit(&moments.pencil(centred, |other| other != part)) else { continue };
         let left_out = moments.pencil(centred, |other| other == part).on(support);
         let others = over(raw, lead);
-        generator.holds &= left_out.ratio(&scaled) <= HOLDS * limits.taken / TAKEN;
+        generator.holds &= left_out.ratio(&scaled) <= MOST_HELD_OUT_RATIO * limits.taken / MOST_VARIANCE_RATIO;
         squares.iter_mut().zip(others.iter().zip(&weights)).for_each(|(sum, (a, b))| *sum += (a - b) * (a - b));
     }
     for ((&term, weight), square) in support.iter().zip(weights).zip(squares) {
@@ -360,7 +347,7 @@ fn leading(features: &Features, support: &[usize], raw: &[f64]) -> usize {
     let same = (0..support.len()).filter(|&k| features.degree(support[k]) == features.degree(support[first]));
     let same = same.filter(|&k| features.moves(support[k]) == features.moves(support[first]));
     let heaviest = same.max_by(|&a, &b| raw[a].abs().total_cmp(&raw[b].abs())).unwrap_or(first);
-    if raw[heaviest].abs() > 3.0 * raw[first].abs() { heaviest } else { first }
+    if raw[heaviest].abs() > HEAVIER_TERM * raw[first].abs() { heaviest } else { first }
 }
 
 impl Generator {
@@ -387,7 +374,7 @@ impl Generator {
     /// `false` if several combinations of the same terms vanish, so that parts of the data give different ones.
     fn is_determined(&self) -> bool {
         let most = self.weights.iter().fold(0.0, |most: f64, weight| most.max(weight.abs()));
-        self.spread.iter().all(|spread| *spread < UNDETERMINED * most)
+        self.spread.iter().all(|spread| *spread < UNDETERMINED_FACTOR * most)
     }
 
     /// The highest degree of its terms.

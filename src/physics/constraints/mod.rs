@@ -17,10 +17,14 @@ mod samples;
 mod says;
 #[cfg(test)]
 mod tests;
+mod thresholds;
 
 #[doc(hidden)]
-pub use examine::{EXAMINED_STATES, ExaminedLagrangian, examine};
+pub use examine::{ExaminedLagrangian, examine};
 pub use samples::MotionSamples;
+#[doc(hidden)]
+pub use thresholds::EXAMINED_STATES;
+pub(crate) use thresholds::OBEDIENCE;
 
 use crate::cancellation::Cancelled;
 use crate::lagrangian::{ReducedMass, take_out};
@@ -30,27 +34,10 @@ use generators::{Generator, Limits, Vanishing};
 use regular::{branching, phases};
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Largest root mean square distance of smoothed positions from their constraints, in standard deviations of the noise and over the size of
-/// the motion, at which the motion is said to obey them.
-pub(crate) const OBEDIENCE: (f64, f64) = (5.0, 0.01);
-
-/// Largest number of terms that are searched together.
-const MOST_TERMS: usize = 1000;
-/// A row follows from others if the root mean square of its part outside their span is below this share.
-const OUTSIDE: f64 = 0.15;
-/// Share of the states at which a combination must have a part outside the span of the constraints found so far, and the smallest size of that
-/// part: for functions that vanish, and for further candidates, whose noise is larger.
-const IMPOSED: (f64, f64) = (0.1, 0.1);
-const BESIDE: (f64, f64) = (0.5, OUTSIDE);
-/// Number of states at which gradients are compared.
-const PLACES: usize = 64;
-/// Number of states at which functions are tested for independence, which must include one near a place where they depend on each other.
-const MANY_PLACES: usize = 256;
-/// A row of unit length nearly follows from others at a state if its part outside their span is below this.
-const NEARLY: f64 = 0.1;
-/// The curl of a row within its kernel counts as noise below this share of its derivatives.
-const CURL: f64 = 0.03;
+use thresholds::{
+    FURTHER_CANDIDATE, GRADIENT_STATES, IMPROVED_VOLUME, INDEPENDENCE_STATES, LEAST_NEW_PART, LEAST_SQUARED_PART,
+    MOST_CURL, MOST_TERMS, NEARLY_DEPENDENT, NEW_FUNCTION, SAMPLES_PER_TERM, SIMPLER_PART,
+};
 
 /// Options of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,12 +188,12 @@ pub fn find_constraints(
         if found > MOST_TERMS {
             return Err(ConstraintSearchError::Terms { what, found });
         }
-        let needed = 4 * found;
+        let needed = SAMPLES_PER_TERM * found;
         if samples.len() < needed {
             return Err(ConstraintSearchError::Samples { terms: found, found: samples.len(), needed });
         }
     }
-    let mut held = RowsTaken::at(samples, PLACES);
+    let mut held = RowsTaken::at(samples, GRADIENT_STATES);
     let stop = &samples.cancellation;
     stop.stage("functions that vanish");
     let limits = Limits::of(samples);
@@ -216,11 +203,11 @@ pub fn find_constraints(
         cut_short.push("the search for formulas with few terms was stopped early: simpler ones may exist".to_string());
     }
     stop.check()?;
-    let functions = held.take(samples, &of_positions, candidates.clone(), false, IMPOSED);
+    let functions = held.take(samples, &of_positions, candidates.clone(), false, NEW_FUNCTION);
     let gap = vanishing.gap(&functions);
     let functions = independent_everywhere(samples, &of_positions, functions, candidates);
     stop.check()?;
-    let places = samples.places(MANY_PLACES);
+    let places = samples.places(INDEPENDENCE_STATES);
     let functions: Vec<Generator> =
         functions.into_iter().map(|found| found.sized(samples, &of_positions, &places)).collect();
     let (of_angles, functions) = phases(samples, &of_positions, limits, &functions);
@@ -228,7 +215,7 @@ pub fn find_constraints(
     stop.stage("functions that are constant");
     let conserved = if samples.trajectories() > 1 {
         let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, (1.0, limits));
-        held.take(samples, &of_positions, constant.generators().0, false, BESIDE)
+        held.take(samples, &of_positions, constant.generators().0, false, FURTHER_CANDIDATE)
     } else {
         Vec::new()
     };
@@ -237,7 +224,7 @@ pub fn find_constraints(
     stop.stage("rows of velocities");
     let of_rows = if samples.measured() { limits } else { Limits::of_smoothed() };
     let moving = Vanishing::of(samples, &of_velocities, Some(&vanishing), false, (samples.shared(), of_rows));
-    let moving = held.take(samples, &of_velocities, moving.generators().0, true, BESIDE);
+    let moving = held.take(samples, &of_velocities, moving.generators().0, true, FURTHER_CANDIDATE);
     stop.check()?;
     let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
     let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
@@ -312,7 +299,9 @@ impl RowsTaken {
         while taken.len() < rank {
             let parts: Vec<f64> = left.iter().map(|(_, rows)| self.outside(rows)).collect();
             let most = parts.iter().fold(0.0, |most: f64, part| most.max(*part));
-            let Some(next) = parts.iter().position(|part| *part >= 0.5 * most).filter(|_| most >= OUTSIDE) else {
+            let Some(next) =
+                parts.iter().position(|part| *part >= SIMPLER_PART * most).filter(|_| most >= LEAST_NEW_PART)
+            else {
                 break;
             };
             let (generator, rows) = left.remove(next);
@@ -369,7 +358,7 @@ fn independent_everywhere(
     taken: Vec<Generator>,
     candidates: Vec<Generator>,
 ) -> Vec<Generator> {
-    let places = samples.places(MANY_PLACES);
+    let places = samples.places(INDEPENDENCE_STATES);
     // Normalized by their mean size, so that a gradient that vanishes somewhere stays visible.
     let sized = |generator: &Generator| -> Vec<Vec<f64>> {
         let mut rows: Vec<Vec<f64>> =
@@ -379,7 +368,8 @@ fn independent_everywhere(
         rows
     };
     let rows: Vec<Vec<Vec<f64>>> = taken.iter().map(sized).collect();
-    let nearly = (0..places.len()).any(|place| least_part(rows.iter().map(|row| row[place].as_slice())) < NEARLY);
+    let nearly =
+        (0..places.len()).any(|place| least_part(rows.iter().map(|row| row[place].as_slice())) < NEARLY_DEPENDENT);
     if !nearly {
         return taken;
     }
@@ -396,7 +386,7 @@ fn independent_everywhere(
             // A state at which they depend on each other counts, but does not outweigh all others.
             let part = |basis: &[f64], row: &[f64]| {
                 let rest = beside(basis, row);
-                dot(&rest, &rest).max(1e-6)
+                dot(&rest, &rest).max(LEAST_SQUARED_PART)
             };
             for &k in others {
                 volume *= part(&basis, &rows[k][place]);
@@ -421,7 +411,7 @@ fn independent_everywhere(
         let without = |from: usize| [&chosen[..from], &chosen[from + 1..]].concat();
         let of = |from: usize| best(&without(from)).map(|(sum, to)| (sum, from, to));
         match (0..size).filter_map(of).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((sum, from, to)) if sum < 0.999 * least => (least, chosen[from]) = (sum, to),
+            Some((sum, from, to)) if sum < IMPROVED_VOLUME * least => (least, chosen[from]) = (sum, to),
             _ => break,
         }
     }
@@ -468,7 +458,7 @@ fn integrable(
             let places = held.places.iter().zip(&bases);
             let turns: Vec<f64> = places.map(|(&at, rows)| curl(features, samples, at, weights, rows)).collect();
             let turn = (turns.iter().map(|x| x * x).sum::<f64>() / turns.len() as f64).sqrt();
-            if turn >= CURL || features.has_rate(weights) {
+            if turn >= MOST_CURL || features.has_rate(weights) {
                 (*left, lost) = (false, true);
             }
         }

@@ -2,10 +2,8 @@
 
 use super::MotionSamples;
 use super::features::Features;
+use super::thresholds::ROUNDING_SHARE;
 use crate::linalg::{Workspace, dot, eigh};
-
-/// Deviations below this share of a term are rounding.
-pub const FLOOR: f64 = 1e-6;
 
 /// Means of products of terms, of their noise, and of products of their means along trajectories.
 #[derive(Clone, Debug)]
@@ -125,7 +123,7 @@ impl Moments {
                 gram[i * p + j] *= unit;
                 noise[i * p + j] *= unit;
             }
-            noise[i * p + i] += FLOOR * FLOOR;
+            noise[i * p + i] += ROUNDING_SHARE * ROUNDING_SHARE;
         }
         Pencil { terms: p, gram, noise }
     }

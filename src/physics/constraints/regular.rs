@@ -3,19 +3,14 @@
 
 use super::features::Features;
 use super::generators::{Generator, Limits, digits, reduce};
-use super::{ConstraintKind, FoundConstraint, MANY_PLACES, MotionSamples};
+use super::thresholds::{
+    ANGLE_MULTIPLES, BRANCH_RATIO, COMMON_DIRECTIONS, INDEPENDENCE_STATES, ROUNDING_SHARE, VISIBLE_GRADIENT,
+    WHOLE_NUMBER_ERROR,
+};
+use super::{ConstraintKind, FoundConstraint, MotionSamples};
 use crate::linalg::{Workspace, dot, eigh};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
-
-/// Largest integer multiple of an angle that is tried, and the largest deviation of a ratio of gradients from one.
-const MULTIPLES: std::ops::RangeInclusive<u32> = 1..=12;
-const WHOLE: f64 = 0.05;
-/// Share of the gradients that must have the same directions everywhere.
-const ALIKE: f64 = 0.99;
-/// Ratio of the smallest singular value of the gradients to its largest along the motion below which a second branch counts as reached: half of
-/// the value for a motion that crosses a branch with samples a hundredth of a radian apart.
-const BRANCH: f64 = 0.005;
 
 /// Replaces functions of angles alone whose gradients have the same directions everywhere by `sin(k.q - delta)` with integers `k`: `cos(b) -
 /// cos(2a)` has a second branch at every half turn, the sine of `b - 2a` has none. Returns the remaining functions.
@@ -38,11 +33,11 @@ pub(super) fn phases(
 /// Integer multiples of the coordinates that span the gradients of some functions everywhere, if they exist.
 fn directions(samples: &MotionSamples, features: &Features, functions: &[&Generator]) -> Option<Vec<Vec<i32>>> {
     let (n, mut mean, mut count) = (samples.n(), vec![0.0; samples.n() * samples.n()], 0.0);
-    for at in samples.places(MANY_PLACES) {
+    for at in samples.places(INDEPENDENCE_STATES) {
         let rows = functions.iter().map(|function| {
             let row = features.gradient(samples, at, &function.weights);
             // Where a gradient nearly vanishes, its direction is noise.
-            let seen = dot(&row, &row) > 1e-2 * function.size().powi(2);
+            let seen = dot(&row, &row) > VISIBLE_GRADIENT * function.size().powi(2);
             if seen { row } else { vec![0.0; n] }
         });
         let rows: Vec<Vec<f64>> = rows.collect();
@@ -55,13 +50,14 @@ fn directions(samples: &MotionSamples, features: &Features, functions: &[&Genera
     mean.iter_mut().for_each(|x| *x /= f64::max(count, 1.0));
     let (mut shares, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
     eigh(n, &mean, &mut shares, &mut vectors, &mut Workspace::new()).ok()?;
-    let alike = |r: &usize| shares[n - r..].iter().sum::<f64>() >= ALIKE;
+    let alike = |r: &usize| shares[n - r..].iter().sum::<f64>() >= COMMON_DIRECTIONS;
     let r = (1..=functions.len().min(n)).find(alike)?;
     let mut rows: Vec<Vec<f64>> = vectors.chunks_exact(n).skip(n - r).map(<[f64]>::to_vec).collect();
     reduce(&mut rows, &vec![1.0; n]);
     let whole = |row: &Vec<f64>| {
-        let near = |s: &u32| row.iter().all(|x| (f64::from(*s) * x - (f64::from(*s) * x).round()).abs() < WHOLE);
-        MULTIPLES.into_iter().find(near).map(|s| row.iter().map(|x| (f64::from(s) * x).round() as i32).collect())
+        let near =
+            |s: &u32| row.iter().all(|x| (f64::from(*s) * x - (f64::from(*s) * x).round()).abs() < WHOLE_NUMBER_ERROR);
+        ANGLE_MULTIPLES.into_iter().find(near).map(|s| row.iter().map(|x| (f64::from(s) * x).round() as i32).collect())
     };
     rows.iter().map(whole).collect()
 }
@@ -79,7 +75,7 @@ fn phase(samples: &MotionSamples, limits: Limits, k: &[i32]) -> Option<FoundCons
     let mean = (0..samples.len()).map(off).sum::<f64>() / count;
     let square = (0..samples.len()).map(|at| (off(at) - mean).powi(2)).sum::<f64>() / count;
     let noise: f64 = k.iter().enumerate().map(|(i, k)| (f64::from(*k) * samples.noise(0, i)).powi(2)).sum();
-    let noise = noise + (super::pencil::FLOOR * PI).powi(2);
+    let noise = noise + (ROUNDING_SHARE * PI).powi(2);
     let ratio = square / noise;
     if ratio > limits.taken {
         return None;
@@ -142,6 +138,6 @@ pub(super) fn branching(samples: &MotionSamples, features: &Features, functions:
         }
     }
     let largest = least.iter().map(|(value, _)| *value).fold(0.0, f64::max);
-    least.iter().filter(|(value, _)| *value < BRANCH * largest).for_each(|(_, i)| found[*i] = true);
+    least.iter().filter(|(value, _)| *value < BRANCH_RATIO * largest).for_each(|(_, i)| found[*i] = true);
     found
 }

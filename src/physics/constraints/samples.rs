@@ -1,17 +1,12 @@
 //! States of recorded motion with their noise.
 
 use super::colour::Colour;
+use super::thresholds::{LEAST_MOTION_RATIO, MOST_SAMPLES};
 use crate::cancellation::Cancellation;
 use crate::names::number;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use std::collections::BTreeMap;
-
-/// Largest number of samples that are used, evenly spaced.
-const MOST_SAMPLES: usize = 60_000;
-/// A column moves if its standard deviation along its trajectories exceeds this many standard deviations of its noise. Otherwise it would
-/// vanish itself, and with it every function of it.
-const MOVES: f64 = 2.0;
 
 /// Positions and velocities of trajectories, with standard deviations of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -228,6 +223,7 @@ fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> O
         ));
     }
     // A mean absorbs part of correlated noise.
-    let still = resolved && square <= MOVES * MOVES * noise.sigma.powi(2) * noise.slack * count;
+    let still =
+        resolved && square <= LEAST_MOTION_RATIO * LEAST_MOTION_RATIO * noise.sigma.powi(2) * noise.slack * count;
     still.then(|| format!("moves by no more than twice its noise of {}", number(noise.sigma)))
 }

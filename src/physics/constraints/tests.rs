@@ -103,8 +103,8 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
     let features = Features::of_positions(&samples, 2);
     let vanishing = Vanishing::of(&samples, &features, None, false, (1.0, Limits::of(&samples)));
-    let mut held = RowsTaken::at(&samples, PLACES);
-    let simplest = held.take(&samples, &features, vanishing.generators().0, false, IMPOSED);
+    let mut held = RowsTaken::at(&samples, GRADIENT_STATES);
+    let simplest = held.take(&samples, &features, vanishing.generators().0, false, NEW_FUNCTION);
     let taken = independent_everywhere(&samples, &features, simplest.clone(), vanishing.generators().0);
     assert_eq!((simplest.len(), taken.len()), (6, 6));
     // Orthonormal columns of unit gradients at a turn about the vertical.
@@ -134,7 +134,7 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
         least_part(rows.iter().map(Vec::as_slice))
     };
     let worst = |of: &[Generator]| (1..20).map(|k| least(of, 0.31 * f64::from(k))).fold(f64::INFINITY, f64::min);
-    assert!(worst(&taken) > NEARLY && worst(&simplest) < NEARLY, "{} {}", worst(&simplest), worst(&taken));
+    assert!(worst(&taken) > NEARLY_DEPENDENT && worst(&simplest) < NEARLY_DEPENDENT, "{} {}", worst(&simplest), worst(&taken));
 }
 
 /// A rotation about a fixed point: a point of its third axis, then the ends of all three, seen from there.
@@ -225,7 +225,7 @@ fn a_row_beside_others_is_integrable_by_itself_or_not_at_all() {
     };
     let along = row(&[("cos(theta)*x_dot", 1.0), ("sin(theta)*y_dot", 1.0), ("phi_dot", -0.5)]);
     let across = row(&[("sin(theta)*x_dot", 1.0), ("cos(theta)*y_dot", -1.0)]);
-    let mut held = RowsTaken::at(&samples, PLACES);
+    let mut held = RowsTaken::at(&samples, GRADIENT_STATES);
     let none = held.bases.clone();
     for weights in [&along, &across] {
         assert_eq!(weights.iter().filter(|weight| **weight != 0.0).count(), if weights == &along { 3 } else { 2 });

@@ -1,6 +1,7 @@
 //! Names of constants, shared by equal coefficients, and fractions near them.
 
 use super::found::{FoundFormula, Near};
+use super::thresholds::{CHANCE_FRACTION, CONSTANT_ERRORS, EQUAL_CONSTANTS_ERROR, MOST_DENOMINATOR, MOST_NUMERATOR};
 use super::units::{Dimension, of_coefficient};
 use crate::identification::linear::{inverse, part};
 use crate::linalg::dot;
@@ -39,14 +40,13 @@ impl FoundFormula {
     /// `true` if two coefficients are the same constant or its negative: in the same block, with the same unit, equal within their errors,
     /// and too close for chance.
     fn equal(&self, a: usize, b: usize) -> bool {
-        const ACCIDENT: f64 = 5e-3;
         let (m, [x, y]) = (self.terms.len(), [a, b].map(|k| &self.terms[k]));
         let sign = x.coefficient.signum() * y.coefficient.signum();
         let covariance = |i: usize, j: usize| self.covariance[i * m + j];
         let variance = covariance(a, a) + covariance(b, b) - 2.0 * sign * covariance(a, b);
         let (size, error) = (x.coefficient.abs(), variance.max(0.0).sqrt() + 1e-9 * x.coefficient.abs());
         let same = x.unit.is_some() && x.unit == y.unit && x.dissipation == y.dissipation && x.reference == y.reference;
-        same && error < ACCIDENT * size && (size - y.coefficient.abs()).abs() <= 2.0 * error
+        same && error < EQUAL_CONSTANTS_ERROR * size && (size - y.coefficient.abs()).abs() <= CONSTANT_ERRORS * error
     }
 
     /// The best estimate of a constant and its standard error, from the coefficients that equal it.
@@ -71,12 +71,12 @@ fn near(x: f64, error: f64) -> Option<Near> {
     if !(x.is_finite() && error.is_finite()) {
         return None;
     }
-    let within = (2.0 * error).max(1e-9 * x.abs());
-    for bottom in 1..=12 {
+    let within = (CONSTANT_ERRORS * error).max(1e-9 * x.abs());
+    for bottom in 1..=MOST_DENOMINATOR {
         let top = (x * f64::from(bottom)).round();
         // Fractions with this denominator are 1 / bottom apart: one within the error is rarely there by chance.
-        let rare = within * f64::from(bottom * bottom) < 0.02;
-        if rare && top != 0.0 && top.abs() <= 24.0 && (x - top / f64::from(bottom)).abs() <= within {
+        let rare = within * f64::from(bottom * bottom) < CHANCE_FRACTION;
+        if rare && top != 0.0 && top.abs() <= MOST_NUMERATOR && (x - top / f64::from(bottom)).abs() <= within {
             let fraction = if bottom == 1 { format!("{top}") } else { format!("{top}/{bottom}") };
             let off = x - top / f64::from(bottom);
             return Some(Near { fraction, standard_errors: if error > 0.0 { off / error } else { 0.0 } });

@@ -8,31 +8,15 @@ use super::find::{WeakForm, best};
 use super::function::Function;
 use super::library::{Kind, Library};
 use super::prepared::Prepared;
+use super::thresholds::{
+    BACKGROUND_RANGE, FREQUENCIES_PER_RESOLUTION, INDEPENDENT_FREQUENCIES, LEAST_BACKGROUND, LEAST_DRIVE_PERIODS,
+    MOST_DRIVE_FREQUENCIES, MOST_FALSE_ALARMS, MOST_FREQUENCIES, MOST_REMOVED_EFFECTS, MOST_WINDOW_PHASE,
+};
 use crate::cancellation::Cancellation;
 use crate::linalg::dot;
 use crate::recording::RecordedTrajectory;
 use std::collections::BTreeSet;
 use std::f64::consts::{LN_2, PI, TAU};
-
-/// Smallest number of periods in the longest trajectory.
-pub(super) const LEAST_PERIODS: f64 = 3.0;
-/// Largest product of a frequency and the width of the test functions, which damp faster drives.
-const MOST_DAMPED: f64 = 15.0;
-/// Frequencies that are looked at within the resolution of the recording, and their largest number.
-const OVERSAMPLED: f64 = 4.0;
-const MOST_FREQUENCIES: f64 = 50_000.0;
-/// Distance from a line, in units of the resolution, of the frequencies that show the background spectrum; and their smallest number, in
-/// the same units.
-const BESIDE: [f64; 2] = [2.0, 14.0];
-const LEAST_BESIDE: f64 = 6.0;
-/// Largest rate of false alarms, for all frequencies that are looked at together.
-const MOST_ALARMS: f64 = 1e-3;
-/// Independent frequencies for each unit of the resolution, over which a maximum is taken.
-const INDEPENDENT: f64 = 3.0;
-/// Largest number of frequencies that are tried.
-const MOST_LINES: usize = 3;
-/// Largest number of terms whose effect is removed from the motion first.
-const MOST_REMOVED: usize = 20;
 
 /// The residuals that a library leaves.
 pub(super) struct Rest {
@@ -112,7 +96,7 @@ impl Rest {
         let set: Vec<usize> = (0..coefficients.len()).filter(|&at| coefficients[at] != 0.0).collect();
         let kept = |at: &usize| quotient.kept[*at];
         let still = |at: &usize| library.kinetic(kept(at)).is_none();
-        let mut removed: Vec<usize> = path.order.iter().copied().filter(still).take(MOST_REMOVED).collect();
+        let mut removed: Vec<usize> = path.order.iter().copied().filter(still).take(MOST_REMOVED_EFFECTS).collect();
         removed.extend(set.iter().filter(|at| still(at) && !path.order.contains(at)));
         let shaken: Vec<usize> = library
             .driven()
@@ -141,7 +125,7 @@ impl Rest {
         let ends = [times.iter().copied().fold(f64::INFINITY, f64::min), times.iter().copied().fold(0.0, f64::max)];
         let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
         let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
-        let band = [TAU * LEAST_PERIODS / longest, (MOST_DAMPED / data.width().0).min(PI / apart)];
+        let band = [TAU * LEAST_DRIVE_PERIODS / longest, (MOST_WINDOW_PHASE / data.width().0).min(PI / apart)];
         let resolution = [TAU / longest, TAU / (ends[1] - ends[0]).max(longest)];
         Self { times, driven, band, resolution }
     }
@@ -153,7 +137,9 @@ impl Rest {
         lines.sort_by(|(a, _), (b, _)| a.alarms.total_cmp(&b.alarms));
         let mut apart: Vec<Line> = Vec::new();
         for (line, width) in lines {
-            if apart.len() < MOST_LINES && apart.iter().all(|own| (own.frequency - line.frequency).abs() >= width) {
+            if apart.len() < MOST_DRIVE_FREQUENCIES
+                && apart.iter().all(|own| (own.frequency - line.frequency).abs() >= width)
+            {
                 apart.push(line);
             }
         }
@@ -163,7 +149,7 @@ impl Rest {
     /// The most significant line; `None` if none stands out.
     fn line(&self, stop: &Cancellation) -> Option<Line> {
         let [low, high] = self.band;
-        let step = self.resolution[1] / OVERSAMPLED;
+        let step = self.resolution[1] / FREQUENCIES_PER_RESOLUTION;
         let count = (high - low) / step;
         if !(2.0..MOST_FREQUENCIES).contains(&count) {
             return None;
@@ -173,7 +159,7 @@ impl Rest {
         if powers.len() < grid.len() {
             return None;
         }
-        let tests = INDEPENDENT * (high - low) / self.resolution[1] * self.driven.len() as f64;
+        let tests = INDEPENDENT_FREQUENCIES * (high - low) / self.resolution[1] * self.driven.len() as f64;
         let of = |k: usize| {
             let own: Vec<f64> = powers.iter().map(|powers| powers[k]).collect();
             let peak = (0..own.len()).max_by(|&a, &b| own[a].total_cmp(&own[b]))?;
@@ -182,7 +168,7 @@ impl Rest {
             Some(Line { frequency: self.refined(k, [grid[peak] - step, grid[peak] + step]), alarms })
         };
         let lines = (0..self.driven.len()).filter_map(of);
-        lines.min_by(|a, b| a.alarms.total_cmp(&b.alarms)).filter(|line| line.alarms < MOST_ALARMS)
+        lines.min_by(|a, b| a.alarms.total_cmp(&b.alarms)).filter(|line| line.alarms < MOST_FALSE_ALARMS)
     }
 
     /// Reduction of the sum of squares by a drive of each kind at a frequency.
@@ -194,12 +180,12 @@ impl Rest {
     /// Probability of a power as large as that at a peak, from the median of `k` powers beside it: `(1 + z/k)^-k` for a power of `z` times
     /// their mean, if all are exponentially distributed. `None` if there are too few.
     fn chance(&self, grid: &[f64], powers: &[f64], peak: usize) -> Option<f64> {
-        let [from, to] = BESIDE.map(|units| units * self.resolution[0]);
+        let [from, to] = BACKGROUND_RANGE.map(|units| units * self.resolution[0]);
         let is_beside = |om: &f64| (from..to).contains(&(om - grid[peak]).abs());
         let mut beside: Vec<f64> = grid.iter().zip(powers).filter(|(om, _)| is_beside(om)).map(|(_, p)| *p).collect();
         beside.sort_by(f64::total_cmp);
         let count = beside.len() as f64 * (grid[1] - grid[0]) / self.resolution[0];
-        let mean = beside.get(beside.len() / 2).filter(|_| count >= LEAST_BESIDE)? / LN_2;
+        let mean = beside.get(beside.len() / 2).filter(|_| count >= LEAST_BACKGROUND)? / LN_2;
         Some((-count * (powers[peak] / mean / count).ln_1p()).exp())
     }
 

@@ -1,20 +1,16 @@
 //! Why motion that a formula with a drive fits may have another reason.
 
-use super::drive::{LEAST_PERIODS, longest};
+use super::drive::longest;
 use super::function::{Factor, Function};
 use super::library::{Kind, Library};
 use super::motion::{Model, Motion};
 use super::prepared::Prepared;
+use super::thresholds::{
+    LEAST_COMPARED_SAMPLES, LEAST_DRIVE_PERIODS, MOST_DRIVEN_TERMS, MOST_PERIOD_DIFFERENCE, MOST_REPEATED_PERIODS,
+};
 use crate::identification::Between;
 use crate::names::rounded;
 use std::f64::consts::TAU;
-
-/// Largest difference of motion a period later, over its spread times the root of two, at which it repeats; and of how many periods it may.
-const REPEATED: f64 = 0.02;
-const MOST_REPEATED: usize = 4;
-/// Largest number of terms of a law with a drive, whose frequency is fitted too: for two nearly linear coordinates outside the libraries, 24 terms
-/// fitted one recording in ten; laws with a drive in the same study have up to 7 (`lnn-studies rates --part drives`).
-const MOST_TERMS: usize = 12;
 
 /// Reasons why a model with a drive may not be the law of the motion that it fits.
 pub(super) fn drive_doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
@@ -22,19 +18,19 @@ pub(super) fn drive_doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
     let period = TAU / model.frequency.abs();
     let mut doubts = Vec::new();
     let periods = longest(data) / period;
-    if periods < LEAST_PERIODS {
+    if periods < LEAST_DRIVE_PERIODS {
         let periods = rounded(periods, 2);
         doubts.push(format!(
             "the longest trajectory has {periods} periods of the drive: too few to tell that it is periodic"
         ));
     }
-    if let Some(count) = (1..=MOST_REPEATED).find(|&count| repeats(data, count as f64 * period)) {
+    if let Some(count) = (1..=MOST_REPEATED_PERIODS).find(|&count| repeats(data, count as f64 * period)) {
         let periods = if count == 1 { "period".to_string() } else { format!("{count} periods") };
         doubts.push(format!(
             "the motion repeats itself after each {periods} of the drive: a system that oscillates by itself moves in the same way"
         ));
     }
-    if model.terms.len() > MOST_TERMS {
+    if model.terms.len() > MOST_DRIVEN_TERMS {
         let count = model.terms.len();
         doubts.push(format!("it has {count} terms and a drive: so many may follow the motion of another law as well"));
     }
@@ -91,7 +87,7 @@ fn repeats(data: &Prepared<'_>, after: f64) -> bool {
     }
     let same = |i: usize| {
         let noise = 2.0 * data.sigma[i].powi(2);
-        squares[i] / count - noise < 2.0 * (REPEATED * data.spread[i]).powi(2)
+        squares[i] / count - noise < 2.0 * (MOST_PERIOD_DIFFERENCE * data.spread[i]).powi(2)
     };
-    count >= 10.0 && (0..n).all(same)
+    count >= LEAST_COMPARED_SAMPLES && (0..n).all(same)
 }

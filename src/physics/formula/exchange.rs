@@ -1,28 +1,15 @@
 //! Exchanges of terms after convergence: one candidate replaces one to four terms of the formula.
 
 use super::motion::{BlockSum, Model, inflation, total};
-use super::search::{Search, THRESHOLD};
-use super::wald::RIDGE;
+use super::search::Search;
+use super::thresholds::{
+    CHOICES_AFTER_EXCHANGE, EXCHANGE_ROUNDS, MOST_CHECKED_EXCHANGES, MOST_EXCHANGE_COST, MOST_EXCHANGE_SQUARE,
+    MOST_EXCHANGES, MOST_REPLACED_TERMS, RIDGE, TERM_COST, USUAL_EXCHANGES,
+};
 use crate::identification::Segment;
 use crate::identification::linear::{inverse_with, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
-
-/// Number of exchanges that are fitted to the motion in each round: the usual number, and the largest one if others promise more than the best
-/// of them gains.
-const TRIED: usize = 3;
-const MOST_TRIED: usize = 10;
-/// Largest number of rounds of exchanges.
-const ROUNDS: usize = 4;
-/// Largest number of exchanges whose mass matrices are checked.
-const LOOKED_AT: usize = 100;
-/// Mean square of the residuals above which a formula is too far from the motion for exchanges.
-const FAR: f64 = 100.0;
-/// Largest cost of an exchange that is considered, in units of the noise variance: the linear estimate is not reliable beyond.
-const WITHIN: f64 = 10.0 * THRESHOLD;
-/// Largest number of choices of terms after an exchange, and of terms that one candidate replaces.
-const CHOICES: usize = 2;
-const MOST_GONE: usize = 4;
 
 /// Another choice of terms and its additional cost: the sum of squares over the noise variance, plus a threshold for every term.
 #[derive(Clone, Debug)]
@@ -40,20 +27,20 @@ impl Search<'_> {
         blocks: &mut BTreeMap<usize, BlockSum>,
     ) -> Option<Exchanged> {
         let mut rival: Option<Exchanged> = None;
-        for _ in (0..ROUNDS).take_while(|_| self.motion.data.cancellation.go_on()) {
+        for _ in (0..EXCHANGE_ROUNDS).take_while(|_| self.motion.data.cancellation.go_on()) {
             let Some((proposals, noise)) = self.proposals(model, segments, blocks) else { break };
             let before = self.motion.settle(model, segments, 1).0;
             let mut best: Option<(Exchanged, Vec<Segment>)> = None;
             rival = None;
             for (at, proposal) in proposals.into_iter().enumerate() {
                 let gained = best.as_ref().map_or(0.0, |(best, _)| best.cost.min(0.0));
-                if at >= MOST_TRIED || (at >= TRIED && proposal.cost >= gained) {
+                if at >= MOST_EXCHANGES || (at >= USUAL_EXCHANGES && proposal.cost >= gained) {
                     rival = Some(proposal);
                     break;
                 }
                 let mut tried = proposal.model;
                 let mut starts = segments.clone();
-                for rounds in [0, CHOICES] {
+                for rounds in [0, CHOICES_AFTER_EXCHANGE] {
                     // With all terms, and without those that the exchange has made superfluous.
                     self.converge(&mut tried, &mut starts, rounds);
                     if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
@@ -61,7 +48,7 @@ impl Search<'_> {
                     }
                     let square = self.motion.settle(&tried, &mut starts, 1).0;
                     let longer = tried.terms.len() as f64 - model.terms.len() as f64;
-                    let cost = (square - before) / noise + THRESHOLD * longer;
+                    let cost = (square - before) / noise + TERM_COST * longer;
                     let better = best.as_ref().is_none_or(|(best, _)| cost < best.cost);
                     if better && self.regular(model, (&tried.terms, &tried.coefficients)) {
                         best = Some((Exchanged { model: tried.clone(), cost }, starts.clone()));
@@ -92,7 +79,7 @@ impl Search<'_> {
     ) -> Option<(Vec<Exchanged>, f64)> {
         let m = self.candidates.len();
         let mut sum = total(blocks, &|_| 1.0);
-        if sum.square > FAR * sum.count {
+        if sum.square > MOST_EXCHANGE_SQUARE * sum.count {
             return None;
         }
         self.motion.pin(model, &self.candidates, segments, &mut sum);
@@ -113,16 +100,16 @@ impl Search<'_> {
             let Some(inverse) = inverse_with(size, &part(m, &sum.matrix, &longer), RIDGE) else { continue };
             let x = times(size, &inverse, &pick(&longer));
             let gained = dot(&x, &pick(&longer)) - gain;
-            let most = gained + noise * (WITHIN + (MOST_GONE - 1) as f64 * THRESHOLD);
+            let most = gained + noise * (MOST_EXCHANGE_COST + (MOST_REPLACED_TERMS - 1) as f64 * TERM_COST);
             for (lost, gone) in removals(&inverse, &x, most) {
-                let cost = (lost - gained) / noise + THRESHOLD * (1.0 - gone.len() as f64);
+                let cost = (lost - gained) / noise + TERM_COST * (1.0 - gone.len() as f64);
                 let column = |k: usize| gone.iter().map(|&g| inverse[k * size + g]).collect::<Vec<f64>>();
                 let Some(pivot) = inverse_with(gone.len(), &part(size, &inverse, &gone), 0.0) else { continue };
                 let away = times(gone.len(), &pivot, &gone.iter().map(|&g| x[g]).collect::<Vec<f64>>());
                 let left: Vec<usize> = (0..size).filter(|k| !gone.contains(k)).collect();
                 let terms: Vec<usize> = left.iter().map(|&k| self.candidates[longer[k]]).collect();
                 let coefficients: Vec<f64> = left.iter().map(|&k| x[k] - dot(&column(k), &away)).collect();
-                if cost < WITHIN {
+                if cost < MOST_EXCHANGE_COST {
                     let model = Model { terms, coefficients, frequency: model.frequency };
                     proposals.push(Exchanged { model, cost });
                 }
@@ -130,7 +117,10 @@ impl Search<'_> {
         }
         proposals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let regular = |tried: &Exchanged| self.regular(model, (&tried.model.terms, &tried.model.coefficients));
-        Some((proposals.into_iter().take(LOOKED_AT).filter(regular).take(MOST_TRIED + 1).collect(), noise))
+        Some((
+            proposals.into_iter().take(MOST_CHECKED_EXCHANGES).filter(regular).take(MOST_EXCHANGES + 1).collect(),
+            noise,
+        ))
     }
 }
 
@@ -145,7 +135,7 @@ fn removals(inverse: &[f64], x: &[f64], most: f64) -> Vec<(f64, Vec<usize>)> {
     // Removing more terms never costs less than removing one of them.
     let mut found: Vec<(f64, Vec<usize>)> = Vec::new();
     let mut last: Vec<Vec<usize>> = vec![Vec::new()];
-    for _ in 0..MOST_GONE {
+    for _ in 0..MOST_REPLACED_TERMS {
         let mut next = Vec::new();
         for gone in &last {
             let from = gone.last().map_or(0, |last| last + 1);

@@ -3,6 +3,7 @@
 use super::families::Families;
 use super::function::{Factor, Function};
 use super::library::{Kind, Library, Term};
+use super::thresholds::{MOST_DRIVEN_COMPLEXITY, MOST_FRICTION_COMPLEXITY};
 use crate::names::rounded;
 
 /// Dissipation functions of a library.
@@ -14,10 +15,6 @@ pub(super) enum Friction {
     /// `v_i v_j f(q)` with simple functions.
     OfPosition,
 }
-
-/// Largest complexity of a function that multiplies a term of a dissipation function, or a drive: of a square, or the sine of an angle.
-const MOST_FRICTION: f64 = 2.5;
-const MOST_DRIVEN: f64 = 2.0;
 
 /// Kinds of terms in a library, besides `v_i v_j f(q)` and `f(q)`.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +56,7 @@ impl Library {
         let within = |f: &Function| match friction {
             Friction::None => false,
             Friction::Constant => f.is_one(),
-            Friction::OfPosition => f.complexity() <= MOST_FRICTION,
+            Friction::OfPosition => f.complexity() <= MOST_FRICTION_COMPLEXITY,
         };
         for function in (0..self.functions.len()).filter(|&k| within(&self.functions[k])) {
             let pairs = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
@@ -87,7 +84,7 @@ impl Library {
     /// Functions that a drive may multiply.
     pub(super) fn driven(&self) -> Vec<Function> {
         let mut all: Vec<Function> = (0..self.n()).map(Function::coordinate).collect();
-        let simple = |f: &&Function| f.is_smooth() && !f.is_one() && f.complexity() <= MOST_DRIVEN;
+        let simple = |f: &&Function| f.is_smooth() && !f.is_one() && f.complexity() <= MOST_DRIVEN_COMPLEXITY;
         let shaken = self.functions.iter().filter(simple).filter(|f| !all.contains(f)).cloned().collect::<Vec<_>>();
         all.extend(shaken);
         all

@@ -2,9 +2,7 @@
 
 use super::error::FormulaError;
 use super::function::{Factor, Function};
-
-/// Highest degree of a family.
-const MOST_DEGREE: usize = 6;
+use super::thresholds::MOST_FAMILY_DEGREE;
 
 /// Which functions of the coordinates a library is made of, by family and total degree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,8 +100,8 @@ impl std::str::FromStr for Families {
                     return Err(crate::names::unknown("family", family, known));
                 }
             };
-            let degree = degree.trim().parse().ok().filter(|degree| *degree <= MOST_DEGREE);
-            *place = degree.ok_or_else(|| format!("{family}: expected a degree from 0 to {MOST_DEGREE}"))?;
+            let degree = degree.trim().parse().ok().filter(|degree| *degree <= MOST_FAMILY_DEGREE);
+            *place = degree.ok_or_else(|| format!("{family}: expected a degree from 0 to {MOST_FAMILY_DEGREE}"))?;
         }
         Ok(families)
     }

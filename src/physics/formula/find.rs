@@ -9,10 +9,14 @@ use super::function::Notation;
 use super::judged::Judged;
 use super::library::{Library, Values};
 use super::motion::{Model, Motion};
-use super::prepared::{LEAST_SAMPLES, Prepared};
+use super::prepared::Prepared;
 use super::quotient::Quotient;
-use super::search::{Search, THRESHOLD, covariance, left_over, shorten};
+use super::search::{Search, covariance, left_over, shorten};
 use super::select::{Choice, Path, eliminate_backward};
+use super::thresholds::{
+    BLOCKS_PER_HELD_OUT, DEFINITE_ERROR, LEAST_SAMPLES, LONG_SEGMENT_RESIDUAL, MOST_FITTED_TERMS, MOST_STARTING_TERMS,
+    OTHER_STARTING_CHOICES, REGULAR_STATES, ROUNDS_OF_CHOICE, SEGMENT_PACES, STARTING_ERROR, TERM_COST,
+};
 use super::weak::Windows;
 use crate::cancellation::Cancellation;
 use crate::identification::{Between, Segment};
@@ -78,23 +82,6 @@ impl Default for FormulaOptions {
     }
 }
 
-/// Largest number of bootstrap samples.
-pub const MOST_BOOTSTRAPS: usize = 10_000;
-/// One block in this many is held out.
-const HELD_OUT: usize = 5;
-/// Largest number of terms that are fitted to the motion.
-const MOST_CANDIDATES: usize = 60;
-/// Largest number of terms with which the search through the motion starts.
-const MOST_START: usize = 15;
-/// Largest error of accelerations, over the smallest of all choices, of a shorter choice that may be the start.
-const START_ERROR: f64 = 1.3;
-/// The largest such error of a choice with a positive definite mass matrix if no closer choice has one, and of other choices, tried if the
-/// first gives no formula; and the number of the latter.
-const DEFINITE_ERROR: f64 = 3.0;
-const OTHER_STARTS: usize = 2;
-/// Largest number of choices of terms that are fitted to the motion.
-const ROUNDS: usize = 6;
-
 /// A library with the results of the weak form for its terms.
 pub(super) struct WeakForm {
     pub library: Library,
@@ -145,14 +132,14 @@ impl WeakForm {
             stop.check()?;
             let apart = eliminate(&windows.apart(&alone), &data.speeds);
             let Some(choice) = best(&apart) else { break };
-            if best(&path).is_none_or(|whole| judged(choice) <= START_ERROR * judged(whole)) {
+            if best(&path).is_none_or(|whole| judged(choice) <= STARTING_ERROR * judged(whole)) {
                 path = apart.before(path);
                 break;
             }
             let errors = |choice: &Choice| windows.errors_by_coordinate(&choice.coefficients, &data.sigma);
             let (own, whole) = (errors(choice), best(&path).map(errors).unwrap_or_default());
             let before = alone.len();
-            alone.retain(|&i| whole.get(i).is_none_or(|whole| own[i] <= START_ERROR * whole));
+            alone.retain(|&i| whole.get(i).is_none_or(|whole| own[i] <= STARTING_ERROR * whole));
             if alone.len() == before || alone.len() + 1 >= data.n {
                 break;
             }
@@ -201,15 +188,15 @@ impl WeakForm {
             coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
             frequency: library.drive.as_ref().map_or(0.0, |drive| drive.frequency),
         };
-        let mut candidates: Vec<usize> = self.path.order.iter().take(MOST_CANDIDATES).map(|&k| kept[k]).collect();
+        let mut candidates: Vec<usize> = self.path.order.iter().take(MOST_FITTED_TERMS).map(|&k| kept[k]).collect();
         candidates.extend(model.terms.iter().filter(|k| !candidates.contains(k)).copied().collect::<Vec<_>>());
         candidates.sort_unstable();
         let between = options.between.unwrap_or(Between::Linear);
         let motion = Motion { library, data, substeps: 1, between, threads: options.threads };
-        let short = data.segments(2.5 * data.pace);
+        let short = data.segments(SEGMENT_PACES * data.pace);
         let (mut judges, mut learned): (Vec<Segment>, Vec<Segment>) =
             short.into_iter().partition(|s| held.contains(&data.block_of(s)));
-        let states = learned.iter().step_by(learned.len().div_ceil(60).max(1)).map(|s| {
+        let states = learned.iter().step_by(learned.len().div_ceil(REGULAR_STATES).max(1)).map(|s| {
             let mut values = Values::new();
             let all: Vec<usize> = (0..library.functions.len()).collect();
             library.evaluate(&all, (&s.start[..data.n], 0.0), &mut values);
@@ -220,7 +207,7 @@ impl WeakForm {
         stop.stage("short segments");
         search.motion.settle(&model, &mut learned, 4);
         search.motion.choose_steps(&model, &learned);
-        search.converge(&mut model, &mut learned, ROUNDS);
+        search.converge(&mut model, &mut learned, ROUNDS_OF_CHOICE);
         if options.between.is_none() && data.forced.contains(&true) {
             search.motion.choose_between(&mut model, &mut learned);
         }
@@ -231,9 +218,9 @@ impl WeakForm {
         let short = search.motion.settle(&model, &mut learned, 1);
         let mut learned = data.joined(&learned);
         search.motion.choose_steps(&model, &learned);
-        let (mut blocks, mut chosen) = search.converge(&mut model, &mut learned, ROUNDS);
+        let (mut blocks, mut chosen) = search.converge(&mut model, &mut learned, ROUNDS_OF_CHOICE);
         let long = search.motion.settle(&model, &mut learned, 1);
-        if long.0 / long.1 > 1.1 * short.0 / short.1 {
+        if long.0 / long.1 > LONG_SEGMENT_RESIDUAL * short.0 / short.1 {
             // The motion is too unstable to be followed for so long.
             (model, learned) = before;
             (blocks, chosen) = search.converge(&mut model, &mut learned, 0);
@@ -270,7 +257,7 @@ impl WeakForm {
         found.speeds = data.speeds.clone();
         found.between = data.forced.contains(&true).then_some(search.motion.between);
         if let Some(rival) = rival {
-            found.several = rival.cost < THRESHOLD;
+            found.several = rival.cost < TERM_COST;
             let written = |&k: &usize| {
                 let kind = if library.is_dissipation(k) { "D: " } else { "" };
                 format!("{kind}{}", library.written(k, Notation::System))
@@ -278,7 +265,7 @@ impl WeakForm {
             found.rival = Some(Rival { terms: rival.model.terms.iter().map(written).collect(), cost: rival.cost });
         }
         if !chosen {
-            found.notes.push(format!("the choice of terms has not converged after {ROUNDS} rounds"));
+            found.notes.push(format!("the choice of terms has not converged after {ROUNDS_OF_CHOICE} rounds"));
         }
         if let (Some(Drive { name, .. }), Some(standard_error)) = (&library.drive, covariance.frequency) {
             found.drive = Some(FoundDrive { name: name.clone(), frequency: model.frequency, standard_error });
@@ -301,33 +288,33 @@ impl WeakForm {
     }
 }
 
-/// The blocks that are held out: one in [`HELD_OUT`], chosen at random.
+/// The blocks that are held out: one in [`BLOCKS_PER_HELD_OUT`], chosen at random.
 pub(super) fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     let tracks = 0..data.recording.tracks.len();
     let mut blocks: Vec<usize> = tracks.flat_map(|t| data.pieces(t).into_iter().map(|(block, _)| block)).collect();
     blocks.dedup();
     let mut rng = RngStream::HeldOut.generator(seed);
-    let count = (blocks.len() / HELD_OUT).max(1).min(blocks.len().saturating_sub(1));
+    let count = (blocks.len() / BLOCKS_PER_HELD_OUT).max(1).min(blocks.len().saturating_sub(1));
     (0..count).map(|_| blocks.swap_remove(rng.random_range(0..blocks.len()))).collect()
 }
 
 /// The shortest choice whose error is near the smallest, with a positive definite mass matrix if such a choice is not much worse; then other
 /// choices near the smallest error.
 fn beginnings<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
-    let few: Vec<&'a Choice> = path.best.values().filter(|choice| choice.set.len() <= MOST_START).collect();
+    let few: Vec<&'a Choice> = path.best.values().filter(|choice| choice.set.len() <= MOST_STARTING_TERMS).collect();
     let least = few.iter().map(|choice| judged(choice)).fold(f64::INFINITY, f64::min);
     let near = |most: f64| few.iter().copied().filter(move |choice| judged(choice) <= most * least);
     let definite = |most: f64| near(most).find(|choice| windows.is_definite(&choice.coefficients));
-    let first = definite(START_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(START_ERROR).next());
+    let first = definite(STARTING_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(STARTING_ERROR).next());
     let Some(first) = first else { return Vec::new() };
     let mut others: Vec<&Choice> = near(DEFINITE_ERROR).filter(|choice| choice.set != first.set).collect();
     others.sort_by(|a, b| judged(a).total_cmp(&judged(b)));
-    [first].into_iter().chain(others.into_iter().take(OTHER_STARTS)).collect()
+    [first].into_iter().chain(others.into_iter().take(OTHER_STARTING_CHOICES)).collect()
 }
 
 /// The choice with the smallest error that the search through the motion may start with.
 pub(super) fn best(path: &Path) -> Option<&Choice> {
-    let few = path.best.values().filter(|choice| choice.set.len() <= MOST_START);
+    let few = path.best.values().filter(|choice| choice.set.len() <= MOST_STARTING_TERMS);
     few.min_by(|a, b| judged(a).total_cmp(&judged(b)))
 }
 

@@ -1,11 +1,9 @@
 //! Functions of the coordinates in the terms of a Lagrangian.
 
+use super::thresholds::MOST_COORDINATES;
 use crate::forward::Dual;
 use crate::lagrangian::{ExpressionError, ExpressionLagrangian, Lagrangian};
 use crate::scalar::Real;
-
-/// Largest number of coordinates.
-pub(super) const MOST_COORDINATES: usize = 8;
 
 /// A factor of a function.
 #[derive(Clone, Debug, PartialEq)]

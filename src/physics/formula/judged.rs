@@ -4,15 +4,9 @@ use super::found::Verdict;
 use super::motion::Model;
 use super::regular::is_regular;
 use super::search::Search;
+use super::thresholds::{LEAST_HELD_OUT_RESIDUAL, LEAST_MOTION_RATIO, MOST_HELD_OUT_RESIDUAL, RESIDUAL_DEVIATIONS};
 use crate::identification::{ResidualPath, Segment};
 use crate::names::rounded;
-
-/// Smallest and largest ratio of held-out residuals to noise at which a formula counts as found; if the noise is given or that of exact
-/// numbers, only the largest one applies.
-const LEAST_RESIDUAL: f64 = 0.8;
-const MOST_RESIDUAL: f64 = 1.1;
-/// Smallest ratio of a coordinate's motion to its residual at which it can confirm a law: noise is below half of the spread.
-const SIGNAL: f64 = 2.0;
 
 /// Held-out motion as a test of a model.
 pub(super) struct Judged<'a> {
@@ -32,11 +26,11 @@ impl Judged<'_> {
 
     /// Three standard deviations of the residual, which matter if its count is small.
     fn scatter(&self) -> f64 {
-        3.0 / (2.0 * self.count.max(1.0)).sqrt()
+        RESIDUAL_DEVIATIONS / (2.0 * self.count.max(1.0)).sqrt()
     }
 
     pub fn verdict(&self, doubts: &[String]) -> Verdict {
-        match self.residual() <= MOST_RESIDUAL + self.scatter() {
+        match self.residual() <= MOST_HELD_OUT_RESIDUAL + self.scatter() {
             true if doubts.is_empty() => Verdict::Found,
             true => Verdict::Undecided,
             false => Verdict::NotInLibrary,
@@ -48,7 +42,7 @@ impl Judged<'_> {
         let data = self.search.motion.data;
         let mut doubts = Vec::new();
         let residual = self.residual();
-        if data.estimated.iter().all(|estimated| *estimated) && residual < LEAST_RESIDUAL - self.scatter() {
+        if data.estimated.iter().all(|estimated| *estimated) && residual < LEAST_HELD_OUT_RESIDUAL - self.scatter() {
             doubts.push(format!("the residual is {residual:.2} times the noise: the initial states overfit the noise"));
         }
         let masses = self.search.masses(&self.model.terms, &self.model.coefficients);
@@ -56,7 +50,7 @@ impl Judged<'_> {
             doubts.push("its mass matrix is nearly singular".to_string());
         }
         for (i, [moved, left]) in self.motion_and_rest().into_iter().enumerate() {
-            if moved < SIGNAL * left {
+            if moved < LEAST_MOTION_RATIO * left {
                 let name = &data.recording.coordinates[i];
                 doubts.push(format!(
                     "{name} moves by only {} times its residual in the held-out motion: too little to confirm a law",

@@ -9,12 +9,10 @@ use super::found::{FoundFormula, Verdict};
 use super::library::Library;
 use super::obstacles::constrained;
 use super::prepared::Prepared;
+use super::thresholds::LARGER_LIBRARY_ERROR;
 use crate::names::rounded;
 use crate::recording::Recording;
 use std::collections::BTreeSet;
-
-/// Largest error of accelerations, over that of smaller libraries, at which a larger library is fitted to the motion.
-const BETTER: f64 = 0.8;
 
 /// Finds a formula for the Lagrangian of recorded motion. If no families are given, searches larger and larger libraries until one fits the
 /// held-out motion; if none does, it also searches, as far as the options allow, for friction that depends on the position and for a
@@ -132,7 +130,7 @@ impl<'a> Ladder<'a> {
             // A library is fitted to the motion only if it fits accelerations better.
             let (error, before) = (weak.least(), self.least);
             self.least = self.least.min(error);
-            let most = if long { before / BETTER } else { BETTER * before };
+            let most = if long { before / LARGER_LIBRARY_ERROR } else { LARGER_LIBRARY_ERROR * before };
             let followed = match error > most {
                 true => None,
                 false => self.kept(weak.follow_all(self.data, self.judges, self.options))?,
@@ -177,7 +175,7 @@ impl<'a> Ladder<'a> {
             let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent.clone() };
             let Some(weak) = self.weak_form(&extent)? else { continue };
             // Near the frequency of a line, the errors of different libraries hardly differ.
-            if weak.least() > least / BETTER {
+            if weak.least() > least / LARGER_LIBRARY_ERROR {
                 continue;
             }
             least = least.min(weak.least());

@@ -3,8 +3,9 @@
 use super::error::FormulaError;
 use super::extent::{Drive, Extent};
 use super::families::own_function;
-use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
+use super::function::{Factor, Function, Notation, Taylor};
 use super::quotient::Quotient;
+use super::thresholds::{MOST_COORDINATES, MOST_LIBRARY_TERMS};
 use crate::lagrangian::{EquationPart, Equations, Lagrangian};
 use crate::linalg::{self, dot};
 use crate::names::latex_name;
@@ -14,8 +15,6 @@ use crate::tape::TapeError;
 use rand::Rng;
 use std::f64::consts::TAU;
 
-/// Largest number of functions and terms.
-pub(super) const MOST_TERMS: usize = 400;
 /// Kind of a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -68,8 +67,8 @@ impl Library {
         for text in own {
             functions.push(own_function(names, text)?);
         }
-        if functions.len() > MOST_TERMS {
-            return Err(FormulaError::Terms { found: functions.len(), most: MOST_TERMS });
+        if functions.len() > MOST_LIBRARY_TERMS {
+            return Err(FormulaError::Terms { found: functions.len(), most: MOST_LIBRARY_TERMS });
         }
         let mut library = Self { names: names.to_vec(), functions, terms: Vec::new(), drive, searched: 0 };
         for function in 0..library.functions.len() {
@@ -83,8 +82,8 @@ impl Library {
         library.add_friction(friction);
         library.add_drive();
         library.searched = library.terms.len();
-        if library.terms.len() > MOST_TERMS {
-            return Err(FormulaError::Terms { found: library.terms.len(), most: MOST_TERMS });
+        if library.terms.len() > MOST_LIBRARY_TERMS {
+            return Err(FormulaError::Terms { found: library.terms.len(), most: MOST_LIBRARY_TERMS });
         }
         library.add_products(&angles);
         Ok(library)

@@ -50,6 +50,7 @@ mod regular;
 mod says;
 mod search;
 mod select;
+mod thresholds;
 mod units;
 mod wald;
 mod weak;
@@ -61,6 +62,8 @@ pub use find::FormulaOptions;
 pub use found::{FoundDrive, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
 pub use ladder::formula_of_motion;
 pub use regress::formula_of_model;
+#[doc(hidden)]
+pub use thresholds::{MODEL_STATES, MOST_BOOTSTRAPS};
 pub use written::FormulaSummary;
 
 // For the packages of this repository.

@@ -3,7 +3,7 @@
 
 use super::library::{Library, Values};
 use super::prepared::Prepared;
-use super::search::PASSES;
+use super::thresholds::{FAILED_SQUARE, FIT_STEPS, LEAST_SCORED_BLOCKS, RESCUED_RESIDUAL, SEGMENTS_AT_A_TIME};
 use crate::identification::linear::times;
 use crate::identification::{Between, Course, Disturbances, Problem, Segment, choose_steps};
 use crate::lagrangian::system::Range;
@@ -45,11 +45,6 @@ pub(super) struct BlockSum {
     pub inflation: f64,
 }
 
-/// Mean squared residual that is assumed for a segment that cannot be followed.
-const FAILED: f64 = 1e3;
-/// Number of segments whose normal equations are kept at a time.
-const AT_A_TIME: usize = 256;
-
 /// Sum over blocks.
 pub(super) fn total(blocks: &BTreeMap<usize, BlockSum>, weight: &dyn Fn(usize) -> f64) -> BlockSum {
     let mut sum = BlockSum::empty(blocks.values().next().map_or(0, |part| part.right.len()));
@@ -70,7 +65,7 @@ pub(super) fn inflation(
     let m = sum.right.len();
     let square = ((sum.square - dot(&sum.right, change)) / sum.count.max(1.0)).max(1.0);
     let whole: f64 = blocks.keys().map(|&block| weight(block)).sum();
-    if whole < 3.0 {
+    if whole < LEAST_SCORED_BLOCKS {
         return square;
     }
     let pulls: Vec<(f64, Vec<f64>)> = blocks
@@ -172,12 +167,12 @@ impl Motion<'_> {
         let m = unknowns.1.len() + usize::from(unknowns.0);
         let mut blocks: BTreeMap<usize, BlockSum> = BTreeMap::new();
         self.shooting(model, unknowns, |problem, x| {
-            for part in segments.chunks(AT_A_TIME) {
+            for part in segments.chunks(SEGMENTS_AT_A_TIME) {
                 for (segment, found) in part.iter().zip(problem.all(&x, part)) {
                     let sum = blocks.entry(self.data.block_of(segment)).or_insert_with(|| BlockSum::empty(m));
                     if found.is_none() {
                         let count = (segment.samples * self.library.n()) as f64;
-                        sum.square += FAILED * count;
+                        sum.square += FAILED_SQUARE * count;
                         sum.count += count;
                         continue;
                     }
@@ -277,7 +272,7 @@ impl Motion<'_> {
             self.between = between;
             let (mut tried, mut starts) = from.clone();
             self.settle(&tried, &mut starts, 3);
-            self.fit(&mut tried, &mut starts, PASSES);
+            self.fit(&mut tried, &mut starts, FIT_STEPS);
             let square = self.settle(&tried, &mut starts, 1).0;
             if square < least {
                 (least, best) = (square, between);
@@ -307,7 +302,8 @@ impl Motion<'_> {
 fn squares(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<(f64, f64)> {
     let of = |(found, segment): (Option<_>, &Segment)| {
         let size = (segment.samples * problem.sigma.len()) as f64;
-        found.map_or((FAILED * size, size), |linear: crate::identification::Linear| (linear.square, linear.count))
+        found
+            .map_or((FAILED_SQUARE * size, size), |linear: crate::identification::Linear| (linear.square, linear.count))
     };
     problem.all(x, segments).into_iter().zip(segments).map(of).collect()
 }
@@ -315,12 +311,12 @@ fn squares(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<(f64, 
 /// Fits segments with large residuals again: first their beginning, then longer and longer parts while the fit improves. Returns the sum of
 /// squares and the number of residuals of every segment.
 fn rescue(problem: &Problem<'_>, x: &[f64], segments: &mut [Segment]) -> Vec<(f64, f64)> {
-    const BAD: f64 = 3.0;
     let mut found = squares(problem, x, segments);
     let mut means: Vec<f64> = found.iter().map(|(s, c)| s / c.max(1.0)).collect();
     means.sort_by(f64::total_cmp);
     let usual = means.get(means.len() / 2).copied().unwrap_or(1.0).max(1.0);
-    let bad: Vec<usize> = (0..segments.len()).filter(|&k| found[k].0 > BAD * usual * found[k].1.max(1.0)).collect();
+    let bad: Vec<usize> =
+        (0..segments.len()).filter(|&k| found[k].0 > RESCUED_RESIDUAL * usual * found[k].1.max(1.0)).collect();
     if bad.is_empty() || bad.len() > segments.len() / 3 {
         return found;
     }

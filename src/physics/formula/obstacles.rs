@@ -1,17 +1,13 @@
 //! Recordings that do not determine a law: coordinates that stand still, copies, steps, outliers, constraints.
 
 use super::error::FormulaError;
+use super::thresholds::{RANGE_SAMPLES, WILD_DEVIATION};
 use crate::cancellation::Cancellation;
 use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
 use crate::names::pluralize;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothing};
 use crate::recording::survey::{Kind, find_suspicious, stillness};
-
-/// Size of an outlier or a jump above which it does not belong to the motion, over the range of all but one sample in fifty.
-const WILD: f64 = 0.25;
-/// About how many samples are used for ranges.
-const LOOKED_AT: usize = 1 << 16;
 
 /// Rejects a recording without motion, or with rows that do not belong to it; returns a note for each coordinate with less severe faults.
 pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<Vec<String>, FormulaError> {
@@ -26,7 +22,7 @@ pub(super) fn refuse(recording: &Recording, smoothing: &Smoothing) -> Result<Vec
 /// Rejects rows far from the motion around them, and motion in steps; returns a note about rows that stand out less.
 fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, FormulaError> {
     let n = recording.n();
-    let stride = (recording.samples() / LOOKED_AT).max(1);
+    let stride = (recording.samples() / RANGE_SAMPLES).max(1);
     let of = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
     let values = || (0..recording.tracks.len()).flat_map(of);
     let mut some: Vec<f64> = values().step_by(stride).copied().collect();
@@ -39,7 +35,7 @@ fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, F
         (0..recording.tracks.len()).flat_map(pairs)
     };
     let (still, all) = steps().fold((0, 0), |(still, all), step| (still + usize::from(step == 0.0), all + 1));
-    if 2 * still > all && steps().fold(0.0, f64::max) > WILD * range {
+    if 2 * still > all && steps().fold(0.0, f64::max) > WILD_DEVIATION * range {
         return Err(FormulaError::Steps { coordinate: coordinate(), still, steps: all });
     }
     let mut found = Vec::new();
@@ -54,7 +50,7 @@ fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, F
             first.size
         )
     });
-    found.retain(|place| place.size.abs() > WILD * range);
+    found.retain(|place| place.size.abs() > WILD_DEVIATION * range);
     let Some(first) = found.iter().max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())) else { return Ok(mild) };
     let (track, sample) = first.place;
     Err(FormulaError::Wild {

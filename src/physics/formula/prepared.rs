@@ -3,24 +3,15 @@
 use super::FormulaOptions;
 use super::error::FormulaError;
 use super::obstacles;
+use super::thresholds::{
+    LEAST_OWN_NOISE_SAMPLES, LEAST_RELATIVE_NOISE, LEAST_SAMPLES, LEAST_WHOLE_TRAJECTORIES, MOST_BRIDGED_GAP,
+    OWN_NOISE_RATIO, PIECES_PER_TRAJECTORY, STARTING_SPEEDS, WINDOW_PACES,
+};
 use super::weak::Stretch;
 use crate::cancellation::Cancellation;
 use crate::identification::{Segment, joined, spread_of, thinned};
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::{Clock, RecordedTrajectory, Recording};
-
-/// Smallest noise that is assumed, relative to the range of a coordinate.
-const LEAST_NOISE: f64 = 1e-6;
-/// Smallest number of consecutive samples.
-pub(super) const LEAST_SAMPLES: usize = 20;
-/// Smallest number of samples at which a trajectory may have a noise of its own.
-const LEAST_OWN: usize = 200;
-/// Smallest number of trajectories at which whole trajectories are held out; fewer are cut into pieces.
-const WHOLE: usize = 5;
-/// Number of pieces of a trajectory otherwise.
-const PIECES: usize = 10;
-/// Largest gap, over the width of a test function, that the smoothing polynomials bridge; a single lost row does not count as a gap.
-const MOST_GAP: f64 = 0.2;
 
 /// Recorded motion with the results of smoothing.
 #[derive(Debug)]
@@ -77,7 +68,7 @@ impl<'a> Prepared<'a> {
             }
         }
         let sigma = (0..n).map(|i| {
-            let least = LEAST_NOISE * (bounds[i][1] - bounds[i][0]);
+            let least = LEAST_RELATIVE_NOISE * (bounds[i][1] - bounds[i][0]);
             smoothing.coordinates[i].noise.sigma.max(least)
         });
         let inner = || smoothed.iter().flatten().flat_map(|s| s.interior().map(move |at| (s, at)));
@@ -97,15 +88,14 @@ impl<'a> Prepared<'a> {
         let resolved = smoothing.coordinates.iter().all(|c| c.noise.resolved);
         let speeds = speeds.into_iter().map(|s| if s > 0.0 { s } else { 1.0 }).collect();
         let sigma: Vec<f64> = sigma.collect();
-        const OTHER: f64 = 1.25;
         let own = |track: &RecordedTrajectory, i: usize| {
             let usual = sigma[i];
-            if options.noise.is_some() || track.len() < LEAST_OWN {
+            if options.noise.is_some() || track.len() < LEAST_OWN_NOISE_SAMPLES {
                 return usual;
             }
             let own = noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), n, i).sigma;
-            let other = !(usual / OTHER..usual * OTHER).contains(&own);
-            if other { own.max(LEAST_NOISE * (bounds[i][1] - bounds[i][0])) } else { usual }
+            let other = !(usual / OWN_NOISE_RATIO..usual * OWN_NOISE_RATIO).contains(&own);
+            if other { own.max(LEAST_RELATIVE_NOISE * (bounds[i][1] - bounds[i][0])) } else { usual }
         };
         let sigma_of = recording.tracks.iter().map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
         let spread = (0..n).map(|i| spread_of(recording, i)).collect();
@@ -144,17 +134,16 @@ impl<'a> Prepared<'a> {
     pub fn width(&self) -> (f64, usize) {
         let span = |times: &[f64]| times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
         let longest = self.recording.tracks.iter().map(|track| span(&track.times)).fold(0.0, f64::max);
-        let pieces = if self.recording.tracks.len() >= WHOLE { 1 } else { PIECES };
-        ((3.0 * self.pace).min(longest / pieces as f64 / 2.5), pieces)
+        let pieces = if self.recording.tracks.len() >= LEAST_WHOLE_TRAJECTORIES { 1 } else { PIECES_PER_TRAJECTORY };
+        ((WINDOW_PACES * self.pace).min(longest / pieces as f64 / 2.5), pieces)
     }
 
     /// Speeds that weight unit masses, one set for each start of the elimination.
     pub fn starts(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
-        const OTHER: [f64; 3] = [1.0, 3.0, 0.3];
         let at = move |number: usize| {
-            (0..self.n).map(move |i| self.speeds[i] * OTHER[number].powi(if i % 2 == 0 { 1 } else { -1 }))
+            (0..self.n).map(move |i| self.speeds[i] * STARTING_SPEEDS[number].powi(if i % 2 == 0 { 1 } else { -1 }))
         };
-        (0..OTHER.len()).map(move |number| at(number).collect())
+        (0..STARTING_SPEEDS.len()).map(move |number| at(number).collect())
     }
 
     /// The block of a segment.
@@ -164,10 +153,10 @@ impl<'a> Prepared<'a> {
 
     /// The block of a sample.
     fn block(&self, track: usize, sample: usize) -> usize {
-        if self.recording.tracks.len() >= WHOLE {
+        if self.recording.tracks.len() >= LEAST_WHOLE_TRAJECTORIES {
             return track;
         }
-        track * PIECES + sample * PIECES / self.recording.tracks[track].len().max(1)
+        track * PIECES_PER_TRAJECTORY + sample * PIECES_PER_TRAJECTORY / self.recording.tracks[track].len().max(1)
     }
 
     /// Ranges of samples within one block.
@@ -194,7 +183,7 @@ impl<'a> Prepared<'a> {
             let even = Clock::of(&smoothed.times).even;
             for (block, range) in self.pieces(track) {
                 let full: Vec<usize> = range.filter(|&at| smoothed.is_full(at)).collect();
-                let most = (width * MOST_GAP).max(2.5 * self.step);
+                let most = (width * MOST_BRIDGED_GAP).max(2.5 * self.step);
                 let near = |a: &usize, b: &usize| smoothed.times[*b] - smoothed.times[*a] <= most;
                 for part in full.chunk_by(near) {
                     let seconds = smoothed.times[part[part.len() - 1]] - smoothed.times[part[0]];

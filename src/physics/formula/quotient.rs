@@ -1,6 +1,7 @@
 //! Terms that follow from others.
 
 use super::library::Library;
+use super::thresholds::{COMBINATION_REMAINDER, DEPENDENT_REMAINDER, VANISHING_TERM};
 use crate::linalg::dot;
 
 /// How removed terms are combined from the kept ones.
@@ -15,9 +16,6 @@ pub(super) struct Quotient {
 }
 
 impl Quotient {
-    /// Relative remainder below which a term is a combination of others.
-    const REST: f64 = 1e-7;
-
     pub fn new(library: &Library, columns: &[Vec<f64>]) -> (Vec<usize>, Self) {
         let mut order: Vec<usize> = (0..library.searched).collect();
         order.sort_by(|&a, &b| library.complexity(a).total_cmp(&library.complexity(b)));
@@ -41,7 +39,7 @@ impl Quotient {
         };
         for k in order {
             let (mut rest, over, length, left) = reduce(&columns[k], &directions, &combinations);
-            if length > 1e-12 && left > Self::REST * length {
+            if length > VANISHING_TERM && left > DEPENDENT_REMAINDER * length {
                 rest.iter_mut().for_each(|r| *r /= left);
                 let mut combination: Vec<f64> = over.iter().map(|o| -o / left).collect();
                 combination.push(1.0 / left);
@@ -55,7 +53,7 @@ impl Quotient {
         let over_kept = columns.iter().map(|column| {
             let (_, over, length, left) = reduce(column, &directions, &combinations);
             let full = |at: usize| over.get(at).copied().unwrap_or(0.0);
-            (left <= 1e-6 * length).then(|| sorted.iter().map(|&(_, at)| full(at)).collect())
+            (left <= COMBINATION_REMAINDER * length).then(|| sorted.iter().map(|&(_, at)| full(at)).collect())
         });
         let over_kept = over_kept.collect();
         let kept: Vec<usize> = sorted.into_iter().map(|(k, _)| k).collect();

@@ -7,29 +7,16 @@ use super::found::{FoundFormula, Verdict};
 use super::library::{Library, Values};
 use super::motion::Model;
 use super::select::{Choice, Path, eliminate_backward, mean};
-use super::wald::RIDGE;
+use super::thresholds::{
+    LEAST_MODEL_STATES, MODEL_REFITS, MOST_MODEL_ERROR_RATIO, MOST_MODEL_RESIDUAL, MOST_MODEL_STATES, RIDGE,
+    STATES_PER_HELD_OUT, UNDETERMINED_ERROR,
+};
 use super::weak::{State, Windows};
 use crate::identification::linear::{inverse_with, times};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
 use rand::Rng;
-
-/// Largest relative error of accelerations at which a formula still describes a model.
-const MOST_RESIDUAL: f64 = 0.02;
-/// Usual number of states at which a model is evaluated.
-pub const MODEL_STATES: usize = 1500;
-/// Largest number of such states.
-const MOST_STATES: usize = 3000;
-/// One state in this many is used only for validation.
-const HELD_OUT: usize = 5;
-/// Largest mean squared error, over the smallest one, at which a choice of terms may be the formula.
-const NEAR: f64 = 100.0;
-
-/// Passes of a refit: each uses the mass matrix of the previous one.
-const REFITS: usize = 8;
-/// A direction is not determined if the error of the motion stays below this multiple of the smallest error of any coefficients.
-const OPEN: f64 = 4.0;
 
 /// A state with the mass matrix and the acceleration of a model.
 struct Asked {
@@ -61,7 +48,7 @@ pub fn formula_of_model(
     let mut rng = RngStream::Region.generator(options.seed);
     let mut terms = Terms::default();
     let mut known: Vec<Asked> = Vec::new();
-    let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_STATES);
+    let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_MODEL_STATES);
     let stop = &options.cancellation;
     stop.stage("states of the model");
     for (q, v) in rows() {
@@ -73,7 +60,7 @@ pub fn formula_of_model(
         }
     }
     let (states, failed) = (rows().count(), rows().count() - known.len());
-    if known.len() < 20 || 2 * failed > states {
+    if known.len() < LEAST_MODEL_STATES || 2 * failed > states {
         return Err(FormulaError::NotFinite { failed, states });
     }
     let scale = |of: &dyn Fn(usize) -> f64| (known.len() as f64 / (0..known.len()).map(of).sum::<f64>()).sqrt().recip();
@@ -113,7 +100,7 @@ pub fn formula_of_model(
     let mut choice = elbow(&path, n).cloned().ok_or_else(none)?;
     let residual = |choice: &Choice| (choice.held_out / n as f64).sqrt();
     choice = refit((&motion, &windows), choice, &sigma);
-    if residual(&choice) > MOST_RESIDUAL {
+    if residual(&choice) > MOST_MODEL_RESIDUAL {
         // No formula has the mass matrix of the model, though one may have its motion: a function of L has the motion of L.
         let alone = search(&motion, &choice.coefficients);
         let found = elbow(&alone, n).map(|found| refit((&motion, &windows), found.clone(), &sigma));
@@ -145,7 +132,7 @@ pub fn formula_of_model(
     let residual = residual(choice);
     let probability = probabilities(&windows, choice, &path, &sigma, options);
     let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
-    found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
+    found.verdict = if residual <= MOST_MODEL_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
     found.residual = residual;
     found.noise = sigma;
     found.of_model = true;
@@ -189,7 +176,7 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
 
 /// `true` for a validation state.
 fn judges(block: usize) -> bool {
-    block.is_multiple_of(HELD_OUT)
+    block.is_multiple_of(STATES_PER_HELD_OUT)
 }
 
 /// A choice of terms with coefficients from the motion of the model; in directions that the motion does not determine, the mass matrix decides.
@@ -202,7 +189,7 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
         let done = linalg::eigh(m, matrix, &mut values, &mut vectors, &mut Workspace::new());
         done.is_ok().then_some((values, vectors))
     };
-    for _ in 0..REFITS {
+    for _ in 0..MODEL_REFITS {
         let [moved, asked] = [motion, windows].map(|of| of.normal(&choice.coefficients, &set, sigma, &learned));
         // Directions in which the mass matrix changes equally.
         let Some((sizes, axes)) = principal(&asked.matrix) else { break };
@@ -212,7 +199,7 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
         let rows: Vec<&[f64]> = unit.chunks_exact(m).collect();
         let both: Vec<f64> = (0..m * m).map(|at| of(rows[at / m], rows[at % m])).collect();
         let Some((costs, turns)) = principal(&both) else { break };
-        let open = OPEN * costs[0].max(RIDGE);
+        let open = UNDETERMINED_ERROR * costs[0].max(RIDGE);
         let mut x = vec![0.0; m];
         for (_, turn) in costs.iter().zip(turns.chunks_exact(m)).filter(|(cost, _)| **cost <= open) {
             let direction: Vec<f64> = (0..m).map(|k| (0..m).map(|i| turn[i] * rows[i][k]).sum()).collect();
@@ -231,7 +218,7 @@ fn elbow(path: &Path, n: usize) -> Option<&Choice> {
     let least = path.best.values().map(|choice| choice.held_out).fold(f64::INFINITY, f64::min);
     // Differences below rounding are not significant.
     let floor = least.max(1e-20);
-    let near = || path.best.values().filter(|choice| choice.held_out <= NEAR * floor);
+    let near = || path.best.values().filter(|choice| choice.held_out <= MOST_MODEL_ERROR_RATIO * floor);
     let rise = |choice: &Choice| {
         let shorter = path.best.range(..choice.set.len()).next_back();
         // Without terms the error is the size of the accelerations.

@@ -1,12 +1,10 @@
 //! Mass matrices that are not nearly singular.
 
+use super::thresholds::MOST_MASS_CONDITION;
 use crate::linalg::{self, Workspace};
 
-/// Largest condition number of a mass matrix in units of its diagonal: systems in textbooks stay below 100 except near singular positions.
-const MOST_CONDITION: f64 = 1e4;
-
 /// `true` if most of the symmetric matrices `(n, n)`, with rows and columns scaled to size 1, have a condition number below
-/// [`MOST_CONDITION`].
+/// [`MOST_MASS_CONDITION`].
 pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
     let mut scaled = matrices.to_vec();
     for matrix in scaled.chunks_exact_mut(n * n) {
@@ -23,7 +21,7 @@ pub(super) fn is_regular(n: usize, matrices: &[f64]) -> bool {
     let regular = values.chunks_exact(n).filter(|values| {
         let sizes = || values.iter().map(|x| x.abs());
         let (least, most) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
-        values.iter().all(|x| x.is_finite()) && least * MOST_CONDITION > most
+        values.iter().all(|x| x.is_finite()) && least * MOST_MASS_CONDITION > most
     });
     4 * regular.count() > 3 * (values.len() / n)
 }

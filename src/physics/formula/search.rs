@@ -6,23 +6,17 @@ use super::library::{Library, Values};
 use super::motion::{BlockSum, Model, Motion, inflation, total};
 use super::quotient::Quotient;
 use super::regular::is_regular;
-use super::wald::{Equations, RIDGE, Survivors, survivors};
+use super::thresholds::{
+    COMBINATION_REMAINDER, CONVERGED_DECREMENT, FIT_STEPS, LEAST_DETERMINANT_RATIO, MOST_FINAL_FITS, RESIDUAL_RANGES,
+    RIDGE, TERM_COST,
+};
+use super::wald::{Equations, Survivors, survivors};
 use crate::identification::Segment;
 use crate::identification::linear::{inverse_with, part, times};
 use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
 use rand::Rng;
 use std::collections::BTreeMap;
-
-/// Smallest determinant of a mass matrix, over that of the previous model.
-const LEAST_REGULAR: f64 = 0.05;
-/// Reduction of the sum of squares, in units of the noise variance, that a term must bring.
-pub(super) const THRESHOLD: f64 = 30.0;
-/// Largest number of steps of a fit, and of fits until one has converged.
-pub(super) const PASSES: usize = 10;
-const REFITS: usize = 4;
-/// Newton decrement at which a fit has converged, in units of the noise variance: a tenth of a standard error.
-const SETTLED: f64 = 1e-2;
 
 /// A search through the motion.
 pub(super) struct Search<'a> {
@@ -74,7 +68,7 @@ impl Search<'_> {
         };
         let mut ratios: Vec<f64> = pairs.map(ratio).collect();
         ratios.sort_by(f64::total_cmp);
-        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_REGULAR)
+        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_DETERMINANT_RATIO)
     }
 
     /// The terms that blocks with some weights need.
@@ -95,7 +89,7 @@ impl Search<'_> {
         let m = self.candidates.len();
         let change = times(m, &inverse_with(m, &sum.matrix, RIDGE)?, &sum.right);
         let noise = inflation(blocks, weight, &sum, &change);
-        survivors(&equations, THRESHOLD * noise, &|x| self.regular(model, (&self.candidates, x)))
+        survivors(&equations, TERM_COST * noise, &|x| self.regular(model, (&self.candidates, x)))
     }
 
     /// Refits and chooses terms again until they no longer change; returns the normal equations at the end, by block, and `false` if the choice
@@ -109,7 +103,7 @@ impl Search<'_> {
         let mut seen: Vec<Vec<usize>> = Vec::new();
         for round in 0.. {
             self.motion.settle(model, segments, 4);
-            self.motion.fit(model, segments, PASSES);
+            self.motion.fit(model, segments, FIT_STEPS);
             let blocks = self.motion.blocks(model, &self.candidates, segments);
             if round >= rounds || self.motion.data.cancellation.is_cancelled() {
                 return (blocks, rounds == 0);
@@ -191,13 +185,13 @@ pub(super) fn shorten(
         for (term, over) in quotient.over_kept.iter().enumerate() {
             let Some(over) = over.as_ref().filter(|_| !model.terms.contains(&term)) else { continue };
             // The new term as a combination of two of the model's own terms, if it is one.
-            let support: Vec<usize> = (0..over.len()).filter(|&k| over[k].abs() > 1e-6).collect();
+            let support: Vec<usize> = (0..over.len()).filter(|&k| over[k].abs() > COMBINATION_REMAINDER).collect();
             let inside = |k: &usize| own.contains(&Some(*k));
             if support.len() != 2 || !support.iter().all(inside) {
                 continue;
             }
             let column: Vec<f64> = own.iter().map(|k| k.map_or(0.0, |k| over[k])).collect();
-            let gone: Vec<usize> = (0..m).filter(|&k| column[k].abs() > 1e-6).collect();
+            let gone: Vec<usize> = (0..m).filter(|&k| column[k].abs() > COMBINATION_REMAINDER).collect();
             let rest: Vec<usize> = (0..m).filter(|k| !gone.contains(k)).collect();
             // Directions of the shorter model in the coefficients of the longer one.
             let mut directions: Vec<Vec<f64>> =
@@ -211,7 +205,7 @@ pub(super) fn shorten(
             let x = times(size, &inverse, &right);
             let whole = dot(&model.coefficients, &times(m, &sum.matrix, &model.coefficients));
             let cost = whole - dot(&x, &right);
-            let better = cost < THRESHOLD * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least);
+            let better = cost < TERM_COST * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least);
             let terms: Vec<usize> = rest.iter().map(|&k| model.terms[k]).chain([term]).collect();
             if better && search.regular(model, (&terms, &x)) {
                 best = Some((cost, gone, Model { terms, coefficients: x, frequency: model.frequency }));
@@ -223,7 +217,7 @@ pub(super) fn shorten(
         let old = gone.iter().flat_map(|&k| replaced.get(&model.terms[k]).cloned().unwrap_or(vec![model.terms[k]]));
         replaced.insert(shorter.terms[shorter.terms.len() - 1], old.collect());
         *model = shorter;
-        search.motion.fit(model, segments, PASSES);
+        search.motion.fit(model, segments, FIT_STEPS);
     }
 }
 
@@ -248,43 +242,42 @@ pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut 
         Covariance { coefficients: part(m, whole, &places), frequency, converged }
     };
     let mut last = of(&vec![f64::NAN; m * m], false);
-    for _ in 0..REFITS {
+    for _ in 0..MOST_FINAL_FITS {
         let blocks = search.motion.own_blocks(model, segments);
         let mut sum = total(&blocks, &|_| 1.0);
         search.motion.pin(model, &model.terms, segments, &mut sum);
         let Some(inverse) = inverse_with(m, &sum.matrix, RIDGE) else { return last };
         let decrement = dot(&sum.right, &times(m, &inverse, &sum.right)) / sum.inflation;
         let whole: Vec<f64> = inverse.into_iter().map(|x| x * sum.inflation).collect();
-        last = of(&whole, decrement < SETTLED);
+        last = of(&whole, decrement < CONVERGED_DECREMENT);
         if last.converged {
             break;
         }
         tracing::debug!(decrement, "fit goes on");
-        search.motion.fit(model, segments, PASSES);
+        search.motion.fit(model, segments, FIT_STEPS);
     }
     last
 }
 
 /// Residuals over noise in eight parts of the range of every coordinate.
 pub(super) fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment]) -> Vec<Left> {
-    const PARTS: usize = 8;
     let (n, bounds) = (motion.data.n, &motion.data.bounds);
-    let mut sums = vec![[0.0; 2]; n * PARTS];
+    let mut sums = vec![[0.0; 2]; n * RESIDUAL_RANGES];
     for (segment, residuals) in segments.iter().zip(motion.residuals(model, segments)) {
         let q = &motion.data.recording.tracks[segment.track].q[segment.first * n..];
         for (row, residual) in q.chunks_exact(n).zip(residuals.chunks_exact(n)) {
             let square = residual.iter().map(|r| r * r).sum::<f64>() / n as f64;
             for (i, x) in row.iter().enumerate().filter(|_| square.is_finite()) {
                 let share = (x - bounds[i][0]) / (bounds[i][1] - bounds[i][0]);
-                let at = ((share * PARTS as f64) as usize).min(PARTS - 1);
-                sums[i * PARTS + at][0] += square;
-                sums[i * PARTS + at][1] += 1.0;
+                let at = ((share * RESIDUAL_RANGES as f64) as usize).min(RESIDUAL_RANGES - 1);
+                sums[i * RESIDUAL_RANGES + at][0] += square;
+                sums[i * RESIDUAL_RANGES + at][1] += 1.0;
             }
         }
     }
     let of = |(e, [square, count]): (usize, &[f64; 2])| {
-        let (i, at) = (e / PARTS, e % PARTS);
-        let step = (bounds[i][1] - bounds[i][0]) / PARTS as f64;
+        let (i, at) = (e / RESIDUAL_RANGES, e % RESIDUAL_RANGES);
+        let step = (bounds[i][1] - bounds[i][0]) / RESIDUAL_RANGES as f64;
         let low = bounds[i][0] + at as f64 * step;
         Left { coordinate: i, low, high: low + step, residual: (square / count).sqrt(), samples: *count as usize }
     };

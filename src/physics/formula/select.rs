@@ -1,19 +1,14 @@
 //! Backward elimination by the weak form, with refits and exchanges.
 
+use super::thresholds::{
+    CHOICE_TIE, MOST_ERROR_OVER_MEDIAN, MOST_EXCHANGED_TERMS, MOST_JUDGED_REMOVALS, MOST_REFITTED_TERMS, TRIED_CHANGES,
+    WEAK_EXCHANGE_ROUNDS,
+};
 use super::weak::{Group, Normal, Windows};
 use crate::cancellation::Cancellation;
 use crate::identification::linear::{inverse, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
-
-/// Largest number of terms at which every removal is judged by the errors of accelerations, and refitted.
-const FEW: usize = 40;
-/// Largest number of terms at which terms are exchanged as well.
-const EXCHANGED: usize = 10;
-/// Largest number of rounds of exchanges.
-const EXCHANGES: usize = 3;
-/// Number of removals, and of additions, that are tried each time.
-const TRIED: usize = 6;
 
 /// A choice of terms.
 #[derive(Clone, Debug)]
@@ -127,7 +122,7 @@ pub(super) fn mean(errors: &[f64], used: &[bool]) -> f64 {
     }
     of.sort_by(f64::total_cmp);
     // A single window next to a pole of the accelerations must not decide.
-    let most = 300.0 * of[of.len() / 2];
+    let most = MOST_ERROR_OVER_MEDIAN * of[of.len() / 2];
     of.iter().map(|e| e.min(most)).sum::<f64>() / of.len() as f64
 }
 
@@ -175,8 +170,8 @@ impl Search<'_> {
         let costs = normal.costs(&self.windows.groups(&from.set))?;
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-        let refits = if from.set.len() <= 12 { 2 } else { 0 };
-        let tries = order.iter().take(TRIED).filter_map(|&gone| {
+        let refits = if from.set.len() <= MOST_REFITTED_TERMS { 2 } else { 0 };
+        let tries = order.iter().take(TRIED_CHANGES).filter_map(|&gone| {
             let places: Vec<usize> = (0..from.set.len()).filter(|&k| k != gone).collect();
             let set: Vec<usize> = places.iter().map(|&k| from.set[k]).collect();
             if !self.windows.moves_all(&set) {
@@ -188,7 +183,7 @@ impl Search<'_> {
         let tries: Vec<(usize, Choice)> = tries.collect();
         let least = tries.iter().map(|(_, choice)| choice.error).fold(f64::INFINITY, f64::min);
         // Of equally good terms the most complex one is removed.
-        let equal = tries.into_iter().filter(|(_, choice)| choice.error <= least * (1.0 + 1e-3));
+        let equal = tries.into_iter().filter(|(_, choice)| choice.error <= least * (1.0 + CHOICE_TIE));
         let involved = |gone: usize| self.complexity[from.set[gone]];
         equal.max_by(|a, b| involved(a.0).total_cmp(&involved(b.0))).map(|(_, choice)| choice)
     }
@@ -207,7 +202,7 @@ impl Search<'_> {
             })
             .collect();
         gains.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let longer = gains.iter().take(TRIED).filter_map(|&(_, k)| {
+        let longer = gains.iter().take(TRIED_CHANGES).filter_map(|&(_, k)| {
             let mut set = from.set.clone();
             set.push(all[k]);
             set.sort_unstable();
@@ -241,10 +236,10 @@ pub(super) fn eliminate_backward(
     }
     let mut order = Vec::new();
     // Removes many at once while there are many.
-    while set.len() > FEW && cancellation.go_on() {
+    while set.len() > MOST_JUDGED_REMOVALS && cancellation.go_on() {
         let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
         let mut places: Vec<usize> = (0..set.len()).collect();
-        let goal = (set.len() * 9 / 10).max(FEW);
+        let goal = (set.len() * 9 / 10).max(MOST_JUDGED_REMOVALS);
         while places.len() > goal && cancellation.go_on() {
             let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
             let Some(costs) = normal.of(&places).costs(&windows.groups(&left)) else { break };
@@ -280,9 +275,9 @@ pub(super) fn eliminate_backward(
     }
     order.reverse();
     let mut settled = false;
-    for _ in 0..EXCHANGES {
+    for _ in 0..WEAK_EXCHANGE_ROUNDS {
         let mut changed = false;
-        let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= EXCHANGED).collect();
+        let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= MOST_EXCHANGED_TERMS).collect();
         for size in sizes.into_iter().take_while(|_| cancellation.go_on()) {
             let Some(from) = best.get(&size).cloned() else { continue };
             for longer in search.longer(&from, all) {
@@ -303,7 +298,7 @@ pub(super) fn eliminate_backward(
 /// Takes over a choice if it is better than the one of the same size.
 fn improve(best: &mut BTreeMap<usize, Choice>, choice: Choice) -> bool {
     let known = best.get(&choice.set.len()).map_or(f64::INFINITY, |known| known.error);
-    let better = choice.error < known * (1.0 - 1e-3);
+    let better = choice.error < known * (1.0 - CHOICE_TIE);
     if better {
         best.insert(choice.set.len(), choice);
     }

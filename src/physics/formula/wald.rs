@@ -1,5 +1,6 @@
 //! Which terms a fit through the motion needs, from its normal equations alone.
 
+use super::thresholds::{MOST_RIDGE, RIDGE};
 use crate::identification::linear::{inverse_with, times};
 
 /// Normal equations at a model.
@@ -24,11 +25,6 @@ pub(super) struct Survivors {
     pub next: f64,
 }
 
-/// Share of the diagonal that is added for directions that the motion does not determine.
-pub(super) const RIDGE: f64 = 1e-10;
-/// Largest such share, for coefficients that are held at those of the model.
-const MOST_HELD: f64 = 1e-2;
-
 /// Removes terms while one costs less than `threshold` in the sum of squares; `allowed` says whether coefficients still form a mechanical
 /// system.
 ///
@@ -43,7 +39,7 @@ pub(super) fn survivors(
     let m = right.len();
     let mut inverse = inverse_with(m, matrix, RIDGE)?;
     let size = (0..m).map(|k| matrix[k * m + k] * coefficients[k].powi(2)).fold(0.0, f64::max);
-    let held = if size > 0.0 { (threshold / size).clamp(RIDGE, MOST_HELD) } else { RIDGE };
+    let held = if size > 0.0 { (threshold / size).clamp(RIDGE, MOST_RIDGE) } else { RIDGE };
     let change = times(m, &inverse_with(m, matrix, held)?, right);
     let moved = |share: f64| coefficients.iter().zip(&change).map(|(c, d)| c + share * d).collect::<Vec<_>>();
     let mut x = [1.0, 0.5, 0.25].into_iter().map(moved).find(|x| allowed(x)).unwrap_or_else(|| coefficients.to_vec());

@@ -6,6 +6,7 @@
 use super::library::{Kind, Library, Term, Values, blocks};
 use super::regular::is_regular;
 use super::select::mean;
+use super::thresholds::{MASS_WINDOWS, MOST_WINDOW_WEIGHT, MOST_WINDOWS};
 use crate::linalg::{self, Workspace};
 
 /// Positions and velocities of a stretch of motion at even steps, with known forces if there are any: `(samples, n)`.
@@ -48,11 +49,6 @@ pub(super) struct Windows {
     /// Coordinates that each term couples.
     joined: Vec<Vec<usize>>,
 }
-
-/// About how many windows are used to check the condition of mass matrices.
-const LOOKED_AT: usize = 200;
-/// Largest number of windows.
-const MOST_WINDOWS: f64 = 4000.0;
 
 impl Windows {
     /// Test functions `(1 - x^2)^4` of `width` seconds along stretches of motion, at least a quarter of their width apart.
@@ -206,7 +202,7 @@ impl Windows {
     pub fn is_regular(&self, coefficients: &[f64]) -> bool {
         let n = self.n;
         let masses = self.masses(coefficients);
-        let stride = self.len().div_ceil(LOOKED_AT).max(1);
+        let stride = self.len().div_ceil(MASS_WINDOWS).max(1);
         let some: Vec<f64> = masses.chunks_exact(n * n).step_by(stride).flatten().copied().collect();
         is_regular(n, &some)
     }
@@ -294,7 +290,7 @@ impl Windows {
         // Near a singular mass matrix an error would have unlimited weight.
         let mut sorted: Vec<f64> = sizes.iter().copied().filter(|s| *s > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
-        let most = 5.0 * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+        let most = MOST_WINDOW_WEIGHT * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
         for (weight, size) in weights.chunks_exact_mut(n * n).zip(sizes) {
             let cut = if size > most { most / size } else { 1.0 };
             weight.iter_mut().for_each(|w| *w *= cut);

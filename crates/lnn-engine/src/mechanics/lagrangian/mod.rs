@@ -39,7 +39,9 @@ mod wrappers;
 pub use accelerations::Accelerations;
 pub(crate) use accelerations::Solved;
 pub use configure::{SystemError, SystemInstance, build, configure, configure_system, configure_values, find, systems};
-pub use constraints::{Constrained, ConstraintError, Constraints, FormulaError, Manifold, ManifoldRows, RowAdjoint};
+pub use constraints::{
+    Constrained, ConstraintError, ConstraintFormulaError, Constraints, Manifold, ManifoldRows, RowAdjoint,
+};
 pub use derivatives::MetricJet;
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;

@@ -22,7 +22,7 @@ pub struct FormulaConstraints {
 /// Why formulas do not constrain a model.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub enum FormulaError {
+pub enum ConstraintFormulaError {
     /// No formula, or more than are taken.
     Number(usize),
     /// The name of a constraint that no message can show.
@@ -40,7 +40,7 @@ pub enum FormulaError {
     Constraints(ConstraintError),
 }
 
-impl core::fmt::Display for FormulaError {
+impl core::fmt::Display for ConstraintFormulaError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Number(found) => write!(f, "constraints: expected 1 to {MOST} formulas, found {found}"),
@@ -55,7 +55,7 @@ impl core::fmt::Display for FormulaError {
     }
 }
 
-impl core::error::Error for FormulaError {
+impl core::error::Error for ConstraintFormulaError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
             Self::Constraints(error) => Some(error),
@@ -64,7 +64,7 @@ impl core::error::Error for FormulaError {
     }
 }
 
-impl From<ConstraintError> for FormulaError {
+impl From<ConstraintError> for ConstraintFormulaError {
     fn from(error: ConstraintError) -> Self {
         Self::Constraints(error)
     }
@@ -86,25 +86,28 @@ impl FormulaConstraints {
     /// Formulas that vanish, by the name of their constraint, over coordinates `NAME` and velocities `NAME_dot`.
     ///
     /// # Errors
-    /// [`FormulaError`].
-    pub fn new(coordinates: &[impl AsRef<str>], formulas: BTreeMap<String, String>) -> Result<Self, FormulaError> {
+    /// [`ConstraintFormulaError`].
+    pub fn new(
+        coordinates: &[impl AsRef<str>],
+        formulas: BTreeMap<String, String>,
+    ) -> Result<Self, ConstraintFormulaError> {
         if formulas.is_empty() || formulas.len() > MOST {
-            return Err(FormulaError::Number(formulas.len()));
+            return Err(ConstraintFormulaError::Number(formulas.len()));
         }
         if formulas
             .keys()
             .any(|name| name.is_empty() || name.chars().count() > 100 || name.chars().any(char::is_control))
         {
-            return Err(FormulaError::Name);
+            return Err(ConstraintFormulaError::Name);
         }
         let names: Vec<&str> = coordinates.iter().map(AsRef::as_ref).collect();
         if let Some(name) = names.iter().find(|name| !is_name(name) || is_reserved(name)) {
-            return Err(FormulaError::Coordinate(name.to_string()));
+            return Err(ConstraintFormulaError::Coordinate(name.to_string()));
         }
         let rows: Vec<(&str, &str)> =
             formulas.iter().map(|(name, formula)| (name.as_str(), formula.as_str())).collect();
         let compiled = ExpressionConstraints::new(&names, &[], &rows)
-            .map_err(|(name, error)| FormulaError::Formula { name, error })?;
+            .map_err(|(name, error)| ConstraintFormulaError::Formula { name, error })?;
         Ok(Self { formulas, compiled })
     }
 
@@ -146,8 +149,8 @@ impl FormulaConstraints {
     /// The constraints that are independent at some of these states, `(batch, n)` each, and the names of the others.
     ///
     /// # Errors
-    /// [`FormulaError::Constraints`] for constraints that contradict each other or leave no motion.
-    pub fn independent(mut self, q: &[f64], v: &[f64]) -> Result<(Self, Vec<String>), FormulaError> {
+    /// [`ConstraintFormulaError::Constraints`] for constraints that contradict each other or leave no motion.
+    pub fn independent(mut self, q: &[f64], v: &[f64]) -> Result<(Self, Vec<String>), ConstraintFormulaError> {
         let kept = self.alone()?.independent(q, v)?;
         let redundant = kept.redundant().to_vec();
         if redundant.is_empty() {

@@ -28,7 +28,7 @@ mod tests;
 pub use constrained::{Constrained, ConstraintError};
 pub use described::ExpressionConstraints;
 pub use equations::{RowEquations, Tangent};
-pub use formulas::{FormulaConstraints, FormulaError};
+pub use formulas::{ConstraintFormulaError, FormulaConstraints};
 pub use kkt::Bordered;
 pub(super) use kkt::{Motion, accelerate};
 pub use least_norm::LeastNorm;
