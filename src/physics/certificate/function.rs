@@ -56,18 +56,7 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
         Unary::Abs if x.high < 0.0 => [-x, -one, zero, zero, zero, zero, zero],
         Unary::Abs => following(x.abs(), [Interval::ENTIRE; 7]),
         Unary::Recip => powers(x, [-1, -2, -3, -4, -5, -6, -7], [1.0, -1.0, 2.0, -6.0, 24.0, -120.0, 720.0]),
-        Unary::Powi(n) => {
-            let n = i64::from(n);
-            let exponents =
-                [0, 1, 2, 3, 4, 5, 6].map(|k| (n - k).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32);
-            let mut factor = one;
-            let mut found = [one; 7];
-            for (k, (found, exponent)) in found.iter_mut().zip(exponents).enumerate() {
-                *found = if factor == zero { zero } else { factor * x.power(exponent) };
-                factor *= number((n - k as i64) as f64);
-            }
-            found
-        }
+        Unary::Powi(n) => integer_power(x, i64::from(n)),
         Unary::Sqrt => {
             let mut found = real_power(x, 0.5);
             found[0] = x.sqrt();
@@ -93,70 +82,14 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
             let (sinh, cosh) = (x.sinh(), x.cosh());
             [cosh, sinh, cosh, sinh, cosh, sinh, cosh]
         }
-        // Polynomials in the tangent t and its square u, each the derivative of the previous one, times 1 + u = 1 + t^2.
-        Unary::Tan => {
-            let t = x.tan();
-            let (u, first) = (t.square(), one + t.square());
-            let times = |factor: Interval, c: &[f64]| factor * first * polynomial(u, c);
-            [
-                t,
-                first,
-                times(t, &[2.0]),
-                times(one, &[2.0, 6.0]),
-                times(t, &[16.0, 24.0]),
-                times(one, &[16.0, 120.0, 120.0]),
-                times(t, &[272.0, 960.0, 720.0]),
-            ]
+        Unary::Tan => tangent(x),
+        Unary::Asin => arcsine(x),
+        Unary::Acos => {
+            let arcsine = arcsine(x);
+            std::array::from_fn(|k| if k == 0 { x.acos() } else { -arcsine[k] })
         }
-        // With g = 1/sqrt(1 - x^2): polynomials in x^2 g^2 = g^2 - 1, all coefficients positive.
-        Unary::Asin | Unary::Acos => {
-            let square = x.square();
-            let g = one / ((one - x) * (one + x)).sqrt();
-            let part = |power: i32, c: &[f64]| g.power(power) * polynomial(square * g.square(), c);
-            let found = [
-                x.asin(),
-                g,
-                x * g.power(3),
-                part(3, &[1.0, 3.0]),
-                x * part(5, &[9.0, 15.0]),
-                part(5, &[9.0, 90.0, 105.0]),
-                x * part(7, &[225.0, 1050.0, 945.0]),
-            ];
-            match f {
-                Unary::Asin => found,
-                _ => std::array::from_fn(|k| if k == 0 { x.acos() } else { -found[k] }),
-            }
-        }
-        // With g = 1/(1 + x^2).
-        Unary::Atan => {
-            let u = x.square();
-            let g = one / (one + u);
-            let part = |power: i32, c: &[f64]| polynomial(u, c) * g.power(power);
-            [
-                x.atan(),
-                g,
-                x * part(2, &[-2.0]),
-                part(3, &[-2.0, 6.0]),
-                x * part(4, &[24.0, -24.0]),
-                part(5, &[24.0, -240.0, 120.0]),
-                x * part(6, &[-720.0, 2400.0, -720.0]),
-            ]
-        }
-        // Hermite's polynomials times the first derivative.
-        Unary::Erfc => {
-            let u = x.square();
-            let first = -(two / Interval::pi().sqrt()) * (-u).exp();
-            let part = |c: &[f64]| first * polynomial(u, c);
-            [
-                x.erfc(),
-                first,
-                x * part(&[-2.0]),
-                part(&[-2.0, 4.0]),
-                x * part(&[12.0, -8.0]),
-                part(&[12.0, -48.0, 16.0]),
-                x * part(&[-120.0, 160.0, -32.0]),
-            ]
-        }
+        Unary::Atan => arctangent(x),
+        Unary::Erfc => complementary_error(x),
         Unary::Gelu => gelu(x),
         Unary::Softplus => following(x.softplus(), logistic(x)),
         Unary::Logistic => logistic(x),
@@ -178,7 +111,84 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
     }
 }
 
-/// A function whose derivatives are a function and its derivatives.
+/// `x^n` with an integer `n`.
+fn integer_power(x: Interval, n: i64) -> Derivatives {
+    let (zero, one) = (Interval::ZERO, number(1.0));
+    let exponents = [0, 1, 2, 3, 4, 5, 6].map(|k| (n - k).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32);
+    let mut factor = one;
+    let mut found = [one; 7];
+    for (k, (found, exponent)) in found.iter_mut().zip(exponents).enumerate() {
+        *found = if factor == zero { zero } else { factor * x.power(exponent) };
+        factor *= number((n - k as i64) as f64);
+    }
+    found
+}
+
+/// The tangent: polynomials in the tangent `t` and its square `u`, each the derivative of the previous one, times `1 + u = 1 + t^2`.
+fn tangent(x: Interval) -> Derivatives {
+    let (one, t) = (number(1.0), x.tan());
+    let (u, first) = (t.square(), one + t.square());
+    let times = |factor: Interval, c: &[f64]| factor * first * polynomial(u, c);
+    [
+        t,
+        first,
+        times(t, &[2.0]),
+        times(one, &[2.0, 6.0]),
+        times(t, &[16.0, 24.0]),
+        times(one, &[16.0, 120.0, 120.0]),
+        times(t, &[272.0, 960.0, 720.0]),
+    ]
+}
+
+/// The arcsine: with `g = 1/sqrt(1 - x^2)`, polynomials in `x^2 g^2 = g^2 - 1` whose coefficients are all positive.
+fn arcsine(x: Interval) -> Derivatives {
+    let (one, square) = (number(1.0), x.square());
+    let g = one / ((one - x) * (one + x)).sqrt();
+    let part = |power: i32, c: &[f64]| g.power(power) * polynomial(square * g.square(), c);
+    [
+        x.asin(),
+        g,
+        x * g.power(3),
+        part(3, &[1.0, 3.0]),
+        x * part(5, &[9.0, 15.0]),
+        part(5, &[9.0, 90.0, 105.0]),
+        x * part(7, &[225.0, 1050.0, 945.0]),
+    ]
+}
+
+/// The arctangent: polynomials in `x^2` times powers of `g = 1/(1 + x^2)`.
+fn arctangent(x: Interval) -> Derivatives {
+    let (one, u) = (number(1.0), x.square());
+    let g = one / (one + u);
+    let part = |power: i32, c: &[f64]| polynomial(u, c) * g.power(power);
+    [
+        x.atan(),
+        g,
+        x * part(2, &[-2.0]),
+        part(3, &[-2.0, 6.0]),
+        x * part(4, &[24.0, -24.0]),
+        part(5, &[24.0, -240.0, 120.0]),
+        x * part(6, &[-720.0, 2400.0, -720.0]),
+    ]
+}
+
+/// The complementary error function: Hermite polynomials times its first derivative.
+fn complementary_error(x: Interval) -> Derivatives {
+    let u = x.square();
+    let first = -(number(2.0) / Interval::pi().sqrt()) * (-u).exp();
+    let part = |c: &[f64]| first * polynomial(u, c);
+    [
+        x.erfc(),
+        first,
+        x * part(&[-2.0]),
+        part(&[-2.0, 4.0]),
+        x * part(&[12.0, -8.0]),
+        part(&[12.0, -48.0, 16.0]),
+        x * part(&[-120.0, 160.0, -32.0]),
+    ]
+}
+
+/// A function with this value whose derivative is another function, given with its derivatives.
 fn following(value: Interval, derivatives: Derivatives) -> Derivatives {
     std::array::from_fn(|k| if k == 0 { value } else { derivatives[k - 1] })
 }

@@ -166,33 +166,7 @@ pub fn find_constraints(
     samples: &MotionSamples,
     search: ConstraintSearch,
 ) -> Result<FoundConstraints, ConstraintSearchError> {
-    let of_positions = Features::of_positions(samples, search.degree);
-    // With many coordinates, the highest degree that there is room for.
-    let (degree, of_velocities) = (0..=search.velocity_degree)
-        .rev()
-        .map(|degree| (degree, Features::of_velocities(samples, degree)))
-        .find(|(_, features)| features.len() <= MOST_TERMS)
-        .unwrap_or_else(|| (0, Features::of_velocities(samples, 0)));
-    let mut cut_short = Vec::new();
-    if degree < search.velocity_degree {
-        let asked = search.velocity_degree;
-        cut_short.push(format!(
-            "coefficients of velocities were searched only up to degree {degree} instead of {asked}, which has more than {MOST_TERMS} terms"
-        ));
-    }
-    if samples.stride() > 1 {
-        cut_short.push(format!("one sample in {} was looked at", samples.stride()));
-    }
-    for (what, features) in [("the degree", &of_positions), ("the degree of velocities", &of_velocities)] {
-        let found = features.len();
-        if found > MOST_TERMS {
-            return Err(ConstraintSearchError::Terms { what, found });
-        }
-        let needed = SAMPLES_PER_TERM * found;
-        if samples.len() < needed {
-            return Err(ConstraintSearchError::Samples { terms: found, found: samples.len(), needed });
-        }
-    }
+    let (of_positions, of_velocities, mut cut_short) = searched_terms(samples, search)?;
     let mut held = RowsTaken::at(samples, GRADIENT_STATES);
     let stop = &samples.cancellation;
     stop.stage("functions that vanish");
@@ -207,45 +181,17 @@ pub fn find_constraints(
     let gap = vanishing.gap(&functions);
     let functions = independent_everywhere(samples, &of_positions, functions, candidates);
     stop.check()?;
-    let places = samples.places(INDEPENDENCE_STATES);
-    let functions: Vec<Generator> =
-        functions.into_iter().map(|found| found.sized(samples, &of_positions, &places)).collect();
-    let (of_angles, functions) = phases(samples, &of_positions, limits, &functions);
-    let second_branch = branching(samples, &of_positions, &functions);
+    let mut constraints = described_functions(samples, &of_positions, limits, functions);
     stop.stage("functions that are constant");
-    let conserved = if samples.trajectories() > 1 {
+    if samples.trajectories() > 1 {
         let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, (1.0, limits));
-        held.take(samples, &of_positions, constant.generators().0, false, FURTHER_CANDIDATE)
-    } else {
-        Vec::new()
-    };
-    let by_functions = held.bases.clone();
+        let conserved = held.take(samples, &of_positions, constant.generators().0, false, FURTHER_CANDIDATE);
+        constraints.extend(conserved.iter().map(|found| found.described(&of_positions, ConstraintKind::PerTrajectory)));
+    }
     stop.check()?;
     stop.stage("rows of velocities");
-    let of_rows = if samples.measured() { limits } else { Limits::of_smoothed() };
-    let moving = Vanishing::of(samples, &of_velocities, Some(&vanishing), false, (samples.shared(), of_rows));
-    let moving = held.take(samples, &of_velocities, moving.generators().0, true, FURTHER_CANDIDATE);
+    constraints.extend(velocity_rows(samples, &of_velocities, (&vanishing, limits), &mut held));
     stop.check()?;
-    let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
-    let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
-    let mut constraints = of_angles;
-    for (generator, second_branch) in functions.iter().zip(second_branch) {
-        let kind = match (generator.within, second_branch) {
-            (false, _) => ConstraintKind::Nearly,
-            (true, true) => ConstraintKind::Branching,
-            (true, false) => ConstraintKind::Holonomic,
-        };
-        constraints.push(generator.described(&of_positions, kind));
-    }
-    constraints.extend(conserved.iter().map(|found| found.described(&of_positions, ConstraintKind::PerTrajectory)));
-    for (generator, integrable) in moving.iter().zip(integrable) {
-        let kind = match (integrable, generator.within) {
-            (true, _) => ConstraintKind::PerTrajectory,
-            (false, true) => ConstraintKind::Nonholonomic,
-            (false, false) => ConstraintKind::Nearly,
-        };
-        constraints.push(generator.described(&of_velocities, kind));
-    }
     let count = constraints.iter().filter(|found| found.kind.is_imposed()).count();
     Ok(FoundConstraints {
         count,
@@ -258,6 +204,91 @@ pub fn find_constraints(
         still: samples.still(),
         limits: cut_short,
     })
+}
+
+/// The terms of functions of the coordinates and of rows linear in the velocities, and what the search leaves out, in words.
+fn searched_terms(
+    samples: &MotionSamples,
+    search: ConstraintSearch,
+) -> Result<(Features, Features, Vec<String>), ConstraintSearchError> {
+    let of_positions = Features::of_positions(samples, search.degree);
+    // With many coordinates, the highest degree that is not too large.
+    let (degree, of_velocities) = (0..=search.velocity_degree)
+        .rev()
+        .map(|degree| (degree, Features::of_velocities(samples, degree)))
+        .find(|(_, features)| features.len() <= MOST_TERMS)
+        .unwrap_or_else(|| (0, Features::of_velocities(samples, 0)));
+    let mut cut_short = Vec::new();
+    if degree < search.velocity_degree {
+        let requested = search.velocity_degree;
+        cut_short.push(format!(
+            "coefficients of velocities were searched only up to degree {degree} instead of {requested}, which has more than {MOST_TERMS} terms"
+        ));
+    }
+    if samples.stride() > 1 {
+        cut_short.push(format!("only one sample in {} was used", samples.stride()));
+    }
+    for (what, features) in [("the degree", &of_positions), ("the degree of velocities", &of_velocities)] {
+        let found = features.len();
+        if found > MOST_TERMS {
+            return Err(ConstraintSearchError::Terms { what, found });
+        }
+        let needed = SAMPLES_PER_TERM * found;
+        if samples.len() < needed {
+            return Err(ConstraintSearchError::Samples { terms: found, found: samples.len(), needed });
+        }
+    }
+    Ok((of_positions, of_velocities, cut_short))
+}
+
+/// Functions that vanish as constraints, those of angles first.
+fn described_functions(
+    samples: &MotionSamples,
+    features: &Features,
+    limits: Limits,
+    functions: Vec<Generator>,
+) -> Vec<FoundConstraint> {
+    let places = samples.places(INDEPENDENCE_STATES);
+    let functions: Vec<Generator> =
+        functions.into_iter().map(|found| found.sized(samples, features, &places)).collect();
+    let (mut constraints, functions) = phases(samples, features, limits, &functions);
+    let second_branch = branching(samples, features, &functions);
+    for (generator, second_branch) in functions.iter().zip(second_branch) {
+        let kind = match (generator.within, second_branch) {
+            (false, _) => ConstraintKind::Nearly,
+            (true, true) => ConstraintKind::Branching,
+            (true, false) => ConstraintKind::Holonomic,
+        };
+        constraints.push(generator.described(features, kind));
+    }
+    constraints
+}
+
+/// Rows linear in the velocities that vanish beyond the consequences of functions that do.
+fn velocity_rows(
+    samples: &MotionSamples,
+    features: &Features,
+    (vanishing, limits): (&Vanishing<'_>, Limits),
+    held: &mut RowsTaken,
+) -> Vec<FoundConstraint> {
+    let by_functions = held.bases.clone();
+    let limits = if samples.measured() { limits } else { Limits::of_smoothed() };
+    let found = Vanishing::of(samples, features, Some(vanishing), false, (samples.shared(), limits));
+    let found = held.take(samples, features, found.generators().0, true, FURTHER_CANDIDATE);
+    if samples.cancellation.is_cancelled() {
+        return Vec::new();
+    }
+    let rows: Vec<&[f64]> = found.iter().map(|generator| generator.weights.as_slice()).collect();
+    let integrable = integrable(features, samples, &rows, (held, by_functions));
+    let described = found.iter().zip(integrable).map(|(generator, integrable)| {
+        let kind = match (integrable, generator.within) {
+            (true, _) => ConstraintKind::PerTrajectory,
+            (false, true) => ConstraintKind::Nonholonomic,
+            (false, false) => ConstraintKind::Nearly,
+        };
+        generator.described(features, kind)
+    });
+    described.collect()
 }
 
 /// The constraints found so far, at some samples.

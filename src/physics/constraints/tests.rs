@@ -134,7 +134,12 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
         least_part(rows.iter().map(Vec::as_slice))
     };
     let worst = |of: &[Generator]| (1..20).map(|k| least(of, 0.31 * f64::from(k))).fold(f64::INFINITY, f64::min);
-    assert!(worst(&taken) > NEARLY_DEPENDENT && worst(&simplest) < NEARLY_DEPENDENT, "{} {}", worst(&simplest), worst(&taken));
+    assert!(
+        worst(&taken) > NEARLY_DEPENDENT && worst(&simplest) < NEARLY_DEPENDENT,
+        "{} {}",
+        worst(&simplest),
+        worst(&taken)
+    );
 }
 
 /// A rotation about a fixed point: a point of its third axis, then the ends of all three, seen from there.

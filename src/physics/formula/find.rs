@@ -2,13 +2,14 @@
 
 use super::drive_doubts::drive_doubts;
 use super::error::FormulaError;
+use super::exchange::Exchanged;
 use super::extent::Drive;
 use super::families::Families;
 use super::found::{FoundDrive, FoundFormula, Rival, Verdict};
 use super::function::Notation;
 use super::judged::Judged;
 use super::library::{Library, Values};
-use super::motion::{Model, Motion};
+use super::motion::{BlockSum, Model, Motion};
 use super::prepared::Prepared;
 use super::quotient::Quotient;
 use super::search::{Search, covariance, left_over, shorten};
@@ -22,7 +23,7 @@ use crate::cancellation::Cancellation;
 use crate::identification::{Between, Segment};
 use crate::random::RngStream;
 use rand::Rng;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Options of the search for a formula.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,7 +162,7 @@ impl WeakForm {
         options: &FormulaOptions,
     ) -> Result<FoundFormula, FormulaError> {
         let mut best: Option<FoundFormula> = None;
-        for choice in beginnings(&self.path, &self.windows) {
+        for choice in starting_choices(&self.path, &self.windows) {
             let found = self.follow(choice, data, held, options)?;
             let done = found.verdict != Verdict::NotInLibrary;
             if done || best.as_ref().is_none_or(|best| found.residual < best.residual) {
@@ -174,7 +175,7 @@ impl WeakForm {
         best.ok_or(FormulaError::Singular)
     }
 
-    /// Fits a choice to the motion.
+    /// Fits a choice to the motion, chooses terms again, and judges the result on held-out motion.
     fn follow(
         &self,
         choice: &Choice,
@@ -182,8 +183,56 @@ impl WeakForm {
         held: &BTreeSet<usize>,
         options: &FormulaOptions,
     ) -> Result<FoundFormula, FormulaError> {
+        let segments = data.segments(SEGMENT_PACES * data.pace).into_iter();
+        let (mut validation, training): (Vec<Segment>, Vec<Segment>) =
+            segments.partition(|s| held.contains(&data.block_of(s)));
+        let (mut search, model) = self.search(choice, data, &training, options);
+        let Fitted { mut model, mut segments, mut blocks, converged } =
+            fit_segments(&mut search, model, training, options)?;
+        let rival = search.exchange(&mut model, &mut segments, &mut blocks);
+        search.motion.settle(&model, &mut validation, 6);
+        let mut validation = data.joined(&validation);
+        let stop = &options.cancellation;
+        stop.check()?;
+        stop.stage("probabilities");
+        let resampled = search.resample(&model, &blocks, &segments, (options.bootstraps, options.seed));
+        stop.check()?;
+        let shortened = shorten(&search, &self.quotient, &mut model, &mut segments);
+        let covariance = covariance(&search, &mut model, &mut segments);
+        let (square, count) = search.motion.settle(&model, &mut validation, 8);
+        let probability = resampled.probabilities(&model, &shortened);
+        let periodic = &data.recording.periodic;
+        let estimates = (covariance.coefficients.as_slice(), probability.as_slice());
+        let mut found = FoundFormula::new(&self.library, periodic, &model, estimates, options);
+        let residuals = search.motion.residuals(&model, &validation);
+        let judged =
+            Judged { search: &search, model: &model, segments: &validation, residuals: &residuals, square, count };
+        found.draw(&self.library, &model, &resampled.coefficients);
+        self.describe(&mut found, &judged);
+        if let Some(rival) = rival {
+            found.several = rival.cost < TERM_COST;
+            found.rival = Some(self.rival(&rival));
+        }
+        if !converged {
+            found.notes.push(format!("the choice of terms has not converged after {ROUNDS_OF_CHOICE} rounds"));
+        }
+        if let (Some(Drive { name, .. }), Some(standard_error)) = (&self.library.drive, covariance.frequency) {
+            found.drive = Some(FoundDrive { name: name.clone(), frequency: model.frequency, standard_error });
+        }
+        self.judge(&mut found, &judged, covariance.converged);
+        Ok(found)
+    }
+
+    /// The search through the motion that starts from a choice, and the model of that choice.
+    fn search<'a>(
+        &'a self,
+        choice: &Choice,
+        data: &'a Prepared<'a>,
+        training: &[Segment],
+        options: &FormulaOptions,
+    ) -> (Search<'a>, Model) {
         let (library, kept) = (&self.library, &self.quotient.kept);
-        let mut model = Model {
+        let model = Model {
             terms: choice.set.iter().map(|&k| kept[k]).collect(),
             coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
             frequency: library.drive.as_ref().map_or(0.0, |drive| drive.frequency),
@@ -193,99 +242,97 @@ impl WeakForm {
         candidates.sort_unstable();
         let between = options.between.unwrap_or(Between::Linear);
         let motion = Motion { library, data, substeps: 1, between, threads: options.threads };
-        let short = data.segments(SEGMENT_PACES * data.pace);
-        let (mut judges, mut learned): (Vec<Segment>, Vec<Segment>) =
-            short.into_iter().partition(|s| held.contains(&data.block_of(s)));
-        let states = learned.iter().step_by(learned.len().div_ceil(REGULAR_STATES).max(1)).map(|s| {
+        let all: Vec<usize> = (0..library.functions.len()).collect();
+        let states = training.iter().step_by(training.len().div_ceil(REGULAR_STATES).max(1)).map(|s| {
             let mut values = Values::new();
-            let all: Vec<usize> = (0..library.functions.len()).collect();
             library.evaluate(&all, (&s.start[..data.n], 0.0), &mut values);
             values
         });
-        let mut search = Search { library, motion, candidates, states: states.collect() };
-        let stop = &options.cancellation;
-        stop.stage("short segments");
-        search.motion.settle(&model, &mut learned, 4);
-        search.motion.choose_steps(&model, &learned);
-        search.converge(&mut model, &mut learned, ROUNDS_OF_CHOICE);
-        if options.between.is_none() && data.forced.contains(&true) {
-            search.motion.choose_between(&mut model, &mut learned);
-        }
-        stop.check()?;
-        stop.stage("longer segments");
-        // Longer segments determine the constants better; their initial states are known by now.
-        let before = (model.clone(), learned.clone());
-        let short = search.motion.settle(&model, &mut learned, 1);
-        let mut learned = data.joined(&learned);
-        search.motion.choose_steps(&model, &learned);
-        let (mut blocks, mut chosen) = search.converge(&mut model, &mut learned, ROUNDS_OF_CHOICE);
-        let long = search.motion.settle(&model, &mut learned, 1);
-        if long.0 / long.1 > LONG_SEGMENT_RESIDUAL * short.0 / short.1 {
-            // The motion is too unstable to be followed for so long.
-            (model, learned) = before;
-            (blocks, chosen) = search.converge(&mut model, &mut learned, 0);
-        }
-        let rival = search.exchange(&mut model, &mut learned, &mut blocks);
-        search.motion.settle(&model, &mut judges, 6);
-        let mut judges = data.joined(&judges);
-        stop.check()?;
-        stop.stage("probabilities");
-        let resampled = search.resample(&model, &blocks, &learned, (options.bootstraps, options.seed));
-        stop.check()?;
-        let shortened = shorten(&search, &self.quotient, &mut model, &mut learned);
-        let covariance = covariance(&search, &mut model, &mut learned);
-        let (square, count) = search.motion.settle(&model, &mut judges, 8);
-        let share = |k: &usize| resampled.share.get(k).copied().unwrap_or(1.0);
-        let probability = |k: &usize| match shortened.get(k) {
-            Some(replaced) => replaced.iter().map(share).fold(1.0, f64::min),
-            None => share(k),
-        };
-        let probability: Vec<f64> = model.terms.iter().map(probability).collect();
-        let periodic = &data.recording.periodic;
-        let mut found = FoundFormula::new(library, periodic, &model, (&covariance.coefficients, &probability), options);
-        let residuals = search.motion.residuals(&model, &judges);
-        let judged = Judged { search: &search, model: &model, segments: &judges, residuals: &residuals, square, count };
+        (Search { library, motion, candidates, states: states.collect() }, model)
+    }
+
+    /// Reports the held-out motion and the data of a search.
+    fn describe(&self, found: &mut FoundFormula, judged: &Judged<'_>) {
+        let motion = &judged.search.motion;
+        let data = motion.data;
         found.paths = judged.paths();
-        found.forced.clone_from(&data.forced);
-        found.draw(library, &model, &resampled.coefficients);
         found.residual = judged.residual();
+        found.left = left_over(motion, judged.model, judged.segments);
+        found.forced.clone_from(&data.forced);
         found.noise = data.sigma.clone();
         found.noise_resolved = data.resolved;
-        found.left = left_over(&search.motion, &model, &judges);
-        found.searched = (library.searched, self.quotient.removed);
+        found.searched = (self.library.searched, self.quotient.removed);
         found.bounds = data.bounds.clone();
         found.speeds = data.speeds.clone();
-        found.between = data.forced.contains(&true).then_some(search.motion.between);
-        if let Some(rival) = rival {
-            found.several = rival.cost < TERM_COST;
-            let written = |&k: &usize| {
-                let kind = if library.is_dissipation(k) { "D: " } else { "" };
-                format!("{kind}{}", library.written(k, Notation::System))
-            };
-            found.rival = Some(Rival { terms: rival.model.terms.iter().map(written).collect(), cost: rival.cost });
-        }
-        if !chosen {
-            found.notes.push(format!("the choice of terms has not converged after {ROUNDS_OF_CHOICE} rounds"));
-        }
-        if let (Some(Drive { name, .. }), Some(standard_error)) = (&library.drive, covariance.frequency) {
-            found.drive = Some(FoundDrive { name: name.clone(), frequency: model.frequency, standard_error });
-        }
-        if !covariance.converged {
+        found.between = data.forced.contains(&true).then_some(motion.between);
+    }
+
+    /// The best choice of terms that was not taken, in words.
+    fn rival(&self, rival: &Exchanged) -> Rival {
+        let written = |&k: &usize| {
+            let kind = if self.library.is_dissipation(k) { "D: " } else { "" };
+            format!("{kind}{}", self.library.written(k, Notation::System))
+        };
+        Rival { terms: rival.model.terms.iter().map(written).collect(), cost: rival.cost }
+    }
+
+    /// Sets the verdict on a formula, with the reasons for doubt; `converged` refers to the fit of its coefficients.
+    fn judge(&self, found: &mut FoundFormula, judged: &Judged<'_>, converged: bool) {
+        if !converged {
             found.doubts.push("the fit of the coefficients has not converged".to_string());
         }
         found.doubts.extend(judged.doubts());
         if found.drive.is_some() {
-            found.doubts.extend(drive_doubts(&search.motion, &model));
+            found.doubts.extend(drive_doubts(&judged.search.motion, judged.model));
         }
         found.verdict = judged.verdict(&found.doubts);
         if found.verdict == Verdict::NotInLibrary {
             found.doubts.clear();
         }
-        if !self.path.settled && found.verdict != Verdict::Found {
+        if !self.path.converged && found.verdict != Verdict::Found {
             found.notes.push("the exchange of terms in the weak form was stopped before it converged".to_string());
         }
-        Ok(found)
     }
+}
+
+/// A model fitted to segments of the motion.
+struct Fitted {
+    model: Model,
+    segments: Vec<Segment>,
+    blocks: BTreeMap<usize, BlockSum>,
+    /// `false` if the choice of terms did not converge.
+    converged: bool,
+}
+
+/// Fits a model to short segments of the motion, then to longer ones, which determine the constants better.
+fn fit_segments(
+    search: &mut Search<'_>,
+    mut model: Model,
+    mut segments: Vec<Segment>,
+    options: &FormulaOptions,
+) -> Result<Fitted, FormulaError> {
+    let (data, stop) = (search.motion.data, &options.cancellation);
+    stop.stage("short segments");
+    search.motion.settle(&model, &mut segments, 4);
+    search.motion.choose_steps(&model, &segments);
+    search.converge(&mut model, &mut segments, ROUNDS_OF_CHOICE);
+    if options.between.is_none() && data.forced.contains(&true) {
+        search.motion.choose_between(&mut model, &mut segments);
+    }
+    stop.check()?;
+    stop.stage("longer segments");
+    let before = (model.clone(), segments.clone());
+    let short = search.motion.settle(&model, &mut segments, 1);
+    let mut segments = data.joined(&segments);
+    search.motion.choose_steps(&model, &segments);
+    let (mut blocks, mut converged) = search.converge(&mut model, &mut segments, ROUNDS_OF_CHOICE);
+    let long = search.motion.settle(&model, &mut segments, 1);
+    if long.0 / long.1 > LONG_SEGMENT_RESIDUAL * short.0 / short.1 {
+        // The motion is too unstable to be followed for so long.
+        (model, segments) = before;
+        (blocks, converged) = search.converge(&mut model, &mut segments, 0);
+    }
+    Ok(Fitted { model, segments, blocks, converged })
 }
 
 /// The blocks that are held out: one in [`BLOCKS_PER_HELD_OUT`], chosen at random.
@@ -300,7 +347,7 @@ pub(super) fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
 
 /// The shortest choice whose error is near the smallest, with a positive definite mass matrix if such a choice is not much worse; then other
 /// choices near the smallest error.
-fn beginnings<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
+fn starting_choices<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
     let few: Vec<&'a Choice> = path.best.values().filter(|choice| choice.set.len() <= MOST_STARTING_TERMS).collect();
     let least = few.iter().map(|choice| judged(choice)).fold(f64::INFINITY, f64::min);
     let near = |most: f64| few.iter().copied().filter(move |choice| judged(choice) <= most * least);

@@ -56,46 +56,18 @@ impl<'a> Prepared<'a> {
         let smooth =
             |track: &RecordedTrajectory| (track.len() >= LEAST_SAMPLES).then(|| smoothing.apply(track)).transpose();
         let smoothed = recording.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
-        let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
-        for track in &recording.tracks {
-            for row in track.q.chunks_exact(n) {
-                bounds.iter_mut().zip(row).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
-            }
-        }
-        for b in &mut bounds {
-            if b[1] - b[0] < 1e-9 * b[0].abs().max(1e-9) {
-                *b = [b[0] - 0.5, b[1] + 0.5];
-            }
-        }
-        let sigma = (0..n).map(|i| {
-            let least = LEAST_RELATIVE_NOISE * (bounds[i][1] - bounds[i][0]);
-            smoothing.coordinates[i].noise.sigma.max(least)
-        });
-        let inner = || smoothed.iter().flatten().flat_map(|s| s.interior().map(move |at| (s, at)));
-        let spread = |of: &dyn Fn(&Smoothed, usize) -> f64| {
-            let values: Vec<f64> = inner().map(|(s, at)| of(s, at)).collect();
-            let count = values.len().max(1) as f64;
-            let mean = values.iter().sum::<f64>() / count;
-            (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
-        };
-        let speeds: Vec<f64> = (0..n).map(|i| spread(&|s, at| s.v[at * n + i])).collect();
-        let turns: Vec<f64> = (0..n).map(|i| spread(&|s, at| s.a[at * n + i])).collect();
-        let mut paces: Vec<f64> =
-            speeds.iter().zip(&turns).map(|(v, a)| v / a).filter(|p| p.is_finite() && *p > 0.0).collect();
-        paces.sort_by(f64::total_cmp);
+        let bounds = ranges(recording);
+        let least = |i: usize| LEAST_RELATIVE_NOISE * (bounds[i][1] - bounds[i][0]);
+        let sigma: Vec<f64> = (0..n).map(|i| smoothing.coordinates[i].noise.sigma.max(least(i))).collect();
+        let speeds: Vec<f64> = (0..n).map(|i| interior_spread(&smoothed, &|s, at| s.v[at * n + i])).collect();
+        let accelerations: Vec<f64> = (0..n).map(|i| interior_spread(&smoothed, &|s, at| s.a[at * n + i])).collect();
         let step = smoothing.step;
-        let pace = paces.first().copied().unwrap_or(20.0 * step).max(4.0 * step);
+        let pace = time_scale(&speeds, &accelerations, step);
         let resolved = smoothing.coordinates.iter().all(|c| c.noise.resolved);
         let speeds = speeds.into_iter().map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-        let sigma: Vec<f64> = sigma.collect();
         let own = |track: &RecordedTrajectory, i: usize| {
-            let usual = sigma[i];
-            if options.noise.is_some() || track.len() < LEAST_OWN_NOISE_SAMPLES {
-                return usual;
-            }
-            let own = noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), n, i).sigma;
-            let other = !(usual / OWN_NOISE_RATIO..usual * OWN_NOISE_RATIO).contains(&own);
-            if other { own.max(LEAST_RELATIVE_NOISE * (bounds[i][1] - bounds[i][0])) } else { usual }
+            let given = options.noise.is_some() || track.len() < LEAST_OWN_NOISE_SAMPLES;
+            if given { sigma[i] } else { own_noise(track, (n, i), sigma[i], least(i)) }
         };
         let sigma_of = recording.tracks.iter().map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
         let spread = (0..n).map(|i| spread_of(recording, i)).collect();
@@ -225,6 +197,46 @@ impl<'a> Prepared<'a> {
     pub fn joined(&self, segments: &[Segment]) -> Vec<Segment> {
         segments.chunk_by(|a, b| self.block_of(a) == self.block_of(b)).flat_map(joined).collect()
     }
+}
+
+/// Ranges of the coordinates; a coordinate that stands still gets a range of 1.
+fn ranges(recording: &Recording) -> Vec<[f64; 2]> {
+    let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; recording.n()];
+    for track in &recording.tracks {
+        for row in track.q.chunks_exact(recording.n()) {
+            bounds.iter_mut().zip(row).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
+        }
+    }
+    for b in &mut bounds {
+        if b[1] - b[0] < 1e-9 * b[0].abs().max(1e-9) {
+            *b = [b[0] - 0.5, b[1] + 0.5];
+        }
+    }
+    bounds
+}
+
+/// Standard deviation of a quantity over all samples away from the ends of trajectories.
+fn interior_spread(smoothed: &[Option<Smoothed>], quantity: &dyn Fn(&Smoothed, usize) -> f64) -> f64 {
+    let interior = smoothed.iter().flatten().flat_map(|s| s.interior().map(move |at| (s, at)));
+    let values: Vec<f64> = interior.map(|(s, at)| quantity(s, at)).collect();
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+/// The shortest time in which a speed changes by its own size; at least four steps.
+fn time_scale(speeds: &[f64], accelerations: &[f64], step: f64) -> f64 {
+    let times = speeds.iter().zip(accelerations).map(|(v, a)| v / a);
+    let mut times: Vec<f64> = times.filter(|p| p.is_finite() && *p > 0.0).collect();
+    times.sort_by(f64::total_cmp);
+    times.first().copied().unwrap_or(20.0 * step).max(4.0 * step)
+}
+
+/// The noise of coordinate `i` of `n` in a trajectory, if it clearly differs from `usual`, else `usual`.
+fn own_noise(track: &RecordedTrajectory, (n, i): (usize, usize), usual: f64, least: f64) -> f64 {
+    let own = noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), n, i).sigma;
+    let differs = !(usual / OWN_NOISE_RATIO..usual * OWN_NOISE_RATIO).contains(&own);
+    if differs { own.max(least) } else { usual }
 }
 
 /// Samples of smoothed motion, between which polynomials interpolate.

@@ -12,6 +12,7 @@ use super::thresholds::{
     STATES_PER_HELD_OUT, UNDETERMINED_ERROR,
 };
 use super::weak::{State, Windows};
+use crate::cancellation::Cancellation;
 use crate::identification::linear::{inverse_with, times};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{self, Workspace, dot};
@@ -19,11 +20,11 @@ use crate::random::RngStream;
 use rand::Rng;
 
 /// A state with the mass matrix and the acceleration of a model.
-struct Asked {
+struct ModelState {
     q: Vec<f64>,
     v: Vec<f64>,
     mass: Vec<f64>,
-    own: Vec<f64>,
+    acceleration: Vec<f64>,
 }
 
 /// Finds a formula for a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at random accelerations `a`, or by
@@ -45,75 +46,154 @@ pub fn formula_of_model(
     let extent = Extent { families, gyroscopic: options.gyroscopic, friction, drive: None };
     let library = Library::new(names, periodic, extent, &options.functions)?;
     let n = library.n();
-    let mut rng = RngStream::Region.generator(options.seed);
-    let mut terms = Terms::default();
-    let mut known: Vec<Asked> = Vec::new();
-    let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_MODEL_STATES);
     let stop = &options.cancellation;
     stop.stage("states of the model");
-    for (q, v) in rows() {
+    let rows: Vec<(&[f64], &[f64])> = q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_MODEL_STATES).collect();
+    let states = evaluated(model, &rows, stop)?;
+    let scales = Scales::of(&states, n);
+    let (kept, quotient) = library.independent(&scales.bounds, options.seed);
+    let found = choose(&library, &kept, (&states, &scales), options)?;
+    let ModelChoice { windows, path, choice } =
+        found.ok_or_else(|| FormulaError::NotFinite { failed: rows.len() - states.len(), states: rows.len() })?;
+    let covariance = covariance(&windows, &choice, &scales.sigma);
+    let of = Model {
+        terms: choice.set.iter().map(|&k| kept[k]).collect(),
+        coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
+        frequency: 0.0,
+    };
+    let residual = residual(&choice, n);
+    let probability = probabilities(&windows, &choice, &path, &scales.sigma, options);
+    let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
+    found.verdict = if residual <= MOST_MODEL_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
+    found.residual = residual;
+    found.noise = scales.sigma;
+    found.of_model = true;
+    found.searched = (library.searched, quotient.removed);
+    (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
+    (found.bounds, found.speeds) = (scales.bounds, scales.speeds);
+    found.rescale(options.scale.as_ref())?;
+    found.name_constants();
+    stop.check()?;
+    Ok(found)
+}
+
+/// The states at which a model is finite, which must be at least half of them.
+fn evaluated(
+    model: &dyn EulerLagrange<f64>,
+    rows: &[(&[f64], &[f64])],
+    stop: &Cancellation,
+) -> Result<Vec<ModelState>, FormulaError> {
+    let mut terms = Terms::default();
+    let mut found: Vec<ModelState> = Vec::new();
+    for (q, v) in rows {
         stop.check()?;
         let fine = model.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms).is_ok();
         if fine && terms.acceleration.iter().chain(&terms.mass_matrix).all(|x| x.is_finite()) {
-            let (mass, own) = (terms.mass_matrix.clone(), terms.acceleration.clone());
-            known.push(Asked { q: q.to_vec(), v: v.to_vec(), mass, own });
+            let (mass, acceleration) = (terms.mass_matrix.clone(), terms.acceleration.clone());
+            found.push(ModelState { q: q.to_vec(), v: v.to_vec(), mass, acceleration });
         }
     }
-    let (states, failed) = (rows().count(), rows().count() - known.len());
-    if known.len() < LEAST_MODEL_STATES || 2 * failed > states {
-        return Err(FormulaError::NotFinite { failed, states });
+    let (states, failed) = (rows.len(), rows.len() - found.len());
+    let enough = found.len() >= LEAST_MODEL_STATES && 2 * failed <= states;
+    if enough { Ok(found) } else { Err(FormulaError::NotFinite { failed, states }) }
+}
+
+/// Typical accelerations and speeds of states, and the ranges of their coordinates.
+struct Scales {
+    sigma: Vec<f64>,
+    speeds: Vec<f64>,
+    bounds: Vec<[f64; 2]>,
+}
+
+impl Scales {
+    fn of(states: &[ModelState], n: usize) -> Self {
+        let count = states.len() as f64;
+        let scale =
+            |of: &dyn Fn(&ModelState) -> f64| (count / states.iter().map(of).sum::<f64>()).sqrt().recip().max(1e-9);
+        let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
+        for ModelState { q, .. } in states {
+            bounds.iter_mut().zip(q).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
+        }
+        Self {
+            sigma: (0..n).map(|i| scale(&|s| s.acceleration[i].powi(2))).collect(),
+            speeds: (0..n).map(|i| scale(&|s| s.v[i].powi(2))).collect(),
+            bounds,
+        }
     }
-    let scale = |of: &dyn Fn(usize) -> f64| (known.len() as f64 / (0..known.len()).map(of).sum::<f64>()).sqrt().recip();
-    let sigma: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].own[i].powi(2)).max(1e-9)).collect();
-    let speeds: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].v[i].powi(2)).max(1e-9)).collect();
-    let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
-    for Asked { q, .. } in &known {
-        bounds.iter_mut().zip(q).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
-    }
-    let (kept, quotient) = library.independent(&bounds, options.seed);
+}
+
+/// A choice of terms for a model, the equations of its own motion, and the elimination that led to the choice.
+struct ModelChoice {
+    windows: Windows,
+    path: Path,
+    choice: Choice,
+}
+
+/// Chooses terms by the mass matrix and the motion of a model, or by its motion alone if no formula has its mass matrix; `None` if there is no
+/// choice.
+fn choose(
+    library: &Library,
+    kept: &[usize],
+    (states, scales): (&[ModelState], &Scales),
+    options: &FormulaOptions,
+) -> Result<Option<ModelChoice>, FormulaError> {
+    let (n, sigma, stop) = (library.n(), &scales.sigma, &options.cancellation);
     let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
     stop.stage("choice of terms");
     let all: Vec<usize> = (0..kept.len()).collect();
     let search = |windows: &Windows, start: &[f64]| {
-        eliminate_backward(windows, (&all, start), (&sigma, &complexity), &judges, stop)
+        eliminate_backward(windows, (&all, start), (sigma, &complexity), &is_validation, stop)
     };
-    // The model's own motion, which contains the mass matrix only as far as it affects the motion.
-    let moving = known.iter().map(|Asked { q, v, own, .. }| {
-        let (q, v, a) = (q.clone(), v.clone(), own.clone());
-        State { q, v, a, equation: Vec::new() }
-    });
-    let motion = Windows::of_states(&library, &kept, &moving.collect::<Vec<_>>());
-    let masses = mass_coefficients(&library, &kept, &known);
-    let asked: Vec<State> = known
-        .into_iter()
-        .map(|Asked { q, v, mass, own }| {
-            let a: Vec<f64> = (0..n).map(|i| own[i] + 2.0 * sigma[i] * (rng.random::<f64>() - 0.5)).collect();
-            let difference: Vec<f64> = a.iter().zip(&own).map(|(a, own)| a - own).collect();
-            State { equation: times(n, &mass, &difference), q, v, a }
-        })
-        .collect();
-    let windows = Windows::of_states(&library, &kept, &asked);
-    let start = masses.unwrap_or_else(|| windows.unit_mass(&library, &kept, &vec![1.0; n]));
-    let none = || FormulaError::NotFinite { failed, states };
+    let motion = Windows::of_states(library, kept, &unforced(states));
+    let windows = Windows::of_states(library, kept, &forced(states, sigma, options.seed));
+    let masses = mass_coefficients(library, kept, states);
+    let start = masses.unwrap_or_else(|| windows.unit_mass(library, kept, &vec![1.0; n]));
     let mut path = search(&windows, &start);
     stop.check()?;
-    let mut choice = elbow(&path, n).cloned().ok_or_else(none)?;
-    let residual = |choice: &Choice| (choice.held_out / n as f64).sqrt();
-    choice = refit((&motion, &windows), choice, &sigma);
-    if residual(&choice) > MOST_MODEL_RESIDUAL {
+    let Some(first) = elbow(&path, n).cloned() else { return Ok(None) };
+    let mut choice = refit((&motion, &windows), first, sigma);
+    if residual(&choice, n) > MOST_MODEL_RESIDUAL {
         // No formula has the mass matrix of the model, though one may have its motion: a function of L has the motion of L.
         let alone = search(&motion, &choice.coefficients);
-        let found = elbow(&alone, n).map(|found| refit((&motion, &windows), found.clone(), &sigma));
-        if let Some(found) = found.filter(|found| residual(found) < residual(&choice)) {
+        let found = elbow(&alone, n).map(|found| refit((&motion, &windows), found.clone(), sigma));
+        if let Some(found) = found.filter(|found| residual(found, n) < residual(&choice, n)) {
             (path, choice) = (alone, found);
         }
     }
-    let (windows, choice) = (motion, &choice);
+    Ok(Some(ModelChoice { windows: motion, path, choice }))
+}
+
+/// The model's own motion, which contains the mass matrix only as far as it affects the motion.
+fn unforced(states: &[ModelState]) -> Vec<State> {
+    let of = |ModelState { q, v, acceleration, .. }: &ModelState| {
+        let (q, v, a) = (q.clone(), v.clone(), acceleration.clone());
+        State { q, v, a, equation: Vec::new() }
+    };
+    states.iter().map(of).collect()
+}
+
+/// Motion with random accelerations, and the forces that it takes by the model's mass matrix.
+fn forced(states: &[ModelState], sigma: &[f64], seed: u64) -> Vec<State> {
+    let (n, mut rng) = (sigma.len(), RngStream::Region.generator(seed));
+    let of = |ModelState { q, v, mass, acceleration }: &ModelState| {
+        let a: Vec<f64> = (0..n).map(|i| acceleration[i] + 2.0 * sigma[i] * (rng.random::<f64>() - 0.5)).collect();
+        let difference: Vec<f64> = a.iter().zip(acceleration).map(|(a, own)| a - own).collect();
+        State { equation: times(n, mass, &difference), q: q.clone(), v: v.clone(), a }
+    };
+    states.iter().map(of).collect()
+}
+
+/// Root mean square error of held-out accelerations, relative to their size.
+fn residual(choice: &Choice, n: usize) -> f64 {
+    (choice.held_out / n as f64).sqrt()
+}
+
+/// Covariance of the coefficients of a choice, with the common factor of each group fixed: the motion does not determine it.
+fn covariance(windows: &Windows, choice: &Choice, sigma: &[f64]) -> Vec<f64> {
+    let (n, m) = (sigma.len(), choice.set.len());
     let used = vec![true; windows.len()];
-    let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
-    let m = choice.set.len();
-    let rest = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
-    // The motion does not determine the common factor of each group.
+    let normal = windows.normal(&choice.coefficients, &choice.set, sigma, &used);
+    let variance = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
     let weight =
         (0..m).map(|k| normal.matrix[k * m + k] * choice.coefficients[choice.set[k]].powi(2)).fold(0.0, f64::max);
     let mut pinned = normal.matrix.clone();
@@ -123,30 +203,11 @@ pub fn formula_of_model(
         }
     }
     let covariance = inverse_with(m, &pinned, RIDGE).unwrap_or(vec![f64::NAN; m * m]);
-    let covariance: Vec<f64> = covariance.into_iter().map(|x| x * rest).collect();
-    let of = Model {
-        terms: choice.set.iter().map(|&k| kept[k]).collect(),
-        coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
-        frequency: 0.0,
-    };
-    let residual = residual(choice);
-    let probability = probabilities(&windows, choice, &path, &sigma, options);
-    let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
-    found.verdict = if residual <= MOST_MODEL_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
-    found.residual = residual;
-    found.noise = sigma;
-    found.of_model = true;
-    found.searched = (library.searched, quotient.removed);
-    (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
-    (found.bounds, found.speeds) = (bounds, speeds);
-    found.rescale(options.scale.as_ref())?;
-    found.name_constants();
-    stop.check()?;
-    Ok(found)
+    covariance.into_iter().map(|x| x * variance).collect()
 }
 
 /// Coefficients of kinetic terms that reproduce the mass matrices of a model, every element in units of its coordinates' typical values.
-fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Option<Vec<f64>> {
+fn mass_coefficients(library: &Library, kept: &[usize], known: &[ModelState]) -> Option<Vec<f64>> {
     let n = library.n();
     let size = |i: usize| known.iter().map(|k| k.mass[i * n + i].abs()).sum::<f64>() / known.len() as f64;
     let sizes: Vec<f64> = (0..n).map(size).collect();
@@ -156,7 +217,7 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
     let m = kinetic.len();
     let functions = library.functions_of(kept);
     let (mut values, mut matrix, mut right) = (Values::new(), vec![0.0; m * m], vec![0.0; m]);
-    for Asked { q, mass, .. } in known {
+    for ModelState { q, mass, .. } in known {
         library.evaluate(&functions, (q, 0.0), &mut values);
         for (k, &(_, (i, j), f)) in kinetic.iter().enumerate() {
             // An off-diagonal element appears twice in the matrix.
@@ -175,13 +236,13 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
 }
 
 /// `true` for a validation state.
-fn judges(block: usize) -> bool {
+fn is_validation(block: usize) -> bool {
     block.is_multiple_of(STATES_PER_HELD_OUT)
 }
 
 /// A choice of terms with coefficients from the motion of the model; in directions that the motion does not determine, the mass matrix decides.
 fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f64]) -> Choice {
-    let held_out: Vec<bool> = motion.blocks.iter().map(|&block| judges(block)).collect();
+    let held_out: Vec<bool> = motion.blocks.iter().map(|&block| is_validation(block)).collect();
     let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
     let (set, m) = (choice.set.clone(), choice.set.len());
     let principal = |matrix: &[f64]| {
@@ -190,12 +251,12 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
         done.is_ok().then_some((values, vectors))
     };
     for _ in 0..MODEL_REFITS {
-        let [moved, asked] = [motion, windows].map(|of| of.normal(&choice.coefficients, &set, sigma, &learned));
+        let [of_motion, of_masses] = [motion, windows].map(|of| of.normal(&choice.coefficients, &set, sigma, &learned));
         // Directions in which the mass matrix changes equally.
-        let Some((sizes, axes)) = principal(&asked.matrix) else { break };
+        let Some((sizes, axes)) = principal(&of_masses.matrix) else { break };
         let least = RIDGE * sizes.iter().copied().fold(0.0, f64::max);
         let unit: Vec<f64> = (0..m * m).map(|at| axes[at] / sizes[at / m].max(least).sqrt()).collect();
-        let of = |a: &[f64], b: &[f64]| dot(a, &times(m, &moved.matrix, b));
+        let of = |a: &[f64], b: &[f64]| dot(a, &times(m, &of_motion.matrix, b));
         let rows: Vec<&[f64]> = unit.chunks_exact(m).collect();
         let both: Vec<f64> = (0..m * m).map(|at| of(rows[at / m], rows[at % m])).collect();
         let Some((costs, turns)) = principal(&both) else { break };
@@ -203,8 +264,8 @@ fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f
         let mut x = vec![0.0; m];
         for (_, turn) in costs.iter().zip(turns.chunks_exact(m)).filter(|(cost, _)| **cost <= open) {
             let direction: Vec<f64> = (0..m).map(|k| (0..m).map(|i| turn[i] * rows[i][k]).sum()).collect();
-            let part = dot(&direction, &asked.right);
-            x.iter_mut().zip(&direction).for_each(|(x, d)| *x += part * d);
+            let share = dot(&direction, &of_masses.right);
+            x.iter_mut().zip(&direction).for_each(|(x, d)| *x += share * d);
         }
         set.iter().zip(x).for_each(|(&k, x)| choice.coefficients[k] = x);
     }

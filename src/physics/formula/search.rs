@@ -135,6 +135,18 @@ pub(super) struct Resampled {
     pub coefficients: BTreeMap<usize, Vec<f64>>,
 }
 
+impl Resampled {
+    /// Probabilities of a model's terms; a term that replaced others has the smallest of theirs.
+    pub fn probabilities(&self, model: &Model, replaced: &BTreeMap<usize, Vec<usize>>) -> Vec<f64> {
+        let share = |k: &usize| self.share.get(k).copied().unwrap_or(1.0);
+        let probability = |k: &usize| match replaced.get(k) {
+            Some(replaced) => replaced.iter().map(share).fold(1.0, f64::min),
+            None => share(k),
+        };
+        model.terms.iter().map(probability).collect()
+    }
+}
+
 impl Search<'_> {
     /// Draws blocks at random, and chooses the terms for each bootstrap sample.
     pub fn resample(

@@ -31,7 +31,7 @@ pub(super) struct Path {
     /// All terms in the order of removal, the last ones first.
     pub order: Vec<usize>,
     /// `false` if exchanges were stopped while they still improved choices.
-    pub settled: bool,
+    pub converged: bool,
 }
 
 impl Path {
@@ -42,11 +42,14 @@ impl Path {
     }
 }
 
+/// A backward elimination.
 struct Search<'a> {
     windows: &'a Windows,
     sigma: &'a [f64],
     complexity: &'a [f64],
-    learned: Vec<bool>,
+    cancellation: &'a Cancellation,
+    /// Windows that are used for training, and those that are held out.
+    training: Vec<bool>,
     held_out: Vec<bool>,
 }
 
@@ -141,7 +144,7 @@ impl Search<'_> {
         let groups = self.windows.groups(set);
         let mut coefficients = start.to_vec();
         for _ in 0..refits {
-            let normal = self.windows.normal(&coefficients, set, self.sigma, &self.learned);
+            let normal = self.windows.normal(&coefficients, set, self.sigma, &self.training);
             coefficients = self.spread(set, &solve(&normal, &groups)?);
         }
         // A nearly singular mass matrix fits everything.
@@ -160,13 +163,13 @@ impl Search<'_> {
 
     fn judged(&self, set: Vec<usize>, coefficients: Vec<f64>) -> Option<Choice> {
         let errors = self.windows.errors(&coefficients, self.sigma);
-        let (error, held_out) = (mean(&errors, &self.learned), mean(&errors, &self.held_out));
+        let (error, held_out) = (mean(&errors, &self.training), mean(&errors, &self.held_out));
         error.is_finite().then_some(Choice { set, coefficients, error, held_out })
     }
 
     /// The best choice with one term less.
     fn shorter(&self, from: &Choice) -> Option<Choice> {
-        let normal = self.windows.normal(&from.coefficients, &from.set, self.sigma, &self.learned);
+        let normal = self.windows.normal(&from.coefficients, &from.set, self.sigma, &self.training);
         let costs = normal.costs(&self.windows.groups(&from.set))?;
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
@@ -190,7 +193,7 @@ impl Search<'_> {
 
     /// Choices with one term more, for the most promising terms.
     fn longer(&self, from: &Choice, all: &[usize]) -> Vec<Choice> {
-        let normal = self.windows.normal(&from.coefficients, all, self.sigma, &self.learned);
+        let normal = self.windows.normal(&from.coefficients, all, self.sigma, &self.training);
         let own: Vec<usize> = (0..all.len()).filter(|&k| from.set.contains(&all[k])).collect();
         let mut gains: Vec<(f64, usize)> = (0..all.len())
             .filter(|k| !own.contains(k))
@@ -212,10 +215,10 @@ impl Search<'_> {
     }
 }
 
-/// Removes terms of a set, from all of them down to one per coordinate or fewer, then exchanges some while that improves the choices.
+/// Removes terms from a set one after the other, down to one per coordinate or fewer, then exchanges terms while that improves the choices.
 ///
-/// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks used
-/// only for validation. The result is meaningless after a cancellation.
+/// `start` holds coefficients with a regular mass matrix, `sigma` the unit of the errors of accelerations; `held_out` is `true` for blocks that
+/// are used for validation alone. The result is meaningless after a cancellation.
 pub(super) fn eliminate_backward(
     windows: &Windows,
     (all, start): (&[usize], &[f64]),
@@ -224,75 +227,93 @@ pub(super) fn eliminate_backward(
     cancellation: &Cancellation,
 ) -> Path {
     let held_out: Vec<bool> = windows.blocks.iter().map(|&block| held_out(block)).collect();
-    let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
-    let search = Search { windows, sigma, complexity, learned, held_out };
+    let training: Vec<bool> = held_out.iter().map(|held| !held).collect();
+    let search = Search { windows, sigma, complexity, cancellation, training, held_out };
     let mut set = all.to_vec();
-    let mut coefficients = start.to_vec();
-    for _ in 0..3 {
-        let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
-        if let Some(x) = solve(&normal, &windows.groups(&set)) {
-            coefficients = search.kept_regular(&coefficients, search.spread(&set, &x));
-        }
-    }
+    let mut coefficients = search.refitted(&set, start.to_vec());
     let mut order = Vec::new();
-    // Removes many at once while there are many.
-    while set.len() > MOST_JUDGED_REMOVALS && cancellation.go_on() {
-        let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
-        let mut places: Vec<usize> = (0..set.len()).collect();
-        let goal = (set.len() * 9 / 10).max(MOST_JUDGED_REMOVALS);
-        while places.len() > goal && cancellation.go_on() {
-            let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
-            let Some(costs) = normal.of(&places).costs(&windows.groups(&left)) else { break };
-            let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
-            let kept: Vec<usize> = (0..places.len()).filter(|&k| k != gone).map(|k| set[places[k]]).collect();
-            if !windows.moves_all(&kept) {
+    search.remove_many(&mut set, &mut coefficients, &mut order);
+    let mut best = search.remove_singly(&set, &coefficients, &mut order);
+    order.reverse();
+    let converged = search.exchange(&mut best, all);
+    Path { best, order, converged }
+}
+
+impl Search<'_> {
+    /// Coefficients of a set after a few refits.
+    fn refitted(&self, set: &[usize], mut coefficients: Vec<f64>) -> Vec<f64> {
+        for _ in 0..3 {
+            let normal = self.windows.normal(&coefficients, set, self.sigma, &self.training);
+            if let Some(x) = solve(&normal, &self.windows.groups(set)) {
+                coefficients = self.kept_regular(&coefficients, self.spread(set, &x));
+            }
+        }
+        coefficients
+    }
+
+    /// Removes a tenth of the terms at a time by their first-order costs, while there are many; appends them to `order`.
+    fn remove_many(&self, set: &mut Vec<usize>, coefficients: &mut Vec<f64>, order: &mut Vec<usize>) {
+        while set.len() > MOST_JUDGED_REMOVALS && self.cancellation.go_on() {
+            let normal = self.windows.normal(coefficients, set, self.sigma, &self.training);
+            let mut places: Vec<usize> = (0..set.len()).collect();
+            let goal = (set.len() * 9 / 10).max(MOST_JUDGED_REMOVALS);
+            while places.len() > goal && self.cancellation.go_on() {
+                let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
+                let Some(costs) = normal.of(&places).costs(&self.windows.groups(&left)) else { break };
+                let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
+                let kept: Vec<usize> = (0..places.len()).filter(|&k| k != gone).map(|k| set[places[k]]).collect();
+                if !self.windows.moves_all(&kept) {
+                    break;
+                }
+                order.push(set[places.remove(gone)]);
+            }
+            if places.len() == set.len() {
                 break;
             }
-            order.push(set[places.remove(gone)]);
-        }
-        if places.len() == set.len() {
-            break;
-        }
-        let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
-        if let Some(x) = solve(&normal.of(&places), &windows.groups(&left)) {
-            let before = search.spread(&left, &left.iter().map(|&k| coefficients[k]).collect::<Vec<_>>());
-            coefficients = search.kept_regular(&before, search.spread(&left, &x));
-            set = left;
-        } else {
-            break;
+            let left: Vec<usize> = places.iter().map(|&k| set[k]).collect();
+            let Some(x) = solve(&normal.of(&places), &self.windows.groups(&left)) else { break };
+            let before = self.spread(&left, &left.iter().map(|&k| coefficients[k]).collect::<Vec<_>>());
+            *coefficients = self.kept_regular(&before, self.spread(&left, &x));
+            *set = left;
         }
     }
-    let mut best: BTreeMap<usize, Choice> = BTreeMap::new();
-    let mut choice = search.choice(&set, &coefficients, 0);
-    while let Some(found) = choice {
-        choice = if found.set.len() > 1 && cancellation.go_on() { search.shorter(&found) } else { None };
-        if let Some(next) = &choice {
-            order.extend(found.set.iter().filter(|k| !next.set.contains(k)));
-        } else {
-            order.extend(&found.set);
+
+    /// The best choice of every size, removing one term after the other; appends them to `order`.
+    fn remove_singly(&self, set: &[usize], coefficients: &[f64], order: &mut Vec<usize>) -> BTreeMap<usize, Choice> {
+        let mut best: BTreeMap<usize, Choice> = BTreeMap::new();
+        let mut choice = self.choice(set, coefficients, 0);
+        while let Some(found) = choice {
+            choice = if found.set.len() > 1 && self.cancellation.go_on() { self.shorter(&found) } else { None };
+            if let Some(next) = &choice {
+                order.extend(found.set.iter().filter(|k| !next.set.contains(k)));
+            } else {
+                order.extend(&found.set);
+            }
+            best.insert(found.set.len(), found);
         }
-        best.insert(found.set.len(), found);
+        best
     }
-    order.reverse();
-    let mut settled = false;
-    for _ in 0..WEAK_EXCHANGE_ROUNDS {
-        let mut changed = false;
-        let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= MOST_EXCHANGED_TERMS).collect();
-        for size in sizes.into_iter().take_while(|_| cancellation.go_on()) {
-            let Some(from) = best.get(&size).cloned() else { continue };
-            for longer in search.longer(&from, all) {
-                if let Some(shorter) = search.shorter(&longer) {
-                    changed |= improve(&mut best, shorter);
+
+    /// Improves short choices by adding a term and removing one; `false` if it is stopped before that has converged.
+    fn exchange(&self, best: &mut BTreeMap<usize, Choice>, all: &[usize]) -> bool {
+        for _ in 0..WEAK_EXCHANGE_ROUNDS {
+            let mut changed = false;
+            let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= MOST_EXCHANGED_TERMS).collect();
+            for size in sizes.into_iter().take_while(|_| self.cancellation.go_on()) {
+                let Some(from) = best.get(&size).cloned() else { continue };
+                for longer in self.longer(&from, all) {
+                    if let Some(shorter) = self.shorter(&longer) {
+                        changed |= improve(best, shorter);
+                    }
+                    changed |= improve(best, longer);
                 }
-                changed |= improve(&mut best, longer);
+            }
+            if !changed {
+                return true;
             }
         }
-        if !changed {
-            settled = true;
-            break;
-        }
+        false
     }
-    Path { best, order, settled }
 }
 
 /// Takes over a choice if it is better than the one of the same size.

@@ -78,6 +78,7 @@ impl Windows {
         windows
     }
 
+    /// Adds the windows of a stretch.
     fn add(
         &mut self,
         library: &Library,
@@ -85,73 +86,48 @@ impl Windows {
         stretch: &Stretch,
         (width, apart): (f64, f64),
     ) {
-        let (n, count) = (self.n, self.terms);
+        let sampled = SampledTerms::new(library, (terms, which), stretch);
         let times = &stretch.times;
-        let samples = times.len();
-        // Momenta and forces of all terms at every sample.
-        let (mut momenta, mut pulls) = (vec![0.0; samples * n * count], vec![0.0; samples * n * count]);
-        let mut functions = vec![0.0; samples * self.width];
-        let mut values = Values::new();
-        for s in 0..samples {
-            let (q, v) = (&stretch.q[s * n..(s + 1) * n], &stretch.v[s * n..(s + 1) * n]);
-            library.evaluate(which, (q, times[s]), &mut values);
-            which.iter().enumerate().for_each(|(at, &f)| functions[s * self.width + at] = values[f].value);
-            let range = s * n * count..(s + 1) * n * count;
-            let (momenta, pulls) = (&mut momenta[range.clone()], &mut pulls[range]);
-            for (at, &k) in terms.iter().enumerate() {
-                let Term { kind, function } = library.terms[k];
-                let f = &values[function];
-                let mut slope = |factor: f64| (0..n).for_each(|i| pulls[i * count + at] -= factor * f.gradient[i]);
-                match kind {
-                    Kind::Kinetic(i, j) => {
-                        momenta[i * count + at] += f.value * v[j];
-                        momenta[j * count + at] += f.value * v[i];
-                        slope(v[i] * v[j]);
-                    }
-                    Kind::Gyroscopic(i) => {
-                        momenta[i * count + at] += f.value;
-                        slope(v[i]);
-                    }
-                    Kind::Potential => slope(1.0),
-                    Kind::Dissipation(i, j) => {
-                        pulls[i * count + at] += f.value * v[j];
-                        pulls[j * count + at] += f.value * v[i];
-                    }
-                }
-            }
-        }
         let half = width / 2.0;
         let mut centre = times[0] + half;
-        while centre + half <= times[samples - 1] + 1e-9 * width {
-            let from = times.partition_point(|t| *t < centre - half);
-            let to = times.partition_point(|t| *t <= centre + half);
-            let start = self.equations.len();
-            self.equations.resize(start + n * count, 0.0);
-            let first = self.functions.len();
-            self.functions.resize(first + self.width, 0.0);
-            let mut force = vec![0.0; n];
-            for s in from..to {
-                let step = (times[(s + 1).min(samples - 1)] - times[s.saturating_sub(1)]) / 2.0;
-                let x = (times[s] - centre) / half;
-                let inside = (1.0 - x * x).max(0.0);
-                let phi = inside.powi(4) * step;
-                let slope = -8.0 * x * inside.powi(3) / half * step;
-                let range = s * n * count..(s + 1) * n * count;
-                let both = momenta[range.clone()].iter().zip(&pulls[range]);
-                let row = &mut self.equations[start..];
-                row.iter_mut().zip(both).for_each(|(e, (p, r))| *e += phi * r - slope * p);
-                let values = &functions[s * self.width..(s + 1) * self.width];
-                self.functions[first..].iter_mut().zip(values).for_each(|(i, f)| *i += phi * f);
-                if !stretch.force.is_empty() {
-                    (0..n).for_each(|i| force[i] += phi * stretch.force[s * n + i]);
-                }
-            }
-            if !stretch.force.is_empty() {
-                self.forces.extend(&force);
-            }
+        while centre + half <= times[times.len() - 1] + 1e-9 * width {
+            self.add_window(&sampled, stretch, (centre, half));
             self.blocks.push(stretch.block);
             self.centres.push(centre);
             centre += apart;
+        }
+    }
+
+    /// Integrates the terms, functions and forces over one test function.
+    fn add_window(&mut self, sampled: &SampledTerms, stretch: &Stretch, (centre, half): (f64, f64)) {
+        let (n, count) = (self.n, self.terms);
+        let times = &stretch.times;
+        let samples = times.len();
+        let from = times.partition_point(|t| *t < centre - half);
+        let to = times.partition_point(|t| *t <= centre + half);
+        let start = self.equations.len();
+        self.equations.resize(start + n * count, 0.0);
+        let first = self.functions.len();
+        self.functions.resize(first + self.width, 0.0);
+        let mut force = vec![0.0; n];
+        for s in from..to {
+            let step = (times[(s + 1).min(samples - 1)] - times[s.saturating_sub(1)]) / 2.0;
+            let x = (times[s] - centre) / half;
+            let inside = (1.0 - x * x).max(0.0);
+            let phi = inside.powi(4) * step;
+            let slope = -8.0 * x * inside.powi(3) / half * step;
+            let range = s * n * count..(s + 1) * n * count;
+            let both = sampled.momenta[range.clone()].iter().zip(&sampled.forces[range]);
+            let row = &mut self.equations[start..];
+            row.iter_mut().zip(both).for_each(|(e, (p, r))| *e += phi * r - slope * p);
+            let values = &sampled.functions[s * self.width..(s + 1) * self.width];
+            self.functions[first..].iter_mut().zip(values).for_each(|(i, f)| *i += phi * f);
+            if !stretch.force.is_empty() {
+                (0..n).for_each(|i| force[i] += phi * stretch.force[s * n + i]);
+            }
+        }
+        if !stretch.force.is_empty() {
+            self.forces.extend(&force);
         }
     }
 
@@ -203,8 +179,8 @@ impl Windows {
         let n = self.n;
         let masses = self.masses(coefficients);
         let stride = self.len().div_ceil(MASS_WINDOWS).max(1);
-        let some: Vec<f64> = masses.chunks_exact(n * n).step_by(stride).flatten().copied().collect();
-        is_regular(n, &some)
+        let checked: Vec<f64> = masses.chunks_exact(n * n).step_by(stride).flatten().copied().collect();
+        is_regular(n, &checked)
     }
 
     /// The mean mass matrices over all windows under the test function, `(windows, n, n)`.
@@ -371,6 +347,54 @@ impl Windows {
             _ => 0.0,
         };
         terms.iter().map(of).collect()
+    }
+}
+
+/// All terms at the samples of a stretch.
+struct SampledTerms {
+    /// Derivatives of the terms by the velocities, `(samples, n, terms)`.
+    momenta: Vec<f64>,
+    /// Friction minus the derivatives of the terms by the coordinates, of the same shape.
+    forces: Vec<f64>,
+    /// Values of the functions, `(samples, functions)`.
+    functions: Vec<f64>,
+}
+
+impl SampledTerms {
+    fn new(library: &Library, (terms, which): (&[usize], &[usize]), stretch: &Stretch) -> Self {
+        let (n, count, width, samples) = (library.n(), terms.len(), which.len(), stretch.times.len());
+        let (mut momenta, mut forces) = (vec![0.0; samples * n * count], vec![0.0; samples * n * count]);
+        let mut functions = vec![0.0; samples * width];
+        let mut values = Values::new();
+        for s in 0..samples {
+            let (q, v) = (&stretch.q[s * n..(s + 1) * n], &stretch.v[s * n..(s + 1) * n]);
+            library.evaluate(which, (q, stretch.times[s]), &mut values);
+            which.iter().enumerate().for_each(|(at, &f)| functions[s * width + at] = values[f].value);
+            let range = s * n * count..(s + 1) * n * count;
+            let (momenta, forces) = (&mut momenta[range.clone()], &mut forces[range]);
+            for (at, &k) in terms.iter().enumerate() {
+                let Term { kind, function } = library.terms[k];
+                let f = &values[function];
+                let mut slope = |factor: f64| (0..n).for_each(|i| forces[i * count + at] -= factor * f.gradient[i]);
+                match kind {
+                    Kind::Kinetic(i, j) => {
+                        momenta[i * count + at] += f.value * v[j];
+                        momenta[j * count + at] += f.value * v[i];
+                        slope(v[i] * v[j]);
+                    }
+                    Kind::Gyroscopic(i) => {
+                        momenta[i * count + at] += f.value;
+                        slope(v[i]);
+                    }
+                    Kind::Potential => slope(1.0),
+                    Kind::Dissipation(i, j) => {
+                        forces[i * count + at] += f.value * v[j];
+                        forces[j * count + at] += f.value * v[i];
+                    }
+                }
+            }
+        }
+        Self { momenta, forces, functions }
     }
 }
 
