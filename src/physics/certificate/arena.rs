@@ -1,4 +1,4 @@
-//! Memory and rules of the numbers that a Lagrangian is evaluated with.
+//! Memory and arithmetic of the numbers with which a Lagrangian is evaluated.
 
 use super::form::{self, Basis, Expansion};
 use super::function::Function;
@@ -28,7 +28,7 @@ pub struct Arena {
     /// Coefficients of all packs, one pack after the other; in a pack the same coefficient of all its numbers lies side by side.
     forms: RefCell<Vec<f64>>,
     packs: RefCell<Vec<Pack>>,
-    /// Set when a value was read, on which the Lagrangian may then branch unseen.
+    /// Set when a value was read: the Lagrangian may have branched on it.
     read: Cell<bool>,
     /// Bits of the axes that a function depended on where it is not known.
     blamed: Cell<u64>,
@@ -64,18 +64,18 @@ impl Arena {
         let (basis, read, blamed) = (Arc::clone(basis), Cell::new(false), Cell::new(0));
         Self { basis, n, parts, forms: RefCell::default(), packs: RefCell::default(), read, blamed }
     }
-    /// Forgets all numbers.
+    /// Removes all numbers.
     pub fn clear(&self) {
         self.forms.borrow_mut().clear();
         self.packs.borrow_mut().clear();
         self.read.set(false);
         self.blamed.set(0);
     }
-    /// Notes that a value was read.
+    /// Records that a value was read.
     pub fn note_read(&self) {
         self.read.set(true);
     }
-    /// `true` if a value was read since.
+    /// `true` if a value was read since the arena was cleared.
     pub fn was_read(&self) -> bool {
         self.read.get()
     }
@@ -83,13 +83,13 @@ impl Arena {
     pub fn blamed(&self) -> u64 {
         self.blamed.get()
     }
-    /// Notes the axes on which the value of a number depends.
+    /// Records the axes on which the value of a number depends.
     pub fn blame(&self, place: Place) {
         self.blame_form(&self.form(place, 0), 0);
     }
     fn blame_form<const W: usize>(&self, form: &[[f64; W]], lane: usize) {
         if !form::deviation(form)[lane].is_finite() {
-            // The axes responsible were noted where it arose.
+            // The axes were recorded where the unbounded value arose.
             return;
         }
         let dependent = (1..self.basis.count()).filter(|&k| form[k][lane] != 0.0);
@@ -183,7 +183,7 @@ impl Arena {
         self.layout(copy.pack)
     }
 
-    /// A function of a number; its neighbours' are found with it and remembered.
+    /// A function of a number; those of its pack are computed with it and stored.
     pub fn function(&self, f: Function, place: Place) -> Place {
         let known = {
             let packs = self.packs.borrow();

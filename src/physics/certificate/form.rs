@@ -2,8 +2,8 @@
 //!
 //! A form over a box with the axes `e_k` from -1 to 1 is a slice `[c_0, .., c_m, r]`, one coefficient per monomial of a [`Basis`]:
 //! everywhere on the box the function lies within `r` of the polynomial. Numbers are rounded to nearest, and a bound of the rounding error
-//! is added to `r`: a sum or product `x` is off by at most `EPSILON |x| / 2`, and `r` is charged at least twice that, which also covers the
-//! rounding of the charge itself.
+//! is added to `r`: a sum or product `x` is off by at most `EPSILON |x| / 2`, and at least twice that is added to `r`, which also covers the
+//! rounding of this addition itself.
 //!
 //! The forms of `W` functions lie side by side, so that vector instructions work on all of them.
 

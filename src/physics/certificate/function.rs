@@ -100,12 +100,7 @@ pub(super) fn formulas(f: Unary, x: Interval) -> Derivatives {
         }
         // ln cosh x = softplus(2 x) - x - ln 2.
         Unary::LnCosh => following((two * x).softplus() - x - two.ln(), formulas(Unary::Tanh, x)),
-        // x g(x), g = tanh(x/2) = 2 s(x) - 1: the k-th derivative is x g^(k) + k g^(k-1).
-        Unary::XTanh => {
-            let mut g = logistic(x).map(|d| two * d);
-            g[0] = (x * number(0.5)).tanh();
-            std::array::from_fn(|k| if k == 0 { x * g[0] } else { x * g[k] + number(k as f64) * g[k - 1] })
-        }
+        Unary::XTanh => x_tanh(x),
         // Numbers enclose such functions through the operations that they consist of.
         _ => [Interval::ENTIRE; 7],
     }
@@ -170,6 +165,13 @@ fn arctangent(x: Interval) -> Derivatives {
         part(5, &[24.0, -240.0, 120.0]),
         x * part(6, &[-720.0, 2400.0, -720.0]),
     ]
+}
+
+/// `x g(x)` with `g = tanh(x/2) = 2 s(x) - 1`, `s` the logistic function: the k-th derivative is `x g^(k) + k g^(k-1)`.
+fn x_tanh(x: Interval) -> Derivatives {
+    let mut g = logistic(x).map(|d| number(2.0) * d);
+    g[0] = (x * number(0.5)).tanh();
+    std::array::from_fn(|k| if k == 0 { x * g[0] } else { x * g[k] + number(k as f64) * g[k - 1] })
 }
 
 /// The complementary error function: Hermite polynomials times its first derivative.

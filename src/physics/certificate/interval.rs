@@ -281,8 +281,8 @@ impl Interval {
         }
         let (a, b) = (f(self.low), f(self.high));
         let mut found = widened(a.min(b), a.max(b));
-        // Half turns from the crest, even for crests and odd for troughs. Where rounding leaves open whether one is inside, it is
-        // taken to be: that only widens.
+        // Half turns from the crest, even for crests and odd for troughs. One that may be inside, by rounding, is counted as inside, which
+        // only widens the result.
         let (first, last) = (self.low / PI - crest, self.high / PI - crest);
         let (first, last) = ((first - 1e-8).ceil() as i64, (last + 1e-8).floor() as i64);
         for half_turn in first..=last {

@@ -1,8 +1,6 @@
-//! Certificates: where in a region of states the mass matrix `M = d2L/dv dv` is proven to have its signature, and a
-//! condition number below a
-//! bound.
+//! Certificates: proofs that the mass matrix `M = d2L/dv dv` has its signature, and a condition number below a bound, in a region of states.
 //!
-//! A Lagrangian, learned or written down, is evaluated once per box of states with numbers that carry its value and its first and second
+//! A Lagrangian, learned or given as a formula, is evaluated once per box of states with numbers that carry its value and its first and second
 //! derivatives along the velocities, each as a polynomial over the box and a bound of the distance from it (a Taylor model, of the third
 //! order for two coordinates). The result encloses the mass matrix of every state of the box; Gershgorin's and Sylvester's theorems prove
 //! the signs of its eigenvalues and bound its condition number. Undecided boxes are cut in two.
@@ -96,12 +94,11 @@ pub struct CertificateOptions<'a> {
     pub condition: Option<f64>,
     /// Time in s after which no further box is evaluated.
     pub seconds: f64,
-    /// Largest number of boxes to evaluate: a search that ends by it, not by time, gives the same result every time, on any number of
-    /// threads.
+    /// Largest number of boxes to evaluate. A search that this limit ends, rather than time, gives the same result on any number of threads.
     pub boxes: usize,
     /// Largest number of threads; if fewer can be started, the search takes longer and finds the same.
     pub threads: usize,
-    /// A flag that ends the search when raised; what is proven by then is kept.
+    /// A flag that stops the search; proofs up to then are kept.
     pub stop: Option<&'a AtomicBool>,
 }
 
@@ -162,7 +159,7 @@ pub struct Certificate {
     regions: Vec<Vec<(f64, f64)>>,
     #[cfg_attr(feature = "serde", serde(skip))]
     tree: Tree,
-    /// Coordinates that are reduced to one turn before the Lagrangian sees them.
+    /// `true` for coordinates that are reduced to one turn before the Lagrangian is evaluated.
     #[cfg_attr(feature = "serde", serde(skip))]
     wrapped: Vec<bool>,
 }
@@ -170,7 +167,7 @@ pub struct Certificate {
 impl Certificate {
     /// The verdict on a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
     ///
-    /// It takes a few comparisons, so that an integrator can ask at every step, as it does for a [`Guarded`] model.
+    /// This takes a few comparisons, so that an integrator can call it at every step, as it does for a [`Guarded`] model.
     pub fn verdict<S: Scalar>(&self, q: &[S], v: &[S]) -> Verdict {
         let wrapped = |(i, x): (usize, &S)| if self.wrapped.get(i) == Some(&true) { x.wrap_angle() } else { *x };
         let state: Vec<f64> = q.iter().enumerate().map(wrapped).chain(v.iter().copied()).map(S::to_f64).collect();
@@ -215,9 +212,9 @@ pub enum CertificateError {
         /// Negative eigenvalues.
         negative: usize,
     },
-    /// A condition number that no matrix has, or no number.
+    /// A condition number below 1, or not a number.
     Condition(f64),
-    /// More coordinates than the enclosures are made for.
+    /// More coordinates than are supported.
     Coordinates(usize),
     /// The system is not in the catalogue and has no description.
     NoLagrangian,
@@ -246,7 +243,7 @@ impl std::fmt::Display for CertificateError {
 
 impl std::error::Error for CertificateError {}
 
-/// Searches a region for states where the mass matrix of a Lagrangian has its signature.
+/// Proves in which parts of a region the mass matrix of a Lagrangian has its signature.
 ///
 /// `parameters` are those of the Lagrangian; a parameter that no `f64` equals is enclosed.
 ///
@@ -284,7 +281,7 @@ pub fn certify_system<S: Scalar>(
     configured.visit(Certify(&configured.parameters, region, options)).unwrap_or(Err(CertificateError::NoLagrangian))
 }
 
-/// The bounds of positions and velocities, one after the other, if everything fits together.
+/// The bounds of positions, then of velocities, if region and options fit the number of coordinates.
 fn checked(n: usize, region: &Bounds, options: &CertificateOptions<'_>) -> Result<Vec<(f64, f64)>, CertificateError> {
     if n > MOST_COORDINATES {
         return Err(CertificateError::Coordinates(n));
@@ -311,7 +308,7 @@ fn checked(n: usize, region: &Bounds, options: &CertificateOptions<'_>) -> Resul
     }
 }
 
-/// A search over regions with their shares.
+/// Searches regions, given with their shares.
 fn certificate(
     source: &dyn Enclose,
     regions: Vec<(Vec<(f64, f64)>, f64)>,

@@ -95,7 +95,7 @@ fn turn(bounds: Vec<(f64, f64)>, share: f64, axis: usize) -> Vec<(Vec<(f64, f64)
         return vec![part((0.0, end), share)];
     }
     let (turns, one) = ((low / TAU).floor(), Interval::point(1.0));
-    // Just below the end of a turn the quotient may be rounded up: the part before the end is not to be lost.
+    // Just below the end of a turn the quotient may be rounded up, which must not lose the part before the end.
     let short = (Interval::point(low) - Interval::point(turns) * full).low < 0.0;
     let shift = (Interval::point(turns) - if short { one } else { Interval::ZERO }) * full;
     let (first, last) = ((Interval::point(low) - shift).low.max(0.0), (Interval::point(high) - shift).high);
@@ -110,8 +110,8 @@ fn turn(bounds: Vec<(f64, f64)>, share: f64, axis: usize) -> Vec<(Vec<(f64, f64)
 /// A model with a [`Certificate`] that is consulted at every state: `dL/dq`, mass matrix and acceleration of a state that is not certified
 /// fail with [`MechanicsError::Uncertified`].
 ///
-/// An integrator stops where the certified region ends, as at the bound of a domain, and says so (`RolloutError::Uncertified`): at every
-/// state that it used, the mass matrix is proven to have its signature. `L`, momenta and the energy are given everywhere.
+/// An integrator stops where the certified region ends, as at the bound of a domain, and reports `RolloutError::Uncertified`: at every state
+/// that it used, the mass matrix is proven to have its signature. `L`, momenta and the energy are available everywhere.
 #[derive(Clone, Debug)]
 pub struct Guarded<'a, M> {
     model: M,

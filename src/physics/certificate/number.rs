@@ -271,7 +271,7 @@ fn termwise<'a>(weights: &[Number<'a>], bias: &[Number<'a>], x: &[Number<'a>]) -
 fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Interval], x: &[Number<'a>]) -> Vec<Number<'a>> {
     let (rows, inputs, stride) = (arena.block(), x.len(), arena.basis.stride());
     let outputs = weights.len() / inputs;
-    // Relative loss of a sum of `inputs` products, with room for the sums of distances.
+    // Relative rounding error of a sum of `inputs` products, with a reserve for the sums of distances.
     let loss = (inputs + stride + 16) as f64 * f64::EPSILON;
     let columns = gathered(arena, x);
     let distances = distances(&columns, (inputs, stride), loss);
@@ -293,7 +293,7 @@ fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Interval], x: &[Number
             rest = others;
             let parts = pack.chunks_exact_mut(stride * width).zip(sums.chunks_exact(stride * outputs));
             for (part, (form, sums)) in parts.enumerate() {
-                // The function 0 stays so.
+                // A function that is 0 stays 0.
                 if distances[part * inputs..(part + 1) * inputs].iter().all(|x| *x == 0.0) {
                     continue;
                 }
@@ -328,7 +328,7 @@ fn gathered(arena: &Arena, x: &[Number<'_>]) -> Vec<f64> {
                 1
             }
             Number::Variable(_, Place { pack, lane }) => {
-                // Neighbours go together.
+                // Inputs in the same pack are copied together.
                 let next = |(x, lane): (&Number<'_>, u32)| matches!(x, Number::Variable(_, place) if *place == Place { pack, lane });
                 let run = x[i..].iter().zip(lane..).take_while(|pair| next(*pair)).count();
                 arena.look(pack, |forms, width| {

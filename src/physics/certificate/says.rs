@@ -5,7 +5,7 @@ use crate::findings::Findings;
 use crate::names::pluralize;
 
 impl Certificate {
-    /// The shares of the region, bounds, and a state where the opposite is proven; `columns` names coordinates and velocities.
+    /// The shares of the region, bounds, and a state that is proven to violate the conditions; `columns` names coordinates and velocities.
     pub fn findings(&self, columns: &[String]) -> Findings {
         let mut findings = Findings::default();
         let Signature { positive, negative } = self.signature;
@@ -24,7 +24,7 @@ impl Certificate {
         if let Some(witness) = &self.witness {
             let state = columns.iter().map(String::as_str).zip(witness.q.iter().chain(&witness.v));
             let values = witness.eigenvalues.iter().map(|x| ("eigenvalue", x));
-            findings.line("A state where the opposite is proven:");
+            findings.line("A state that is proven to violate the conditions:");
             findings.lines(state.chain(values).map(|(name, x)| format!("  {name:<12} {x:>24.16e}")));
         }
         findings.line(format!("{}, {:.2} s", pluralize(self.boxes, "box", "boxes"), self.seconds));

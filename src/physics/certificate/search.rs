@@ -1,4 +1,4 @@
-//! Branch and bound: a region is cut into boxes until each is decided or time is up.
+//! Branch and bound: cuts a region into boxes until each is decided or the time is up.
 
 use super::spectrum::{Enclose, Spectrum};
 use super::thresholds::{BOXES_AT_A_TIME, HALVING_CAUTION, LARGE_BOX, MOST_HALVINGS};
@@ -10,7 +10,7 @@ use std::fmt::{Debug, Formatter};
 use std::sync::atomic;
 use std::time::{Duration, Instant};
 
-/// Knowledge of a box.
+/// What is proven about a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// Every state has the signature, and a condition number of at most `condition`.
@@ -28,7 +28,7 @@ pub enum Verdict {
 #[derive(Clone, Debug)]
 struct Node {
     verdict: Verdict,
-    /// Axis of the cut, its place, and the first of the two parts.
+    /// Axis and place of the cut, and the index of the first of its two parts.
     cut: Option<(usize, f64, usize)>,
 }
 
@@ -45,13 +45,13 @@ impl Debug for Tree {
     }
 }
 
-/// A box that waits for its turn.
+/// A box in the queue.
 struct Waiting {
     node: usize,
     bounds: Vec<(f64, f64)>,
     /// Share of the whole region.
     share: f64,
-    /// Estimated number of halvings until its parts are decided, from the spectrum of the box that it was cut from.
+    /// Estimated number of halvings until its parts are decided, from the spectrum of its parent.
     halvings: f64,
 }
 
@@ -82,7 +82,7 @@ impl Ord for Waiting {
     }
 }
 
-/// Findings of a search.
+/// Result of a search.
 #[derive(Default)]
 pub struct Found {
     pub tree: Tree,
@@ -94,10 +94,10 @@ pub struct Found {
     pub witness: Option<Witness>,
 }
 
-/// Cuts boxes whose shares of the region are given with them, until each is decided, or time, the number of boxes or a flag ends the search.
+/// Cuts boxes, given with their shares of the region, until each is decided or the time, the number of boxes or a flag ends the search.
 pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &CertificateOptions<'_>) -> Found {
     let deadline = Instant::now().checked_add(Duration::try_from_secs_f64(options.seconds).unwrap_or(Duration::MAX));
-    let goes_on = || {
+    let may_continue = || {
         let stopped = options.stop.is_some_and(|stop| stop.load(atomic::Ordering::Relaxed));
         !stopped && deadline.is_none_or(|deadline| Instant::now() < deadline)
     };
@@ -112,8 +112,8 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
     while !queue.is_empty() && found.boxes < options.boxes {
         let room = BOXES_AT_A_TIME.min(options.boxes - found.boxes);
         let chunk: Vec<Waiting> = std::iter::from_fn(|| queue.pop()).take(room).collect();
-        let spectra = evaluate(source, &chunk, options.threads, &goes_on);
-        let ended = !goes_on();
+        let spectra = evaluate(source, &chunk, options.threads, &may_continue);
+        let ended = !may_continue();
         for (waiting, spectrum) in chunk.iter().zip(&spectra) {
             let Some(spectrum) = spectrum else { continue };
             found.boxes += 1;
@@ -144,25 +144,25 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
     found
 }
 
-/// The spectra of boxes; `None` for boxes that were not evaluated before `goes_on` returned `false`.
+/// The spectra of boxes; `None` for boxes that were not evaluated before `may_continue` returned `false`.
 fn evaluate(
     source: &dyn Enclose,
     chunk: &[Waiting],
     threads: usize,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    may_continue: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Option<Spectrum>> {
-    // A few parts per thread: some are slower than others.
+    // Several parts per thread balance the load: some parts take longer than others.
     let share = chunk.len().div_ceil(threads.clamp(1, BOXES_AT_A_TIME) * 4).max(1);
     let parts: Vec<&[Waiting]> = chunk.chunks(share).collect();
     let evaluated = in_order(&parts, threads, |boxes| {
         let mut spectra: Vec<Option<Spectrum>> = boxes.iter().map(|_| None).collect();
-        if !goes_on() {
+        if !may_continue() {
             return spectra;
         }
         let bounds: Vec<&[(f64, f64)]> = boxes.iter().map(|waiting| waiting.bounds.as_slice()).collect();
         source.each(&bounds, &mut |index, matrix| {
             spectra[index] = Some(matrix.spectrum());
-            goes_on()
+            may_continue()
         });
         spectra
     });
@@ -225,9 +225,9 @@ impl<'a> Cut<'a> {
         };
         let Spectrum { remainder, blamed, .. } = *self.spectrum;
         let known = remainder.is_finite();
-        let to_blame = |axis: usize| blamed >> (axis % 64) & 1 == 1;
+        let is_responsible = |axis: usize| blamed >> (axis % 64) & 1 == 1;
         let any = known || blamed == 0;
-        let axes = || (0..bounds.len()).filter(|&axis| if any { self.active[axis] } else { to_blame(axis) });
+        let axes = || (0..bounds.len()).filter(|&axis| if any { self.active[axis] } else { is_responsible(axis) });
         let sides: f64 = axes().map(relative).sum();
         let score = |axis: usize| {
             let side = relative(axis) / sides.max(f64::MIN_POSITIVE);
@@ -240,7 +240,7 @@ impl<'a> Cut<'a> {
     }
 
     /// Number of halvings before a part of the box is evaluated.
-    fn times(&self, share: f64) -> usize {
+    fn halvings(&self, share: f64) -> usize {
         let halvings = self.spectrum.halvings;
         if share.log2() > LARGE_BOX || !halvings.is_finite() {
             1
@@ -260,8 +260,8 @@ impl Tree {
     fn cut(&mut self, waiting: &Waiting, cut: &mut Cut<'_>, queue: &mut BinaryHeap<Waiting>) {
         let halvings = cut.spectrum.halvings;
         let mut parts = vec![Waiting { bounds: waiting.bounds.clone(), halvings, ..*waiting }];
-        for round in 0..cut.times(waiting.share) {
-            // Parts differ in their places alone.
+        for round in 0..cut.halvings(waiting.share) {
+            // All parts have the same sides.
             let Some((axis, _)) = cut.place(&parts[0].bounds) else {
                 if round > 0 {
                     break;

@@ -37,7 +37,7 @@ pub struct Spectrum {
     /// Number of halvings of the box until the signs of the eigenvalues are proven in every part, as far as its polynomial can say; 0 if they
     /// are proven, infinite if the matrix is not known.
     pub halvings: f64,
-    /// The axes to blame for that, see [`MatrixForms::blamed`].
+    /// The axes responsible for that, see [`MatrixForms::blamed`].
     pub blamed: u64,
 }
 
@@ -122,7 +122,7 @@ impl MatrixForms {
         for row in polynomials.forms.chunks_exact_mut(n * stride) {
             let distances = row.iter_mut().skip(stride - 1).step_by(stride).map(std::mem::take);
             let sum = distances.fold(Interval::ZERO, |sum, [r]| sum + Interval::point(r)).high;
-            // Not a number is above everything.
+            // `NaN` counts as the largest.
             norm = if sum <= norm { norm } else { sum };
         }
         (polynomials, norm)
@@ -152,7 +152,7 @@ impl MatrixForms {
 /// Number of halvings of every side of a box until `sum_p growth_p` is below 1, if the summands shrink with their powers of the sides.
 fn halvings(growth: &[f64]) -> f64 {
     let at = |side: f64| growth.iter().rev().fold(0.0, |sum, x| sum * side + x);
-    // Not a number is not below.
+    // `NaN` is not below 1.
     let below = |side: f64| at(side) < 1.0;
     let (mut small, mut large) = (0.0_f64, 64.0_f64);
     if !below((-large).exp2()) {
@@ -222,7 +222,7 @@ pub struct Source<'l, L> {
     pub basis: Arc<Basis>,
 }
 
-/// Questions of the search to a Lagrangian.
+/// What the search needs of a Lagrangian.
 pub trait Enclose: Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
@@ -274,7 +274,7 @@ fn mass_matrix<'a, L: Lagrangian>(
     let state: Vec<Number<'a>> = bounds.iter().enumerate().map(side).collect();
     let found = lagrangian.lagrangian(parameters, &state[..n], &state[n..]);
     let mut forms = vec![[0.0]; n * n * stride];
-    // A Lagrangian that may not be defined, or that read a value.
+    // A Lagrangian that may be undefined in the box, or that may branch on a value.
     let known = found.range().is_bounded() && !arena.was_read();
     for (k, out) in forms.chunks_exact_mut(stride).enumerate() {
         match found {

@@ -39,7 +39,7 @@ impl Default for Colour {
 }
 
 impl Colour {
-    /// Noise of coordinate `i`: white with the survey's size, unless the differences clearly contradict that.
+    /// Noise of coordinate `i`: white with the standard deviation of `white`, unless the differences clearly contradict that.
     pub fn of(tracks: &[RecordedTrajectory], n: usize, i: usize, white: Noise) -> Self {
         let plain = Self { sigma: white.sigma, ..Self::default() };
         let size = tracks

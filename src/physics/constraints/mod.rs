@@ -98,17 +98,17 @@ pub struct FoundConstraint {
     pub defect: f64,
 }
 
-/// Everything that was found.
+/// Result of a search for constraints.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FoundConstraints {
     /// Number of constraints of the system, holonomic and nonholonomic.
     pub count: usize,
-    /// All that was found.
+    /// Constraints and other functions that were found, by kind.
     pub constraints: Vec<FoundConstraint>,
     /// Ratio of the smallest combination that does not vanish to the largest that does, both relative to noise: the smallest over the degrees of
     /// the constraints. Relative to the noise itself if none vanishes.
     pub gap: Option<f64>,
-    /// Trajectories it was found on.
+    /// Number of trajectories.
     pub trajectories: usize,
     /// Candidates that failed on held-out trajectories.
     pub refuted: usize,
@@ -131,7 +131,7 @@ impl FoundConstraints {
     }
 }
 
-/// Why no search is possible.
+/// Why a search for constraints is not possible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConstraintSearchError {
@@ -301,7 +301,7 @@ struct RowsTaken {
 }
 
 impl RowsTaken {
-    /// Nothing yet.
+    /// No constraints.
     fn at(samples: &MotionSamples, places: usize) -> Self {
         let places = samples.places(places);
         Self { bases: vec![Vec::new(); places.len()], places, refuted: 0 }

@@ -25,7 +25,7 @@ pub struct MotionSamples {
     /// Cancels a search in them.
     pub(super) cancellation: Cancellation,
     /// Number of samples that share the errors of their positions, and how much larger the variance of their noise may be.
-    alike: f64,
+    shared_positions: f64,
     slack: f64,
     /// Columns that do not move, with the reason.
     still: Vec<(usize, String)>,
@@ -55,12 +55,12 @@ impl MotionSamples {
             periodic: recording.periodic.clone(),
             position_noise,
             shared: if measured { 1.0 } else { smoothing.window() as f64 },
-            alike: largest(&|colour| colour.shared()),
+            shared_positions: largest(&|colour| colour.shared()),
             slack: largest(&|colour| colour.slack),
             measured,
             ..Self::default()
         };
-        let moves = |i: usize| standing(recording, i, smoothing.coordinates[i].noise.resolved, colours[i]);
+        let moves = |i: usize| stillness(recording, i, smoothing.coordinates[i].noise.resolved, colours[i]);
         samples.still = (0..n).filter_map(|i| Some((i, moves(i)?))).collect();
         let stride = recording.samples().div_ceil(MOST_SAMPLES).max(1);
         samples.stride = stride;
@@ -99,13 +99,13 @@ impl MotionSamples {
             periodic: recording.periodic.clone(),
             position_noise: vec![0.0; n],
             shared: 1.0,
-            alike: 1.0,
+            shared_positions: 1.0,
             slack: 1.0,
             stride: 1,
             measured: true,
             ..Self::default()
         };
-        samples.still = (0..n).filter_map(|i| Some((i, standing(recording, i, false, Colour::default())?))).collect();
+        samples.still = (0..n).filter_map(|i| Some((i, stillness(recording, i, false, Colour::default())?))).collect();
         for track in recording.tracks.iter().filter(|track| !track.is_empty()) {
             if [track.q.len(), track.v.len()] != [track.len() * n; 2] {
                 return Err(SmoothError::Shape { track: track.name.clone(), n });
@@ -143,7 +143,7 @@ impl MotionSamples {
     }
     /// Approximate number of samples with independent noise.
     pub(super) fn independent(&self) -> f64 {
-        self.len() as f64 / self.alike.max(1.0)
+        self.len() as f64 / self.shared_positions.max(1.0)
     }
     /// Largest variance of the noise that the recording allows, over the estimated one.
     pub(super) fn slack(&self) -> f64 {
@@ -203,9 +203,9 @@ impl MotionSamples {
     }
 }
 
-/// Why a column counts as still; none if it moves. Neither a column that is constant along every trajectory nor one of pure noise shows a
+/// Why a column counts as still; `None` if it moves. A column that is constant along every trajectory, or pure noise, is no evidence of a
 /// constraint: its sensor may be off.
-fn standing(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> Option<String> {
+fn stillness(recording: &Recording, i: usize, resolved: bool, noise: Colour) -> Option<String> {
     let (n, mut square, mut count, mut constant) = (recording.n(), 0.0, 0.0, true);
     for track in &recording.tracks {
         let values = || track.q.iter().skip(i).step_by(n);

@@ -2,7 +2,7 @@
 //!
 //! The weak form of a library leaves a mean acceleration in every window. A drive shows in the residuals as a spectral line: as a force on
 //! a coordinate, `cos(om t)`, or as a factor of a function of the coordinates. Its power is compared with that of the neighbouring
-//! frequencies, so that a continuous spectrum, of noise or of what the library lacks, has no line.
+//! frequencies, so that a continuous spectrum, of noise or of missing terms, has no line.
 
 use super::find::{WeakForm, best};
 use super::function::Function;
@@ -18,8 +18,8 @@ use crate::recording::RecordedTrajectory;
 use std::collections::BTreeSet;
 use std::f64::consts::{LN_2, PI, TAU};
 
-/// The residuals that a library leaves.
-pub(super) struct Rest {
+/// Residuals of a library by window.
+pub(super) struct Residuals {
     /// Times of the windows, in s.
     times: Vec<f64>,
     /// Everything that a drive may multiply.
@@ -82,9 +82,9 @@ pub(super) fn longest(data: &Prepared<'_>) -> f64 {
     data.recording.tracks.iter().map(RecordedTrajectory::span).fold(0.0, f64::max)
 }
 
-impl Rest {
-    /// The residuals in the windows that are not held out, with the mass matrix of the best choice of terms, which a drive may have
-    /// spoiled, and with unit masses.
+impl Residuals {
+    /// The residuals in the windows that are not held out, once with unit masses, and once with the mass matrix of the best choice of
+    /// terms, which a drive may bias.
     pub fn of(weak: &WeakForm, data: &Prepared<'_>, held: &BTreeSet<usize>) -> Vec<Self> {
         let units = weak.windows.unit_mass(&weak.library, &weak.quotient.kept, &data.speeds);
         let masses = [Some(&units), best(&weak.path).map(|choice| &choice.coefficients)];
@@ -112,16 +112,16 @@ impl Rest {
             let of = |at: usize| windows.forces[at / data.n * data.n + j];
             errors.iter_mut().zip(unit).enumerate().for_each(|(at, (e, u))| *e -= of(at) * u);
         }
-        let learned: Vec<usize> = (0..windows.len()).filter(|&w| !held.contains(&windows.blocks[w])).collect();
-        let some = |column: &[f64]| -> Vec<f64> {
-            learned.iter().flat_map(|w| &column[w * data.n..(w + 1) * data.n]).copied().collect()
+        let used: Vec<usize> = (0..windows.len()).filter(|&w| !held.contains(&windows.blocks[w])).collect();
+        let training = |column: &[f64]| -> Vec<f64> {
+            used.iter().flat_map(|w| &column[w * data.n..(w + 1) * data.n]).copied().collect()
         };
-        let mut errors = some(&errors);
-        let others = remove(&mut errors, of(&removed)[0].iter().map(|column| some(column)));
+        let mut errors = training(&errors);
+        let others = remove(&mut errors, of(&removed)[0].iter().map(|column| training(column)));
         let effects = of(&shaken);
-        let effects = units.iter().chain(&effects[0]).map(|effect| some(effect));
+        let effects = units.iter().chain(&effects[0]).map(|effect| training(effect));
         let driven = effects.map(|effect| Driven::new(&effect, &errors, &others, data.n)).collect();
-        let times: Vec<f64> = learned.iter().map(|&w| windows.centres[w]).collect();
+        let times: Vec<f64> = used.iter().map(|&w| windows.centres[w]).collect();
         let ends = [times.iter().copied().fold(f64::INFINITY, f64::min), times.iter().copied().fold(0.0, f64::max)];
         let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
         let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
@@ -146,7 +146,7 @@ impl Rest {
         apart
     }
 
-    /// The most significant line; `None` if none stands out.
+    /// The most significant line, if any line is significant.
     fn line(&self, stop: &Cancellation) -> Option<Line> {
         let [low, high] = self.band;
         let step = self.resolution[1] / FREQUENCIES_PER_RESOLUTION;
@@ -209,7 +209,7 @@ fn add(to: &mut [f64], factor: f64, column: &[f64]) {
     to.iter_mut().zip(column).for_each(|(to, x)| *to += factor * x);
 }
 
-/// Removes from a column what other columns explain; returns orthonormal directions of those columns.
+/// Removes the projection on other columns from a column; returns orthonormal directions of those columns.
 fn remove(from: &mut [f64], columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
     let mut directions: Vec<Vec<f64>> = Vec::new();
     for mut column in columns {
@@ -238,7 +238,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     /// Errors of 400 windows, 0.25 s apart, of one coordinate that a force and a factor of a function may drive.
-    fn rest(seed: u64, mut error: impl FnMut(f64, f64) -> f64) -> Rest {
+    fn rest(seed: u64, mut error: impl FnMut(f64, f64) -> f64) -> Residuals {
         let mut rng = RngStream::Trajectories.generator(seed);
         let mut draw = || <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
         let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
@@ -247,10 +247,10 @@ mod tests {
         let (span, force) = (100.0, vec![1.0; times.len()]);
         let resolution = [TAU / span; 2];
         let driven = [force, function].map(|effect| Driven::new(&effect, &errors, &[], 1)).into();
-        Rest { times, driven, band: [3.0 * TAU / span, 10.0], resolution }
+        Residuals { times, driven, band: [3.0 * TAU / span, 10.0], resolution }
     }
 
-    fn line(rest: &Rest) -> Option<Line> {
+    fn line(rest: &Residuals) -> Option<Line> {
         rest.line(&Cancellation::default())
     }
 
@@ -269,7 +269,7 @@ mod tests {
     #[test]
     fn continuous_spectra_have_no_line() {
         let seeds = 60;
-        let alarms = |make: &dyn Fn(u64) -> Rest| (0..seeds).filter(|&seed| line(&make(seed)).is_some()).count();
+        let alarms = |make: &dyn Fn(u64) -> Residuals| (0..seeds).filter(|&seed| line(&make(seed)).is_some()).count();
         assert!(alarms(&|seed| rest(seed, |_, noise| noise)) <= 1);
         // Correlated over 1 s.
         let red = |seed| {
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn a_band_without_neighbours_has_no_line() {
-        let few = |high: f64| Rest { band: [1.0, high], ..rest(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
+        let few = |high: f64| Residuals { band: [1.0, high], ..rest(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
         assert!(line(&few(1.0 + 5.0 * TAU / 100.0)).is_none() && line(&few(10.0)).is_some());
     }
 
@@ -318,7 +318,7 @@ mod tests {
         let mut errors = drive.clone();
         let others = remove(&mut errors, [term].into_iter());
         let driven = vec![Driven::new(&vec![1.0; times.len()], &errors, &others, 1)];
-        let rest = Rest { times, driven, band: [0.2, 10.0], resolution: [TAU / 100.0; 2] };
+        let rest = Residuals { times, driven, band: [0.2, 10.0], resolution: [TAU / 100.0; 2] };
         assert!((line(&rest).unwrap().frequency - 1.3).abs() < 2e-3);
     }
 }

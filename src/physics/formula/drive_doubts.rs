@@ -1,4 +1,4 @@
-//! Why motion that a formula with a drive fits may have another reason.
+//! Other explanations of motion that a formula with a drive fits.
 
 use super::drive::longest;
 use super::function::{Factor, Function};
@@ -21,7 +21,7 @@ pub(super) fn drive_doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
     if periods < LEAST_DRIVE_PERIODS {
         let periods = rounded(periods, 2);
         doubts.push(format!(
-            "the longest trajectory has {periods} periods of the drive: too few to tell that it is periodic"
+            "the longest trajectory has {periods} periods of the drive: too few to show that it is periodic"
         ));
     }
     if let Some(count) = (1..=MOST_REPEATED_PERIODS).find(|&count| repeats(data, count as f64 * period)) {
@@ -32,7 +32,9 @@ pub(super) fn drive_doubts(motion: &Motion<'_>, model: &Model) -> Vec<String> {
     }
     if model.terms.len() > MOST_DRIVEN_TERMS {
         let count = model.terms.len();
-        doubts.push(format!("it has {count} terms and a drive: so many may follow the motion of another law as well"));
+        doubts.push(format!(
+            "it has {count} terms and a drive: so many terms may also overfit the motion of another law"
+        ));
     }
     if data.recording.tracks.len() == 1 && model.terms.iter().all(|&k| is_linear(library, k)) {
         doubts.push(

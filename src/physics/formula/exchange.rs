@@ -29,7 +29,7 @@ impl Search<'_> {
         let mut rival: Option<Exchanged> = None;
         for _ in (0..EXCHANGE_ROUNDS).take_while(|_| self.motion.data.cancellation.go_on()) {
             let Some((proposals, noise)) = self.proposals(model, segments, blocks) else { break };
-            let before = self.motion.settle(model, segments, 1).0;
+            let before = self.motion.fit_initial_states(model, segments, 1).0;
             let mut best: Option<(Exchanged, Vec<Segment>)> = None;
             rival = None;
             for (at, proposal) in proposals.into_iter().enumerate() {
@@ -46,7 +46,7 @@ impl Search<'_> {
                     if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
                         break;
                     }
-                    let square = self.motion.settle(&tried, &mut starts, 1).0;
+                    let square = self.motion.fit_initial_states(&tried, &mut starts, 1).0;
                     let longer = tried.terms.len() as f64 - model.terms.len() as f64;
                     let cost = (square - before) / noise + TERM_COST * longer;
                     let better = best.as_ref().is_none_or(|(best, _)| cost < best.cost);

@@ -28,7 +28,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Options of the search for a formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FormulaOptions {
-    /// Functions of the coordinates; if not given, larger and larger libraries until one fits the motion.
+    /// Functions of the coordinates; by default, larger and larger libraries are searched until one fits the motion.
     pub families: Option<Families>,
     /// Additional formulas of the coordinates, in the grammar of system files.
     pub functions: Vec<String>,
@@ -36,9 +36,9 @@ pub struct FormulaOptions {
     pub gyroscopic: bool,
     /// `true` for a Rayleigh dissipation function of the velocities.
     pub friction: bool,
-    /// `true` to go on, if there is friction and no library with a constant one fits, with friction that depends on the position.
+    /// `true` to search for friction that depends on the position if there is friction and no library with constant friction fits.
     pub friction_of_position: bool,
-    /// `true` to go on, if no library fits, with a periodic drive of unknown frequency.
+    /// `true` to search for a periodic drive of unknown frequency if no library fits.
     pub drive: bool,
     /// Standard deviation of every coordinate's noise; estimated if not given.
     pub noise: Option<Vec<f64>>,
@@ -47,7 +47,7 @@ pub struct FormulaOptions {
     /// Term and coefficient that fix the common factor; by default the first square of a velocity and 1/2. With known forces the motion itself
     /// gives the factor.
     pub scale: Option<(String, f64)>,
-    /// Units of the coordinates, such as `m`; an empty text, or no list, where they are not known.
+    /// Units of the coordinates, such as `m`; empty where a unit is not known.
     pub units: Vec<String>,
     /// Unit of time.
     pub time_unit: String,
@@ -57,7 +57,7 @@ pub struct FormulaOptions {
     pub seed: u64,
     /// Threads; the result does not depend on them.
     pub threads: usize,
-    /// Cancels the search, and receives reports of its progress.
+    /// Cancels the search and receives its progress.
     pub cancellation: Cancellation,
 }
 
@@ -114,8 +114,8 @@ impl WeakForm {
         let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
         let eliminate = |set: &[usize], speeds: &[f64]| {
             let start = windows.unit_mass(&library, &kept, speeds);
-            let judges = |block| held.contains(&block);
-            eliminate_backward(&windows, (set, &start), (&data.sigma, &complexity), &judges, stop)
+            let is_validation = |block| held.contains(&block);
+            eliminate_backward(&windows, (set, &start), (&data.sigma, &complexity), &is_validation, stop)
         };
         let mut path = Path::default();
         // A search that ends at a nearly singular mass matrix restarts from other choices.
@@ -175,7 +175,7 @@ impl WeakForm {
         best.ok_or(FormulaError::Singular)
     }
 
-    /// Fits a choice to the motion, chooses terms again, and judges the result on held-out motion.
+    /// Fits a choice to the motion, chooses terms again, and is_validation the result on held-out motion.
     fn follow(
         &self,
         choice: &Choice,
@@ -190,7 +190,7 @@ impl WeakForm {
         let Fitted { mut model, mut segments, mut blocks, converged } =
             fit_segments(&mut search, model, training, options)?;
         let rival = search.exchange(&mut model, &mut segments, &mut blocks);
-        search.motion.settle(&model, &mut validation, 6);
+        search.motion.fit_initial_states(&model, &mut validation, 6);
         let mut validation = data.joined(&validation);
         let stop = &options.cancellation;
         stop.check()?;
@@ -199,7 +199,7 @@ impl WeakForm {
         stop.check()?;
         let shortened = shorten(&search, &self.quotient, &mut model, &mut segments);
         let covariance = covariance(&search, &mut model, &mut segments);
-        let (square, count) = search.motion.settle(&model, &mut validation, 8);
+        let (square, count) = search.motion.fit_initial_states(&model, &mut validation, 8);
         let probability = resampled.probabilities(&model, &shortened);
         let periodic = &data.recording.periodic;
         let estimates = (covariance.coefficients.as_slice(), probability.as_slice());
@@ -207,7 +207,7 @@ impl WeakForm {
         let residuals = search.motion.residuals(&model, &validation);
         let judged =
             Judged { search: &search, model: &model, segments: &validation, residuals: &residuals, square, count };
-        found.draw(&self.library, &model, &resampled.coefficients);
+        found.set_bootstraps(&self.library, &model, &resampled.coefficients);
         self.describe(&mut found, &judged);
         if let Some(rival) = rival {
             found.several = rival.cost < TERM_COST;
@@ -313,7 +313,7 @@ fn fit_segments(
 ) -> Result<Fitted, FormulaError> {
     let (data, stop) = (search.motion.data, &options.cancellation);
     stop.stage("short segments");
-    search.motion.settle(&model, &mut segments, 4);
+    search.motion.fit_initial_states(&model, &mut segments, 4);
     search.motion.choose_steps(&model, &segments);
     search.converge(&mut model, &mut segments, ROUNDS_OF_CHOICE);
     if options.between.is_none() && data.forced.contains(&true) {
@@ -322,11 +322,11 @@ fn fit_segments(
     stop.check()?;
     stop.stage("longer segments");
     let before = (model.clone(), segments.clone());
-    let short = search.motion.settle(&model, &mut segments, 1);
+    let short = search.motion.fit_initial_states(&model, &mut segments, 1);
     let mut segments = data.joined(&segments);
     search.motion.choose_steps(&model, &segments);
     let (mut blocks, mut converged) = search.converge(&mut model, &mut segments, ROUNDS_OF_CHOICE);
-    let long = search.motion.settle(&model, &mut segments, 1);
+    let long = search.motion.fit_initial_states(&model, &mut segments, 1);
     if long.0 / long.1 > LONG_SEGMENT_RESIDUAL * short.0 / short.1 {
         // The motion is too unstable to be followed for so long.
         (model, segments) = before;

@@ -38,7 +38,7 @@ pub struct Rival {
 pub struct Near {
     /// The fraction, such as `1/6`.
     pub fraction: String,
-    /// By how much the coefficient is larger, over its standard error; 0 where both are equal.
+    /// Difference between coefficient and fraction in standard errors; 0 if both are equal.
     pub standard_errors: f64,
 }
 
@@ -66,8 +66,8 @@ pub struct FoundTerm {
     pub(super) reference: Option<usize>,
     /// Coefficients of bootstrap samples in which terms were chosen again.
     #[serde(skip)]
-    drawn: Vec<f64>,
-    /// Coordinates that it joins.
+    bootstraps: Vec<f64>,
+    /// Coordinates that it couples.
     #[serde(skip)]
     joined: Vec<usize>,
     #[serde(skip)]
@@ -184,7 +184,7 @@ impl FoundFormula {
                     unit: None,
                     near: None,
                     reference: None,
-                    drawn: Vec::new(),
+                    bootstraps: Vec::new(),
                     joined: library.coordinates(k),
                     dimension: units.of_term(library, k),
                     latex: library.written(k, Notation::Latex),
@@ -232,23 +232,28 @@ impl FoundFormula {
     }
 
     /// Stores the coefficients of bootstrap samples for the terms of the library.
-    pub(super) fn draw(&mut self, library: &Library, model: &Model, coefficients: &BTreeMap<usize, Vec<f64>>) {
+    pub(super) fn set_bootstraps(
+        &mut self,
+        library: &Library,
+        model: &Model,
+        coefficients: &BTreeMap<usize, Vec<f64>>,
+    ) {
         for &k in &model.terms {
             let text = library.written(k, Notation::System);
             let own = |t: &&mut FoundTerm| t.term == text && t.dissipation == library.is_dissipation(k);
             if let (Some(term), Some(drawn)) = (self.terms.iter_mut().find(own), coefficients.get(&k)) {
-                term.drawn.clone_from(drawn);
+                term.bootstraps.clone_from(drawn);
             }
         }
     }
 
     /// Standard deviation of a term's coefficient over the bootstrap samples, relative to a reference, which then has the value `value`.
     fn scatter(&self, k: usize, reference: Option<(usize, f64)>) -> f64 {
-        let own = &self.terms[k].drawn;
+        let own = &self.terms[k].bootstraps;
         let values: Vec<f64> = match reference {
             None => own.clone(),
             Some((at, value)) => {
-                let pairs = own.iter().zip(&self.terms[at].drawn).filter(|(_, base)| **base != 0.0);
+                let pairs = own.iter().zip(&self.terms[at].bootstraps).filter(|(_, base)| **base != 0.0);
                 pairs.map(|(x, base)| x * value / base).collect()
             }
         };
@@ -290,7 +295,7 @@ impl FoundFormula {
                 self.terms[at].reference = Some(reference);
             });
         }
-        self.relate(&references);
+        self.apply_references(&references);
         Ok(())
     }
 
@@ -307,7 +312,7 @@ impl FoundFormula {
     }
 
     /// Expresses coefficients as ratios to the references of their blocks, with their covariance.
-    fn relate(&mut self, references: &[(usize, f64)]) {
+    fn apply_references(&mut self, references: &[(usize, f64)]) {
         let m = self.terms.len();
         let x: Vec<f64> = self.terms.iter().map(|t| t.coefficient).collect();
         let of = |k: usize| {

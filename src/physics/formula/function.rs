@@ -71,7 +71,7 @@ impl Factor {
         }
     }
 
-    /// Its complexity.
+    /// Complexity, by which equally good terms are ranked.
     fn complexity(&self) -> f64 {
         match self {
             Self::Power(_, k) => f64::from(k.abs()) + if *k < 0 { 0.5 } else { 0.0 },
@@ -258,7 +258,7 @@ impl Function {
         }
     }
 
-    /// Its complexity.
+    /// Complexity, by which equally good terms are ranked.
     pub fn complexity(&self) -> f64 {
         match self {
             Self::Product(factors) => factors.iter().map(Factor::complexity).sum(),
@@ -266,7 +266,7 @@ impl Function {
         }
     }
 
-    /// Its factors.
+    /// Its factors as text.
     pub fn written(&self, names: &[String], notation: Notation) -> Vec<String> {
         match self {
             Self::Product(factors) => {

@@ -49,12 +49,12 @@ impl Judged<'_> {
         if !is_regular(data.n, &masses) {
             doubts.push("its mass matrix is nearly singular".to_string());
         }
-        for (i, [moved, left]) in self.motion_and_rest().into_iter().enumerate() {
-            if moved < LEAST_MOTION_RATIO * left {
+        for (i, [motion, residual]) in self.motion_and_residual().into_iter().enumerate() {
+            if motion < LEAST_MOTION_RATIO * residual {
                 let name = &data.recording.coordinates[i];
                 doubts.push(format!(
                     "{name} moves by only {} times its residual in the held-out motion: too little to confirm a law",
-                    rounded(moved / left, 2)
+                    rounded(motion / residual, 2)
                 ));
             }
         }
@@ -71,7 +71,7 @@ impl Judged<'_> {
     }
 
     /// Standard deviation of each coordinate within segments, and of its residual, in units of noise.
-    fn motion_and_rest(&self) -> Vec<[f64; 2]> {
+    fn motion_and_residual(&self) -> Vec<[f64; 2]> {
         let data = self.search.motion.data;
         let n = data.n;
         let mut sums = vec![[0.0; 4]; n];

@@ -1,6 +1,6 @@
 //! Larger and larger libraries until one fits the motion: first without, then with friction that depends on the position and with a drive.
 
-use super::drive::{Line, Rest};
+use super::drive::{Line, Residuals};
 use super::error::FormulaError;
 use super::extent::{Drive, Extent, Friction};
 use super::families::Families;
@@ -33,8 +33,8 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     stop.check()?;
     let held = constrained(recording, options.noise.as_ref(), stop)?;
     stop.check()?;
-    let judges = held_out(&data, options.seed);
-    let mut ladder = Ladder::new(&data, &judges, options, rungs);
+    let validation = held_out(&data, options.seed);
+    let mut ladder = Ladder::new(&data, &validation, options, rungs);
     ladder.climb(friction)?;
     if options.friction && options.friction_of_position && !ladder.is_done() {
         ladder.climb(Friction::OfPosition)?;
@@ -62,10 +62,10 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
 /// A search through libraries.
 struct Ladder<'a> {
     data: &'a Prepared<'a>,
-    judges: &'a BTreeSet<usize>,
+    validation: &'a BTreeSet<usize>,
     options: &'a FormulaOptions,
     rungs: Vec<Families>,
-    /// What was searched, and remarks on it.
+    /// Libraries that were searched, and notes for the user.
     searched: Vec<String>,
     notes: Vec<String>,
     refused: Option<FormulaError>,
@@ -73,18 +73,29 @@ struct Ladder<'a> {
     /// Smallest error of accelerations so far.
     least: f64,
     /// Residuals of the libraries without a drive.
-    rests: Vec<(Extent, Vec<Rest>)>,
+    residuals: Vec<(Extent, Vec<Residuals>)>,
 }
 
 impl<'a> Ladder<'a> {
     fn new(
         data: &'a Prepared<'a>,
-        judges: &'a BTreeSet<usize>,
+        validation: &'a BTreeSet<usize>,
         options: &'a FormulaOptions,
         rungs: Vec<Families>,
     ) -> Self {
-        let (searched, notes, rests) = (Vec::new(), Vec::new(), Vec::new());
-        Self { data, judges, options, rungs, searched, notes, refused: None, best: None, least: f64::INFINITY, rests }
+        let (searched, notes, residuals) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            data,
+            validation,
+            options,
+            rungs,
+            searched,
+            notes,
+            refused: None,
+            best: None,
+            least: f64::INFINITY,
+            residuals,
+        }
     }
 
     /// `true` if a formula fits the motion.
@@ -102,7 +113,7 @@ impl<'a> Ladder<'a> {
         };
         self.searched.push(extent.to_string());
         self.options.cancellation.check()?;
-        let weak = WeakForm::new(self.data, library, self.judges, self.options);
+        let weak = WeakForm::new(self.data, library, self.validation, self.options);
         self.kept(weak)
     }
 
@@ -118,6 +129,7 @@ impl<'a> Ladder<'a> {
         })
     }
 
+    /// Searches the libraries in order, with this kind of friction.
     fn climb(&mut self, friction: Friction) -> Result<(), FormulaError> {
         // A long formula of high powers may be the series of a shorter one of other functions.
         let mut long = false;
@@ -133,10 +145,10 @@ impl<'a> Ladder<'a> {
             let most = if long { before / LARGER_LIBRARY_ERROR } else { LARGER_LIBRARY_ERROR * before };
             let followed = match error > most {
                 true => None,
-                false => self.kept(weak.follow_all(self.data, self.judges, self.options))?,
+                false => self.kept(weak.follow_all(self.data, self.validation, self.options))?,
             };
             if self.options.drive && followed.as_ref().is_none_or(|found| found.verdict == Verdict::NotInLibrary) {
-                self.rests.push((extent, Rest::of(&weak, self.data, self.judges)));
+                self.residuals.push((extent, Residuals::of(&weak, self.data, self.validation)));
             }
             let Some(mut found) = followed else { continue };
             let done = found.verdict != Verdict::NotInLibrary;
@@ -158,15 +170,16 @@ impl<'a> Ladder<'a> {
         Ok(())
     }
 
-    /// Searches the libraries again with a drive, at each frequency that stands out of the residuals of one of them: one library may hide a
-    /// line that another one shows.
+    /// Searches the libraries again with a drive, at each significant frequency in the residuals of any of them: one library may hide a line
+    /// that another one shows.
     fn drive(&mut self) -> Result<(), FormulaError> {
         let Some(name) = drive_name(&self.data.recording.coordinates) else { return Ok(()) };
         let stop = &self.options.cancellation;
         stop.stage("periodic drives");
         let (mut least, mut tried) = (f64::INFINITY, BTreeSet::new());
-        let (extents, rests): (Vec<Extent>, Vec<Vec<Rest>>) = std::mem::take(&mut self.rests).into_iter().unzip();
-        let lines = Rest::lines(rests.iter().flatten(), stop);
+        let (extents, residuals): (Vec<Extent>, Vec<Vec<Residuals>>) =
+            std::mem::take(&mut self.residuals).into_iter().unzip();
+        let lines = Residuals::lines(residuals.iter().flatten(), stop);
         for (extent, Line { frequency, .. }) in
             extents.iter().flat_map(|extent| lines.iter().map(move |line| (extent, *line)))
         {
@@ -180,7 +193,7 @@ impl<'a> Ladder<'a> {
             }
             least = least.min(weak.least());
             tried.insert(rounded(frequency, 4));
-            let followed = self.kept(weak.follow_all(self.data, self.judges, self.options))?;
+            let followed = self.kept(weak.follow_all(self.data, self.validation, self.options))?;
             let fits = |found: &FoundFormula| found.verdict != Verdict::NotInLibrary && found.drive.is_some();
             if let Some(mut found) = followed.filter(fits) {
                 found.basis = families.to_string();
@@ -189,7 +202,7 @@ impl<'a> Ladder<'a> {
             }
         }
         self.notes.push(match tried.is_empty() {
-            true => "no frequency of a drive stands out of what the libraries leave of the motion".to_string(),
+            true => "the residuals of the libraries show no frequency of a periodic drive".to_string(),
             false => {
                 let tried = tried.into_iter().collect::<Vec<_>>().join(" or ");
                 format!("a drive of {tried} rad/s does not explain the motion either")

@@ -48,7 +48,7 @@ pub(super) struct Library {
     pub searched: usize,
 }
 
-/// Functions of a state, at the functions of a library.
+/// Values and derivatives of the functions of a library at a state.
 pub(super) type Values = Vec<Taylor>;
 
 impl Library {

@@ -1,7 +1,7 @@
 //! A Lagrangian as a formula, from recorded motion or from a learned model.
 //!
 //! The Euler-Lagrange equations are linear in the coefficients of a library of terms: products of velocities with functions of the coordinates.
-//! Terms that are total derivatives, or that follow from others by identities such as `sin^2 + cos^2 = 1`, are detected and left out by the rank
+//! Terms that are total derivatives, or that follow from others by identities such as `sin^2 + cos^2 = 1`, are removed by the rank
 //! of the stacked equations at random states. For recorded motion, [`formula_of_motion`] uses the weak form of the equations along smoothed
 //! positions, removes terms one after the other with refits, and then fits the surviving terms to the motion itself: multiple shooting with
 //! Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does not bias. Held-out

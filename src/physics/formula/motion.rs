@@ -40,8 +40,8 @@ pub(super) struct BlockSum {
     pub square: f64,
     /// Number of residuals minus the numbers of initial states.
     pub count: f64,
-    /// Variance of the scores of coefficients over that of independent noise: residuals of an imperfect model are correlated along the motion
-    /// and carry less information than their number suggests. At least 1.
+    /// Variance of the scores of coefficients over that of independent noise, at least 1: residuals of an imperfect model are correlated along
+    /// the motion and carry less information than their number suggests.
     pub inflation: f64,
 }
 
@@ -68,16 +68,16 @@ pub(super) fn inflation(
     if whole < LEAST_SCORED_BLOCKS {
         return square;
     }
-    let pulls: Vec<(f64, Vec<f64>)> = blocks
+    let scores: Vec<(f64, Vec<f64>)> = blocks
         .iter()
         .map(|(&block, part)| {
             let taken = times(m, &part.matrix, change);
-            (weight(block), part.right.iter().zip(taken).map(|(pull, taken)| pull - taken).collect())
+            (weight(block), part.right.iter().zip(taken).map(|(score, taken)| score - taken).collect())
         })
         .collect();
     let ratio = |k: usize| {
-        let mean = pulls.iter().map(|(weight, pull)| weight * pull[k]).sum::<f64>() / whole;
-        let scatter: f64 = pulls.iter().map(|(weight, pull)| weight * (pull[k] - mean).powi(2)).sum();
+        let mean = scores.iter().map(|(weight, score)| weight * score[k]).sum::<f64>() / whole;
+        let scatter: f64 = scores.iter().map(|(weight, score)| weight * (score[k] - mean).powi(2)).sum();
         scatter * whole / (whole - 1.0) / sum.matrix[k * m + k]
     };
     let mut ratios: Vec<f64> = (0..m).map(ratio).filter(|ratio| ratio.is_finite()).collect();
@@ -186,8 +186,8 @@ impl Motion<'_> {
         blocks
     }
 
-    /// Adapts only the initial states, so that a model fits the data as well as it can; returns the sum of squares and the number of residuals.
-    pub fn settle(&self, model: &Model, segments: &mut [Segment], iterations: usize) -> (f64, f64) {
+    /// Fits the initial states alone, with the model fixed; returns the sum of squares and the number of residuals.
+    pub fn fit_initial_states(&self, model: &Model, segments: &mut [Segment], iterations: usize) -> (f64, f64) {
         let squares = self.shooting(model, (false, &[]), |problem, x| {
             problem.settle(&x, segments, iterations);
             rescue(problem, &x, segments)
@@ -265,15 +265,15 @@ impl Motion<'_> {
 
     /// The interpolation of known forces that fits the motion best; returns the model and its segments with it.
     pub fn choose_between(&mut self, model: &mut Model, segments: &mut [Segment]) {
-        let mut least = self.settle(model, segments, 1).0;
+        let mut least = self.fit_initial_states(model, segments, 1).0;
         let from = (model.clone(), segments.to_vec());
         let mut best = self.between;
         for between in [Between::Held, Between::Cubic, Between::BandLimited] {
             self.between = between;
             let (mut tried, mut starts) = from.clone();
-            self.settle(&tried, &mut starts, 3);
+            self.fit_initial_states(&tried, &mut starts, 3);
             self.fit(&mut tried, &mut starts, FIT_STEPS);
-            let square = self.settle(&tried, &mut starts, 1).0;
+            let square = self.fit_initial_states(&tried, &mut starts, 1).0;
             if square < least {
                 (least, best) = (square, between);
                 *model = tried;

@@ -25,9 +25,9 @@ fn wild(recording: &Recording, i: usize, sigma: f64) -> Result<Option<String>, F
     let stride = (recording.samples() / RANGE_SAMPLES).max(1);
     let of = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
     let values = || (0..recording.tracks.len()).flat_map(of);
-    let mut some: Vec<f64> = values().step_by(stride).copied().collect();
-    some.sort_by(f64::total_cmp);
-    let at = |share: f64| some[((some.len() - 1) as f64 * share) as usize];
+    let mut sorted: Vec<f64> = values().step_by(stride).copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
     let range = at(0.99) - at(0.01);
     let coordinate = || recording.coordinates[i].clone();
     let steps = || {
@@ -81,7 +81,7 @@ pub(super) fn constrained(
     }
     let options = SmoothOptions { noise: noise.cloned(), ..SmoothOptions::default() };
     let samples = MotionSamples::of(recording, &options)?.watched(cancellation);
-    // A search that is too large, or has too few samples, does not rule a formula out.
+    // A search for constraints that is not possible does not prevent one for a formula.
     let Ok(found) = find_constraints(&samples, ConstraintSearch::default()) else { return Ok(None) };
     let held = found.constraints.into_iter().filter(|c| c.kind == ConstraintKind::Holonomic).map(|c| c.formula);
     let formulas: Vec<String> = held.collect();

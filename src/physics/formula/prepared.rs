@@ -161,7 +161,7 @@ impl<'a> Prepared<'a> {
                     let seconds = smoothed.times[part[part.len() - 1]] - smoothed.times[part[0]];
                     if part.len() >= LEAST_SAMPLES / 2 && seconds >= width {
                         let nodes = Nodes { smoothed, force, at: part, n: self.n };
-                        stretches.push(if even { nodes.as_they_are(block) } else { nodes.at_steps(self.step, block) });
+                        stretches.push(if even { nodes.at_samples(block) } else { nodes.at_steps(self.step, block) });
                     }
                 }
             }
@@ -249,7 +249,7 @@ struct Nodes<'a> {
 
 impl Nodes<'_> {
     /// The samples themselves.
-    fn as_they_are(&self, block: usize) -> Stretch {
+    fn at_samples(&self, block: usize) -> Stretch {
         let n = self.n;
         let of = |values: &[f64]| self.at.iter().flat_map(|at| &values[at * n..(at + 1) * n]).copied().collect();
         Stretch {

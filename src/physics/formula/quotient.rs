@@ -4,7 +4,7 @@ use super::library::Library;
 use super::thresholds::{COMBINATION_REMAINDER, DEPENDENT_REMAINDER, VANISHING_TERM};
 use crate::linalg::dot;
 
-/// How removed terms are combined from the kept ones.
+/// Removed terms as combinations of the kept ones.
 #[derive(Clone, Debug)]
 pub(super) struct Quotient {
     /// Kept terms, in the order of the library.

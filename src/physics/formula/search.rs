@@ -102,7 +102,7 @@ impl Search<'_> {
     ) -> (BTreeMap<usize, BlockSum>, bool) {
         let mut seen: Vec<Vec<usize>> = Vec::new();
         for round in 0.. {
-            self.motion.settle(model, segments, 4);
+            self.motion.fit_initial_states(model, segments, 4);
             self.motion.fit(model, segments, FIT_STEPS);
             let blocks = self.motion.blocks(model, &self.candidates, segments);
             if round >= rounds || self.motion.data.cancellation.is_cancelled() {
@@ -243,7 +243,7 @@ pub(super) struct Covariance {
     pub converged: bool,
 }
 
-/// Refits a model until that has converged.
+/// Refits a model until the fit has converged; returns the covariance of its coefficients.
 pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut [Segment]) -> Covariance {
     let terms = model.terms.len();
     let driven = search.motion.is_driven(model);
@@ -271,7 +271,7 @@ pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut 
     last
 }
 
-/// Residuals over noise in eight parts of the range of every coordinate.
+/// Residuals over noise by parts of the range of every coordinate.
 pub(super) fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment]) -> Vec<Left> {
     let (n, bounds) = (motion.data.n, &motion.data.bounds);
     let mut sums = vec![[0.0; 2]; n * RESIDUAL_RANGES];

@@ -167,7 +167,7 @@ impl Search<'_> {
         error.is_finite().then_some(Choice { set, coefficients, error, held_out })
     }
 
-    /// The best choice with one term less.
+    /// The best choice with one term fewer.
     fn shorter(&self, from: &Choice) -> Option<Choice> {
         let normal = self.windows.normal(&from.coefficients, &from.set, self.sigma, &self.training);
         let costs = normal.costs(&self.windows.groups(&from.set))?;
@@ -191,7 +191,7 @@ impl Search<'_> {
         equal.max_by(|a, b| involved(a.0).total_cmp(&involved(b.0))).map(|(_, choice)| choice)
     }
 
-    /// Choices with one term more, for the most promising terms.
+    /// Choices with one more term, for the most promising terms.
     fn longer(&self, from: &Choice, all: &[usize]) -> Vec<Choice> {
         let normal = self.windows.normal(&from.coefficients, all, self.sigma, &self.training);
         let own: Vec<usize> = (0..all.len()).filter(|&k| from.set.contains(&all[k])).collect();

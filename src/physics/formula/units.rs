@@ -59,7 +59,7 @@ pub(super) struct Units {
 const UNKNOWN: &str = "[q]";
 
 impl Units {
-    /// Units from their texts. Coordinates without a unit are angles, or share one unknown unit.
+    /// Parses units. Coordinates without a unit are angles, or share one unknown unit.
     pub fn new(texts: &[String], time: &str, periodic: &[bool]) -> Self {
         let of = |(i, periodic): (usize, &bool)| match texts.get(i).filter(|text| !text.is_empty()) {
             Some(text) => Dimension::of(text),

@@ -1,4 +1,4 @@
-//! Which terms a fit through the motion needs, from its normal equations alone.
+//! Removes terms by the normal equations of a fit to the motion (Wald tests).
 
 use super::thresholds::{MOST_RIDGE, RIDGE};
 use crate::identification::linear::{inverse_with, times};
@@ -41,8 +41,8 @@ pub(super) fn survivors(
     let size = (0..m).map(|k| matrix[k * m + k] * coefficients[k].powi(2)).fold(0.0, f64::max);
     let held = if size > 0.0 { (threshold / size).clamp(RIDGE, MOST_RIDGE) } else { RIDGE };
     let change = times(m, &inverse_with(m, matrix, held)?, right);
-    let moved = |share: f64| coefficients.iter().zip(&change).map(|(c, d)| c + share * d).collect::<Vec<_>>();
-    let mut x = [1.0, 0.5, 0.25].into_iter().map(moved).find(|x| allowed(x)).unwrap_or_else(|| coefficients.to_vec());
+    let shifted = |share: f64| coefficients.iter().zip(&change).map(|(c, d)| c + share * d).collect::<Vec<_>>();
+    let mut x = [1.0, 0.5, 0.25].into_iter().map(shifted).find(|x| allowed(x)).unwrap_or_else(|| coefficients.to_vec());
     let mut set: Vec<usize> = (0..m).collect();
     let mut refused: Vec<usize> = Vec::new();
     loop {

@@ -1,10 +1,10 @@
-//! Texts of a formula that was found.
+//! A found formula as text, LaTeX, Rust and a system file.
 
 use super::found::{FoundDrive, FoundFormula, FoundTerm, Left, Rival, Verdict};
 use crate::identification::Between;
 use serde::Serialize;
 
-/// A formula with the texts made from it, as JSON.
+/// A formula in all its notations, for JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct FormulaSummary<'a> {
     verdict: Verdict,
@@ -94,7 +94,7 @@ impl FoundFormula {
         if text.is_empty() { "0".to_string() } else { text }
     }
 
-    /// A Rust type with this Lagrangian; with a drive the time is its last coordinate, as [`InTime`](crate::lagrangian::InTime) takes it.
+    /// A Rust type with this Lagrangian; with a drive the time is its last coordinate, as [`InTime`](crate::lagrangian::InTime) expects it.
     pub fn rust(&self) -> String {
         let n = self.coordinates.len() + usize::from(self.drive.is_some());
         let names: Vec<&str> =
