@@ -148,7 +148,7 @@ impl Features {
         self.terms.iter().zip(weights).any(|(term, &weight)| term.velocity.is_none() && weight != 0.0)
     }
 
-    /// Coordinates in the terms of a combination, some more than once.
+    /// Coordinates in the terms of a combination, possibly repeated.
     pub fn coordinates(&self, weights: &[f64]) -> impl Iterator<Item = usize> + '_ {
         let used: Vec<usize> = (0..self.terms.len()).filter(|&term| weights[term] != 0.0).collect();
         used.into_iter().flat_map(|term| self.terms[term].powers.iter().map(|&(k, _)| self.variables[k].0))

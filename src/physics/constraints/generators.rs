@@ -264,7 +264,7 @@ pub fn reduce(rows: &mut [Vec<f64>], preference: &[f64]) -> Vec<usize> {
     pivots
 }
 
-/// The smallest combination of some terms.
+/// The combination of the given terms with the smallest ratio.
 fn smallest(pencil: &Pencil, support: &[usize]) -> Option<(f64, Vec<f64>)> {
     let (ratios, combinations) = pencil.on(support).solve();
     Some((*ratios.first()?, combinations[..support.len()].to_vec()))

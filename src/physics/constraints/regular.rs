@@ -110,7 +110,7 @@ fn phase(samples: &MotionSamples, limits: Limits, k: &[i32]) -> Option<FoundCons
     Some(FoundConstraint { kind, formula: format!("sin({terms})"), coefficients, range, defect: ratio.sqrt() })
 }
 
-/// Which of some functions reach a second branch along the motion: their gradient reverses from one sample to the next, or depends on the
+/// Which of the functions reach a second branch along the motion: their gradient reverses from one sample to the next, or depends on the
 /// gradients of the others.
 pub(super) fn branching(samples: &MotionSamples, features: &Features, functions: &[Generator]) -> Vec<bool> {
     let (m, mut found) = (functions.len(), vec![false; functions.len()]);

@@ -62,7 +62,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
 /// A search through libraries.
 struct Ladder<'a> {
     data: &'a Prepared<'a>,
-    validation: &'a BTreeSet<usize>,
+    held: &'a BTreeSet<usize>,
     options: &'a FormulaOptions,
     rungs: Vec<Families>,
     /// Libraries that were searched, and notes for the user.
@@ -79,23 +79,12 @@ struct Ladder<'a> {
 impl<'a> Ladder<'a> {
     fn new(
         data: &'a Prepared<'a>,
-        validation: &'a BTreeSet<usize>,
+        held: &'a BTreeSet<usize>,
         options: &'a FormulaOptions,
         rungs: Vec<Families>,
     ) -> Self {
         let (searched, notes, residuals) = (Vec::new(), Vec::new(), Vec::new());
-        Self {
-            data,
-            validation,
-            options,
-            rungs,
-            searched,
-            notes,
-            refused: None,
-            best: None,
-            least: f64::INFINITY,
-            residuals,
-        }
+        Self { data, held, options, rungs, searched, notes, refused: None, best: None, least: f64::INFINITY, residuals }
     }
 
     /// `true` if a formula fits the motion.
@@ -113,7 +102,7 @@ impl<'a> Ladder<'a> {
         };
         self.searched.push(extent.to_string());
         self.options.cancellation.check()?;
-        let weak = WeakForm::new(self.data, library, self.validation, self.options);
+        let weak = WeakForm::new(self.data, library, self.held, self.options);
         self.kept(weak)
     }
 
@@ -145,10 +134,10 @@ impl<'a> Ladder<'a> {
             let most = if long { before / LARGER_LIBRARY_ERROR } else { LARGER_LIBRARY_ERROR * before };
             let followed = match error > most {
                 true => None,
-                false => self.kept(weak.follow_all(self.data, self.validation, self.options))?,
+                false => self.kept(weak.follow_all(self.data, self.held, self.options))?,
             };
             if self.options.drive && followed.as_ref().is_none_or(|found| found.verdict == Verdict::NotInLibrary) {
-                self.residuals.push((extent, Residuals::of(&weak, self.data, self.validation)));
+                self.residuals.push((extent, Residuals::of(&weak, self.data, self.held)));
             }
             let Some(mut found) = followed else { continue };
             let done = found.verdict != Verdict::NotInLibrary;
@@ -193,7 +182,7 @@ impl<'a> Ladder<'a> {
             }
             least = least.min(weak.least());
             tried.insert(rounded(frequency, 4));
-            let followed = self.kept(weak.follow_all(self.data, self.validation, self.options))?;
+            let followed = self.kept(weak.follow_all(self.data, self.held, self.options))?;
             let fits = |found: &FoundFormula| found.verdict != Verdict::NotInLibrary && found.drive.is_some();
             if let Some(mut found) = followed.filter(fits) {
                 found.basis = families.to_string();

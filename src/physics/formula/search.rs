@@ -71,7 +71,7 @@ impl Search<'_> {
         ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_DETERMINANT_RATIO)
     }
 
-    /// The terms that blocks with some weights need.
+    /// The terms that remain if every block counts with its weight.
     pub fn survivors(
         &self,
         model: &Model,

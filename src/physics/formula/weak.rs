@@ -208,7 +208,7 @@ impl Windows {
         4 * positive > 3 * self.len()
     }
 
-    /// Errors of the mean accelerations that some coefficients give, `(windows, n)`; `NaN` where the mass matrix is singular.
+    /// Errors of the mean accelerations with the given coefficients, `(windows, n)`; `NaN` where the mass matrix is singular.
     pub fn accelerations(&self, coefficients: &[f64]) -> Vec<f64> {
         let (n, count) = (self.n, self.terms);
         let used: Vec<usize> = (0..count).filter(|&k| coefficients[k] != 0.0).collect();
