@@ -9,8 +9,9 @@ use super::function::Function;
 use super::library::{Kind, Library};
 use super::prepared::Prepared;
 use super::thresholds::{
-    BACKGROUND_RANGE, FREQUENCIES_PER_RESOLUTION, INDEPENDENT_FREQUENCIES, LEAST_BACKGROUND, LEAST_DRIVE_PERIODS,
-    MOST_DRIVE_FREQUENCIES, MOST_FALSE_ALARMS, MOST_FREQUENCIES, MOST_REMOVED_EFFECTS, MOST_WINDOW_PHASE,
+    BACKGROUND_RANGE, EXPLAINING_SHARE, FREQUENCIES_PER_RESOLUTION, INDEPENDENT_FREQUENCIES, LEAST_BACKGROUND,
+    LEAST_DRIVE_PERIODS, MOST_DRIVE_FREQUENCIES, MOST_FALSE_ALARMS, MOST_FREQUENCIES, MOST_REMOVED_EFFECTS,
+    MOST_WINDOW_PHASE, REFINED_PEAKS,
 };
 use crate::cancellation::Cancellation;
 use crate::linalg::dot;
@@ -28,6 +29,8 @@ pub(super) struct Residuals {
     band: [f64; 2],
     /// Resolution of the longest trajectory, and of the whole recording.
     resolution: [f64; 2],
+    /// Sum of the squared residuals.
+    total: f64,
 }
 
 /// The accelerations per unit amplitude of a drive, by window: their square, their product with the residuals, and with each of the
@@ -73,8 +76,8 @@ impl Driven {
 pub(super) struct Line {
     /// Its angular frequency, in rad/s.
     pub frequency: f64,
-    /// Rate of false alarms, for all frequencies together.
-    pub alarms: f64,
+    /// Share of the squared residuals that a drive of this frequency explains.
+    pub share: f64,
 }
 
 /// Time from the first to the last sample of the longest trajectory.
@@ -127,14 +130,14 @@ impl Residuals {
         let (longest, apart) = (longest(data), steps.fold(f64::INFINITY, f64::min));
         let band = [TAU * LEAST_DRIVE_PERIODS / longest, (MOST_WINDOW_PHASE / data.width().0).min(PI / apart)];
         let resolution = [TAU / longest, TAU / (ends[1] - ends[0]).max(longest)];
-        Self { times, driven, band, resolution }
+        Self { times, driven, band, resolution, total: dot(&errors, &errors) }
     }
 
-    /// The most significant lines of several spectra, in order; lines closer than the resolution are returned once.
+    /// The lines of several spectra, those that explain most first; lines closer than the resolution are returned once.
     pub fn lines<'a>(rests: impl Iterator<Item = &'a Self>, stop: &Cancellation) -> Vec<Line> {
         let mut lines: Vec<(Line, f64)> =
             rests.filter_map(|rest| Some((rest.line(stop)?, rest.resolution[0] / 2.0))).collect();
-        lines.sort_by(|(a, _), (b, _)| a.alarms.total_cmp(&b.alarms));
+        lines.sort_by(|(a, _), (b, _)| b.share.total_cmp(&a.share));
         let mut apart: Vec<Line> = Vec::new();
         for (line, width) in lines {
             if apart.len() < MOST_DRIVE_FREQUENCIES
@@ -146,7 +149,7 @@ impl Residuals {
         apart
     }
 
-    /// The most significant line, if any line is significant.
+    /// The line that explains most, among those that are significant or explain nearly everything.
     fn line(&self, stop: &Cancellation) -> Option<Line> {
         let [low, high] = self.band;
         let step = self.resolution[1] / FREQUENCIES_PER_RESOLUTION;
@@ -162,13 +165,14 @@ impl Residuals {
         let tests = INDEPENDENT_FREQUENCIES * (high - low) / self.resolution[1] * self.driven.len() as f64;
         let of = |k: usize| {
             let own: Vec<f64> = powers.iter().map(|powers| powers[k]).collect();
-            let peak = (0..own.len()).max_by(|&a, &b| own[a].total_cmp(&own[b]))?;
+            let (peak, frequency, power) = self.highest(k, &grid, &own)?;
             let alarms = tests * self.chance(&grid, &own, peak)?;
-            tracing::debug!(k, frequency = grid[peak], alarms, "line");
-            Some(Line { frequency: self.refined(k, [grid[peak] - step, grid[peak] + step]), alarms })
+            let share = power / self.total;
+            tracing::debug!(k, frequency, alarms, share, "line");
+            (alarms < MOST_FALSE_ALARMS || share > EXPLAINING_SHARE).then_some(Line { frequency, share })
         };
         let lines = (0..self.driven.len()).filter_map(of);
-        lines.min_by(|a, b| a.alarms.total_cmp(&b.alarms)).filter(|line| line.alarms < MOST_FALSE_ALARMS)
+        lines.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
     /// Reduction of the sum of squares by a drive of each kind at a frequency.
@@ -189,14 +193,30 @@ impl Residuals {
         Some((-count * (powers[peak] / mean / count).ln_1p()).exp())
     }
 
-    /// The frequency of the largest power between two.
-    fn refined(&self, k: usize, [mut low, mut high]: [f64; 2]) -> f64 {
+    /// The highest peak: its index on the grid, its frequency and its power. The grid is too coarse to compare peaks that are nearly equal, so
+    /// the frequencies of several are refined first.
+    fn highest(&self, k: usize, grid: &[f64], own: &[f64]) -> Option<(usize, f64, f64)> {
+        let is_peak =
+            |&at: &usize| (at == 0 || own[at - 1] <= own[at]) && own.get(at + 1).is_none_or(|next| *next <= own[at]);
+        let mut peaks: Vec<usize> = (0..own.len()).filter(is_peak).collect();
+        peaks.sort_by(|&a, &b| own[b].total_cmp(&own[a]));
+        let step = grid[1] - grid[0];
+        let refined = peaks.into_iter().take(REFINED_PEAKS).map(|peak| {
+            let (frequency, power) = self.refined(k, [grid[peak] - step, grid[peak] + step]);
+            (peak, frequency, power)
+        });
+        refined.max_by(|a, b| a.2.total_cmp(&b.2))
+    }
+
+    /// The frequency of the largest power between two, and its power.
+    fn refined(&self, k: usize, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
         let power = |om: f64| self.powers(om)[k];
         for _ in 0..12 {
             let [a, b] = [low + 0.382 * (high - low), low + 0.618 * (high - low)];
             if power(a) > power(b) { high = b } else { low = a }
         }
-        (low + high) / 2.0
+        let frequency = (low + high) / 2.0;
+        (frequency, power(frequency))
     }
 }
 
@@ -244,10 +264,10 @@ mod tests {
         let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
         let function: Vec<f64> = times.iter().map(|t| (0.7 * t + (0.31 * t).sin()).cos()).collect();
         let errors: Vec<f64> = times.iter().map(|t| error(*t, draw())).collect();
-        let (span, force) = (100.0, vec![1.0; times.len()]);
+        let (span, force, total) = (100.0, vec![1.0; times.len()], dot(&errors, &errors));
         let resolution = [TAU / span; 2];
         let driven = [force, function].map(|effect| Driven::new(&effect, &errors, &[], 1)).into();
-        Residuals { times, driven, band: [3.0 * TAU / span, 10.0], resolution }
+        Residuals { times, driven, band: [3.0 * TAU / span, 10.0], resolution, total }
     }
 
     fn line(rest: &Residuals) -> Option<Line> {
@@ -292,6 +312,29 @@ mod tests {
     }
 
     #[test]
+    fn a_line_is_found_though_its_neighbours_explain_the_residuals_too() {
+        // A drive whose effect decays within two periods: its line is as wide as the background that it is compared with.
+        let effect = |t: f64| (-t / 6.0).exp();
+        let mut decaying = rest(0, |t, _| effect(t) * (1.3 * t + 0.4).cos());
+        let errors: Vec<f64> = decaying.times.iter().map(|t| effect(*t) * (1.3 * t + 0.4).cos()).collect();
+        let effects: Vec<f64> = decaying.times.iter().map(|t| effect(*t)).collect();
+        assert!(line(&decaying).is_none());
+        decaying.driven = vec![Driven::new(&effects, &errors, &[], 1)];
+        let found = line(&decaying).unwrap();
+        assert!((found.frequency - 1.3).abs() < 1e-3 && found.share > 0.99, "{found:?}");
+    }
+
+    #[test]
+    fn nearly_equal_peaks_are_compared_between_the_frequencies_of_the_grid() {
+        // The stronger line lies halfway between two frequencies of the grid, the weaker one on it.
+        let step = TAU / 100.0 / FREQUENCIES_PER_RESOLUTION;
+        let low = 3.0 * TAU / 100.0;
+        let [halfway, upon] = [low + 60.5 * step, low + 140.0 * step];
+        let found = line(&rest(1, |t, _| 1.01 * (halfway * t).cos() + (upon * t).cos())).unwrap();
+        assert!((found.frequency - halfway).abs() < step / 4.0, "{found:?} {halfway} {upon}");
+    }
+
+    #[test]
     fn a_band_without_neighbours_has_no_line() {
         let few = |high: f64| Residuals { band: [1.0, high], ..rest(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
         assert!(line(&few(1.0 + 5.0 * TAU / 100.0)).is_none() && line(&few(10.0)).is_some());
@@ -318,7 +361,8 @@ mod tests {
         let mut errors = drive.clone();
         let others = remove(&mut errors, [term].into_iter());
         let driven = vec![Driven::new(&vec![1.0; times.len()], &errors, &others, 1)];
-        let rest = Residuals { times, driven, band: [0.2, 10.0], resolution: [TAU / 100.0; 2] };
+        let total = dot(&errors, &errors);
+        let rest = Residuals { times, driven, band: [0.2, 10.0], resolution: [TAU / 100.0; 2], total };
         assert!((line(&rest).unwrap().frequency - 1.3).abs() < 2e-3);
     }
 }

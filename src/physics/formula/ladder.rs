@@ -9,7 +9,7 @@ use super::found::{FoundFormula, Verdict};
 use super::library::Library;
 use super::obstacles::constrained;
 use super::prepared::Prepared;
-use super::thresholds::LARGER_LIBRARY_ERROR;
+use super::thresholds::{DRIVEN_LIBRARY_ERROR, LARGER_LIBRARY_ERROR};
 use crate::names::rounded;
 use crate::recording::Recording;
 use std::collections::BTreeSet;
@@ -176,8 +176,8 @@ impl<'a> Ladder<'a> {
             let families = extent.families;
             let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent.clone() };
             let Some(weak) = self.weak_form(&extent)? else { continue };
-            // Near the frequency of a line, the errors of different libraries hardly differ.
-            if weak.least() > least / LARGER_LIBRARY_ERROR {
+            // The error that is left of the frequency hides the differences between libraries.
+            if weak.least() > DRIVEN_LIBRARY_ERROR * least {
                 continue;
             }
             least = least.min(weak.least());

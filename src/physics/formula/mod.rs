@@ -62,10 +62,7 @@ pub use find::FormulaOptions;
 pub use found::{FoundDrive, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
 pub use ladder::formula_of_motion;
 pub use regress::formula_of_model;
+// For the packages of this repository.
 #[doc(hidden)]
 pub use thresholds::{MODEL_STATES, MOST_BOOTSTRAPS};
 pub use written::FormulaSummary;
-
-// For the packages of this repository.
-#[doc(hidden)]
-pub use {find::MOST_BOOTSTRAPS, regress::MODEL_STATES};

@@ -186,6 +186,16 @@ pub(super) const MODEL_REFITS: usize = 8;
 pub(super) const FREQUENCIES_PER_RESOLUTION: f64 = 4.0;
 /// Largest number of frequencies of a spectrum.
 pub(super) const MOST_FREQUENCIES: f64 = 50_000.0;
+/// Highest peaks of a spectrum whose frequencies are refined before they are compared: those of the drive, of the own oscillation, and of a
+/// multiple of each.
+pub(super) const REFINED_PEAKS: usize = 4;
+/// Smallest share of the squared residuals that a drive explains if it may be one although neighbouring frequencies explain the residuals as
+/// well. That is so where the motion settles within a few periods, and a library explains all but the beginning: of ten such recordings, the
+/// drive explains 0.95 to 0.999 of the residuals of the right library, and any other frequency at most 0.7 (seeds 0 to 9 of
+/// `lnn-studies rates --part drives`). The drive is then tried, and judged by the motion.
+pub(super) const EXPLAINING_SHARE: f64 = 0.9;
+/// Largest error of accelerations of a library with a drive, over the smallest one before, at which it is fitted to the motion.
+pub(super) const DRIVEN_LIBRARY_ERROR: f64 = 2.0;
 /// Largest number of frequencies of a drive that are tried.
 pub(super) const MOST_DRIVE_FREQUENCIES: usize = 3;
 /// Largest number of terms whose effect is removed from the motion before a drive is searched.

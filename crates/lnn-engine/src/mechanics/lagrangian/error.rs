@@ -95,7 +95,10 @@ impl core::fmt::Display for MechanicsError {
                 "drives: expected at least {expected} different coordinates, as many as degrees of freedom, found {found}"
             ),
             Self::Undriven { row } => {
-                write!(f, "state {row} can move while the drives stand still: their forces do not give its acceleration")
+                write!(
+                    f,
+                    "state {row} can move while the drives stand still: their forces do not give its acceleration"
+                )
             }
             Self::NotFinite { row, what } => write!(f, "{what} of state {row} is not finite"),
             Self::Uncertified { row } => write!(f, "mass matrix of state {row} is not certified"),
