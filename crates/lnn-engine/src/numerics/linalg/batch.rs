@@ -19,12 +19,12 @@ pub struct Workspace<S> {
     pub(super) second: Retry<S>,
     /// Scratch of determinants.
     pub(super) minors: Minors<S>,
-    /// Lent to callers.
+    /// Scratch memory for callers.
     vector: Vec<S>,
     failures: Vec<(usize, Failure)>,
 }
 
-/// Numbers on the boundary of a cache line, as the widest vector instructions like them.
+/// Numbers on the boundary of a cache line, as the widest vector instructions prefer.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Buffer<S> {
     numbers: Vec<S>,

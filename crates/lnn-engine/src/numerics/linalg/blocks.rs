@@ -3,11 +3,9 @@
 use super::batch::Buffer;
 use super::components;
 use super::eigen::whole;
+use super::thresholds::BLOCK_SEARCH_SIZE;
 use crate::scalar::{Real, Scalar, are_finite};
 use alloc::vec::Vec;
-
-/// Size from which the search for blocks is cheap compared with a full matrix.
-const SIZE: usize = 16;
 
 /// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of a batch, of every matrix by its blocks; `true` if all is
 /// known to be finite. Eigenvectors are zero outside their block.
@@ -21,7 +19,7 @@ pub(super) fn by_blocks<S: Scalar>(
     vectors: &mut [S],
     buffer: &mut Buffer<S>,
 ) -> bool {
-    if n < SIZE {
+    if n < BLOCK_SEARCH_SIZE {
         return whole(n, matrices, values, vectors, buffer);
     }
     let groups_of = |row: usize| groups(n, &matrices[row * n * n..][..n * n]);

@@ -1,6 +1,7 @@
 //! Condition numbers, and when a matrix counts as singular.
 
 use super::batch::{Dense, LANES};
+use super::thresholds::REGULAR_SHARE;
 use super::{LinalgError, Workspace, eigen, elimination, expect_length, large_systems};
 use crate::scalar::{Real, Scalar, vectorized};
 use alloc::vec::Vec;
@@ -130,7 +131,7 @@ impl<S: Scalar> Dense<S> {
         );
         let own: f64 = matrix.iter().map(|x| x.to_f64() * x.to_f64()).sum();
         let condition = (own * squares.iter().sum::<f64>()).sqrt();
-        condition * S::epsilon().to_f64() < 0.25
+        condition * S::epsilon().to_f64() < REGULAR_SHARE
     }
 
     /// Smallest and largest absolute eigenvalue of the loaded matrix.

@@ -7,13 +7,10 @@ use super::Workspace;
 use super::batch::{LANES, Lane};
 use super::elimination::{self, Pivots};
 use super::solve::{Systems, finish, is_harmless};
+use super::thresholds::{ALONE_SIZE, LEAST_DEFINITE_SIZE};
 use crate::scalar::{Real, Scalar, are_finite, in_lanes, vectorized};
 use alloc::vec::Vec;
 
-/// Smaller matrices are eliminated with pivots in no more time.
-const SIZE: usize = 5;
-/// From this size on the loops along a row are long enough for one matrix at a time.
-const ALONE: usize = 47;
 /// Pivots whose rows are subtracted together.
 const BLOCK: usize = 4;
 /// Numbers of a row that are treated together.
@@ -23,11 +20,11 @@ impl<S: Scalar> Systems<'_, S> {
     /// Solves all matrices that are safely positive definite; returns the remaining rows, `None` if it is not worth trying.
     pub(super) fn solve_definite(&self, solutions: &mut [S], workspace: &mut Workspace<S>) -> Option<Vec<usize>> {
         let n = self.n;
-        let right = self.right.filter(|_| self.m == 1 && n >= SIZE)?;
+        let right = self.right.filter(|_| self.m == 1 && n >= LEAST_DEFINITE_SIZE)?;
         let batch = solutions.len() / n;
         let mut refused = Vec::new();
         let done = match const { size_of::<S>() < size_of::<f64>() } {
-            _ if n >= ALONE => 0,
+            _ if n >= ALONE_SIZE => 0,
             true => self.definite_blocks::<{ 2 * LANES }>(batch, solutions, workspace, &mut refused),
             false => self.definite_blocks::<LANES>(batch, solutions, workspace, &mut refused),
         };
@@ -51,7 +48,7 @@ impl<S: Scalar> Systems<'_, S> {
     /// trying.
     pub(super) fn invert_definite(&self, inverses: &mut [S], workspace: &mut Workspace<S>) -> Option<Vec<usize>> {
         let n = self.n;
-        if n < SIZE {
+        if n < LEAST_DEFINITE_SIZE {
             return None;
         }
         let (buffer, retry, _) = workspace.parts();

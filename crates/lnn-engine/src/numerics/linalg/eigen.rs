@@ -7,6 +7,7 @@
 
 use super::batch::{Aligned, Buffer, LANES, Lane, Workspace, across, rows, select, with_size};
 use super::blocks::by_blocks;
+use super::thresholds::MOST_EIGEN_SWEEPS;
 use super::{Failure, LinalgError, expect_length, large_systems};
 use crate::scalar::{Real, Scalar, in_lanes};
 
@@ -111,9 +112,6 @@ fn split<S: Scalar, const W: usize>(
     let rest = decompose::<S, 1>(n, matrices, values, vectors, (done, batch), buffer);
     finite != Some(false) && rest != Some(false)
 }
-
-/// More sweeps than any matrix was seen to need (about ten at n = 20 in double-double).
-const SWEEPS: usize = 40;
 
 /// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of the matrices `start..end` of a
 /// batch in blocks of `W`; the upper triangle is read.
@@ -242,7 +240,7 @@ fn diagonalize<S: Scalar, const W: usize>(
         floor[l] = least * least;
     }
     let pairs = n.div_ceil(2);
-    for _ in 0..SWEEPS {
+    for _ in 0..MOST_EIGEN_SWEEPS {
         let mut quiet = true;
         for round in 0..2 * pairs - 1 {
             let mut still = true;

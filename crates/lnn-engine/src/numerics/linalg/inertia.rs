@@ -1,5 +1,6 @@
 //! Signs of the eigenvalues without the eigenvalues; determinants of the leading blocks and their gradients, without overflow.
 
+use super::thresholds::MOST_BALANCING_ROUNDS;
 use super::{LinalgError, Workspace, eigh, expect_length};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
@@ -149,15 +150,12 @@ fn eliminate_two<S: Scalar>(n: usize, a: &mut [S], k: usize) {
     }
 }
 
-/// Scales of very different size are brought together within this many rounds, which halve their exponents.
-const ROUNDS: usize = 16;
-
 /// Multiplies rows and columns of a symmetric matrix, in its lower triangle, by powers of two until the largest element
 /// of each row is near 1 (Ruiz 2001, one row after the other).
 fn balance<S: Scalar>(n: usize, a: &mut [S]) {
     let zero = <S as Real>::zero();
     let lowest = S::min_positive().ilogb();
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_BALANCING_ROUNDS {
         let mut balanced = true;
         for i in 0..n {
             let place = |j: usize| if j < i { i * n + j } else { j * n + i };

@@ -3,18 +3,15 @@
 use super::Failure;
 use super::batch::{Retry, Workspace};
 use super::solve::{Systems, examine};
+use super::thresholds::{BLOCKED_INVERSE_SIZE, BLOCKED_SIZE, TRIDIAGONAL_SIZE};
 use crate::scalar::Scalar;
 use alloc::vec::Vec;
-
-/// Sizes from which faer's blocked elimination is faster than ours on lanes, whose blocks then no longer fit into the nearest cache: for
-/// one right-hand side, and for as many as there are rows.
-const SIZES: (usize, usize) = (47, 40);
 
 impl<S: Scalar> Systems<'_, S> {
     /// Solves all systems by the routine of the scalar, faer's, as [`Systems::solve`] does by lanes, if there is one and the size is large
     /// enough; `true` if it did.
     pub(super) fn solve_large(&self, solutions: &mut [S], workspace: &mut Workspace<S>) -> bool {
-        if self.n < if self.m == 1 { SIZES.0 } else { SIZES.1 } {
+        if self.n < if self.m == 1 { BLOCKED_SIZE } else { BLOCKED_INVERSE_SIZE } {
             return false;
         }
         let (_, second, failures) = workspace.parts();
@@ -33,11 +30,8 @@ impl<S: Scalar> Systems<'_, S> {
     }
 }
 
-/// Size above which faer's tridiagonal method beats Jacobi on lanes.
-const EIGEN: usize = 32;
-
 /// Eigenvalues, ascending, and eigenvectors as rows (if requested) of one symmetric matrix, `NaN` if faer gives up; `false` if lanes are
 /// faster, or this scalar has no routine.
 pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) -> bool {
-    n > EIGEN && S::eigh(n, matrix, values, vectors)
+    n > TRIDIAGONAL_SIZE && S::eigh(n, matrix, values, vectors)
 }

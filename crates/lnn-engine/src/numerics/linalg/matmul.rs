@@ -23,7 +23,7 @@ pub fn gemm<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'
 /// Whether dot products are faster than a blocked product.
 #[cfg(feature = "faer")]
 pub(super) fn is_small<S>(c: &MatMut<'_, S>, a: &MatRef<'_, S>, b: &MatRef<'_, S>) -> bool {
-    (c.rows <= FEW_ROWS || c.cols == 1) && b.transposed && !a.transposed
+    (c.rows <= super::thresholds::DOT_PRODUCT_ROWS || c.cols == 1) && b.transposed && !a.transposed
 }
 
 /// The product without faer: by dot products where the rows of both are contiguous, by loops otherwise.
@@ -39,9 +39,10 @@ pub(super) fn plain<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: 
     );
 }
 
-/// Rows up to which dot products are faster than a blocked product.
-#[cfg(feature = "faer")]
-const FEW_ROWS: usize = 8;
+/// Sum of products.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
 
 /// Rows of a matrix, `stride` numbers apart.
 #[derive(Clone, Copy)]

@@ -34,6 +34,7 @@ mod matmul;
 mod signature;
 mod singular;
 mod solve;
+mod thresholds;
 
 pub use crate::scalar::{MatMut, MatRef};
 pub use batch::Workspace;
@@ -42,15 +43,15 @@ pub use condition::condition_number;
 pub use eigen::{eigenvalues, eigh};
 pub use inertia::Inertia;
 pub(crate) use inertia::Scaled;
-pub(crate) use solve::SMALL_PIVOT;
 pub use solve::{inverse, solve, solve_symmetric};
+pub(crate) use thresholds::SMALL_PIVOT;
 
 // For the packages of this repository.
 #[doc(hidden)]
 pub use {
     components::components,
     inertia::{adjugate, inertia, is_positive_definite, leading_minors},
-    matmul::gemm,
+    matmul::{dot, gemm},
     signature::{
         SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_one_negative, has_signature,
         one_negative_violation, sylvester_violation,
@@ -60,12 +61,6 @@ pub use {
 
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
-
-/// Sum of products.
-#[doc(hidden)]
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
 
 /// Why one matrix of a batch gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,12 +3,10 @@
 //! A gradient by the elements of `M` is given as `G = sum_k gamma_k u_k u_k^T`: each term is one symmetric jet of the adjoint identity. A
 //! matrix of the right signature has no term and needs no spectrum: its pivots show it.
 
+use super::thresholds::PENALTY_FLOOR;
 use crate::linalg::{LinalgError, Scaled, Workspace, adjugate, eigh, inertia, is_positive_definite, leading_minors};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
-
-/// Keeps the paper's denominators away from zero.
-const EPSILON: f64 = 1e-8;
 
 /// A penalty of one matrix and its gradient; buffers are reused from matrix to matrix.
 #[derive(Clone, Debug, Default)]
@@ -160,7 +158,7 @@ pub fn one_negative_violation<S: Scalar>(
     let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
     let SignatureBuffers { block, scaling, values, vectors, workspace, .. } = buffers;
     scaling.clear();
-    scaling.extend(scales.iter().map(|&c| (c + S::of_f64(EPSILON)).sqrt().recip()));
+    scaling.extend(scales.iter().map(|&c| (c + S::of_f64(PENALTY_FLOOR)).sqrt().recip()));
     block.clear();
     // Scaled on one side first: two scales may lie at opposite ends of the range.
     block.extend(matrix.iter().enumerate().map(|(k, &m)| (m * scaling[k / n]) * scaling[k % n]));
@@ -202,7 +200,7 @@ pub fn sylvester_violation<S: Scalar>(
     if let Some(t) = time
         && matrix[t * n + t] > zero
     {
-        let gamma = (scales[t] + S::of_f64(EPSILON)).recip();
+        let gamma = (scales[t] + S::of_f64(PENALTY_FLOOR)).recip();
         found.value += gamma * matrix[t * n + t];
         found.gamma.push(gamma);
         found.vectors.extend((0..n).map(|i| if i == t { one } else { zero }));
@@ -247,7 +245,7 @@ fn minor_violations<S: Scalar, I: Iterator<Item = S>>(
     gradient.resize(m * m, zero);
     leading_minors(m, block, minors, workspace)?;
     // eps / s_k; its part eps / (product of the scales that are not zero) replaces 1/(s_k + eps) where a scale is zero.
-    let mut ratio = Scaled::new(S::of_f64(EPSILON));
+    let mut ratio = Scaled::new(S::of_f64(PENALTY_FLOOR));
     let mut vanishes = false;
     for (k, (minor, c)) in minors.iter().zip(scales()).enumerate() {
         let size = k + 1;

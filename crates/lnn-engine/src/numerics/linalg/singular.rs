@@ -108,10 +108,6 @@ pub fn singular(columns: &[Vec<f64>]) -> Option<Singular> {
     by_rotations(n, m, &all)
 }
 
-/// More sweeps than any matrix was seen to need.
-#[cfg(any(test, not(feature = "faer")))]
-const SWEEPS: usize = 40;
-
 /// [`singular`] without faer, of `all`, the columns of `n` of `m` numbers one after the other, finite, `m >= n`.
 ///
 /// Pairs of columns are rotated by the smaller angle until all are orthogonal (Hestenes 1958): their lengths are the singular values, and the
@@ -124,7 +120,7 @@ fn by_rotations(n: usize, m: usize, all: &[f64]) -> Option<Singular> {
     (0..n).for_each(|k| vectors[k][k] = 1.0);
     let rounding = f64::EPSILON * (m as f64).sqrt();
     let longest = columns.iter().fold(0.0, |longest: f64, x| longest.max(dot(x, x)));
-    for _ in 0..SWEEPS {
+    for _ in 0..super::thresholds::MOST_SINGULAR_SWEEPS {
         let mut orthogonal = true;
         for j in 1..n {
             for i in 0..j {

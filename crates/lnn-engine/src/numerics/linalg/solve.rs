@@ -1,6 +1,7 @@
 //! Batched solution of symmetric, possibly indefinite systems: one elimination for all rows, and a closer examination of rows that need it.
 
 use super::batch::{Aligned, LANES, Lane, Retry, with_size};
+use super::thresholds::{LARGE_GROWTH, SMALL_PIVOT, SUSPICIOUS_ROUNDINGS};
 use super::{Failure, LinalgError, Workspace, condition, elimination, expect_length};
 use crate::scalar::{Real, Scalar, in_lanes};
 use alloc::vec::Vec;
@@ -82,14 +83,9 @@ pub(super) struct Systems<'a, S> {
     pub right: Option<&'a [S]>,
 }
 
-/// Below this ratio of smallest pivot to largest element a solution is refined.
-pub(crate) const SMALL_PIVOT: f64 = 1.0 / 1024.0;
-/// Also above this ratio of the largest element of the triangular factor to that of the matrix.
-const GROWTH: f64 = 4.0;
-
 /// Below this ratio of smallest pivot to largest element a matrix may be singular.
 pub(super) fn suspicious<S: Scalar>(n: usize) -> S {
-    S::epsilon() * S::of_f64(1024.0 * (n * n) as f64)
+    S::epsilon() * S::of_f64(SUSPICIOUS_ROUNDINGS * (n * n) as f64)
 }
 
 impl<'a, S: Scalar> Systems<'a, S> {
@@ -269,7 +265,7 @@ fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>,
 /// `true` if a solution needs no correction, judged by the smallest pivot and the largest elements of the triangular factor and the matrix.
 #[inline(always)]
 pub(super) fn is_harmless<S: Scalar>(smallest: S, growth: S, largest: S) -> bool {
-    (smallest > S::of_f64(SMALL_PIVOT) * largest) & (growth <= S::of_f64(GROWTH) * largest)
+    (smallest > S::of_f64(SMALL_PIVOT) * largest) & (growth <= S::of_f64(LARGE_GROWTH) * largest)
 }
 
 /// Writes the solutions out; whether a row needs a second look.
