@@ -107,7 +107,7 @@ fn the_option_that_helps_is_named() {
     let model = folder.file("m", model().to_bytes().unwrap());
     let out = text(&folder.path("out.csv"));
     let rollout = |more: &[&str]| lnn(&[&["rollout", &model, "--state", "1,2,0,0", "--out", &out], more].concat());
-    rollout(&["--t-end", "1", "--dt", "1e-12"]).refused(2, &["--dt: asks for", "at most 1e8"]);
+    rollout(&["--t-end", "1", "--dt", "1e-12"]).refused(2, &["--dt: requires", "at most 1e8"]);
     rollout(&["--t-end", "1", "--dt", "0.1", "--rtol", "1e-30"]).refused(2, &["--rtol", "2e-15"]);
     lnn(&["evaluate", &model, "--rtol", "1e-30"]).refused(2, &["--rtol", "2e-15"]);
     assert!(!folder.path("out.csv").exists());

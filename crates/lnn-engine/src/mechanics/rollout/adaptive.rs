@@ -159,7 +159,7 @@ impl<'a, S: Integrable> Progress<'a, S> {
         Ok(())
     }
 
-    /// The samples within a piece, from here; it is integrated to its end even if that is not a sample.
+    /// The remaining samples of a piece, which is integrated to its end even if that is not a sample.
     fn samples(&self, piece: &Piece<S>) -> Part<S> {
         let (all, first) = (self.all, self.first);
         let last = piece.end >= all.elapsed(all.len() - 1);

@@ -1,7 +1,7 @@
 //! Crossings of the zeros of events along a motion, step by step.
 //!
-//! Every event knows the side of its zero that the motion is on. A step is looked through at equidistant places of its dense output; where
-//! the side changes, the place is closed in on. After an impact the motion stays on its side, so that the impact does not happen again.
+//! Every event knows the side of its zero that the motion is on. A step is sampled at equidistant places of its dense output; where
+//! the side changes, the crossing is refined. After an impact the motion stays on its side, so that the impact does not happen again.
 
 use super::event::{Event, Occurrence};
 use super::impact::Flights;
@@ -65,7 +65,7 @@ pub(super) fn side<S: Scalar>(value: S) -> Option<bool> {
 
 /// Finds the point between `a` and `b` where `f`, nonnegative at `a`, becomes negative, by the method of Oliveira and Takahashi (2020),
 /// with hardly more evaluations than bisection at worst and few if `f` is smooth. The remaining width is the tolerance, or one rounding.
-fn close_in<S: Scalar, E>(
+fn refine<S: Scalar, E>(
     (mut a, mut b): (S, S),
     tolerance: S,
     f: &mut dyn FnMut(S) -> Result<S, E>,
@@ -140,7 +140,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         }))
     }
 
-    /// `true` if a motion that was above or below zero is to be caught at it.
+    /// `true` if the event happens for a motion that was above or below zero.
     pub(super) fn catches(&self, event: usize, above: bool) -> bool {
         let Event { falling, rising, .. } = self.events[event];
         if above != self.backwards { falling } else { rising }
@@ -153,7 +153,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         self.events[event].when.value(time(share), q, v)
     }
 
-    /// The first crossing within a step behind a share of it; `dense` closes in on it.
+    /// The first crossing within a step behind a share of it; `dense` refines it.
     pub(super) fn first(&mut self, from: S, time: &dyn Fn(S) -> S, dense: &mut Dense<'_, S>) -> Option<Found<S>> {
         let mut first: Option<Found<S>> = None;
         for event in 0..self.events.len() {
@@ -247,7 +247,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         None
     }
 
-    /// A crossing closed in on to the rounding of the time.
+    /// A crossing refined to the rounding of the time.
     fn refined(
         &mut self,
         event: usize,
@@ -258,7 +258,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
     ) -> (S, S) {
         let tolerance = rounding(time);
         let mut f = |share: S| Ok::<S, StepFailure>(self.oriented((event, above), share, time, dense));
-        close_in(between, tolerance, &mut f).unwrap_or(between)
+        refine(between, tolerance, &mut f).unwrap_or(between)
     }
 
     /// Refines a crossing with states that the method itself computes, given the share of the step: first near where `dense` has found it.
@@ -301,7 +301,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
             (a, b) = (S::max(a - reach, zero), a);
             reach = reach.ldexp(3);
         }
-        let between = close_in((a, b), rounding(time), &mut f)?;
+        let between = refine((a, b), rounding(time), &mut f)?;
         Ok(Some(Found { between, ..found }))
     }
 

@@ -22,7 +22,7 @@ pub enum UnderflowCause {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RolloutError {
-    /// An argument makes no sense.
+    /// An argument is invalid.
     #[error("{what}: {problem}")]
     Invalid {
         /// Which argument.
@@ -48,10 +48,10 @@ pub enum RolloutError {
         /// Upper bound.
         upper: f64,
     },
-    /// The mass matrix cannot be solved with.
+    /// The mass matrix is singular.
     #[error("singular mass matrix at t = {t} (condition number {condition:.3e})")]
     SingularMass {
-        /// Last time at which it could.
+        /// Last time at which it was regular.
         t: f64,
         /// State `(q, v)` at `t`.
         state: Vec<f64>,
@@ -68,7 +68,7 @@ pub enum RolloutError {
         /// The nearest state `(q, v)` that they allow; empty if none was found.
         nearest: Vec<f64>,
     },
-    /// A constraint has come to depend on the others, so that the load cannot be divided among them.
+    /// A constraint depends on the others, so that the forces of constraint are not unique.
     #[error("constraint {constraint} depends on the others just after t = {t}")]
     DependentConstraint {
         /// Last time at which it did not.

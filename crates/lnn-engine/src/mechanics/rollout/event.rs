@@ -5,7 +5,7 @@ use crate::scalar::{Real, Scalar};
 use std::fmt;
 use std::sync::Arc;
 
-/// A number along a motion whose zeros are looked for.
+/// A number along a motion whose zeros are events.
 pub(super) trait When<S: Scalar>: Send + Sync {
     /// Its value.
     fn value(&self, t: S, q: &[S], v: &[S]) -> S;

@@ -41,7 +41,7 @@ pub(super) type Receivers<'a, 'f, S> =
 /// Projects the state at the end of a step of some length onto its manifold, and returns the distance in units of the tolerance.
 pub(super) type Project<'a, S, E> = dyn FnMut(S, &mut [S]) -> Result<S, E> + 'a;
 
-/// The methods offered here.
+/// The adaptive methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Adaptive {
     Dopri5,
@@ -179,7 +179,7 @@ struct Observer<'a, 'f, S, E> {
     calls: usize,
     /// Calls of a run before its first attempt, and the time of the last call.
     opening: usize,
-    asked: S,
+    last_call: S,
     statistics: StepCounts,
     /// Last accepted step.
     elapsed: S,
@@ -228,7 +228,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
             recent: vec![zero; ring * dim],
             calls: 0,
             opening: 0,
-            asked: zero,
+            last_call: zero,
             statistics: StepCounts { evaluations: 1, ..StepCounts::default() },
             elapsed: zero,
             state: task.start.to_vec(),
@@ -312,9 +312,9 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
 
     fn evaluate(&mut self, x: S, y: &[S], dy: &mut [S]) {
         let x = self.stage_time(x);
-        self.asked = x;
+        self.last_call = x;
         if self.failure.is_some() && y.iter().any(|x| !x.is_finite()) {
-            // A state that an earlier failure of this attempt has spoilt.
+            // An earlier failure of this attempt has made the state invalid.
             dy.fill(S::nan());
         } else if y == self.state.as_slice() && (!self.task.timed || x == self.elapsed) {
             dy.copy_from_slice(&self.slope);
@@ -331,10 +331,10 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
     }
 
     /// The time of a stage. Stage 12 of the method of order 8 is declared at the start of the step and is at its end;
-    /// stage 11, asked just before, is at 6/7 of it.
+    /// stage 11, evaluated just before, is at 6/7 of it.
     fn stage_time(&self, x: S) -> S {
         if self.task.method == Adaptive::Dop853 && self.calls >= self.opening && x == self.elapsed {
-            self.elapsed + (self.asked - self.elapsed) * S::ratio(7, 6)
+            self.elapsed + (self.last_call - self.elapsed) * S::ratio(7, 6)
         } else {
             x
         }
@@ -359,8 +359,8 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
             return true;
         }
         let rejected = self.failure.take();
-        let looked_at = self.nodes.is_some() || self.scan.is_some();
-        let inside = looked_at || self.task.samples.get(self.next).is_some_and(|t| t < x);
+        let is_dense = self.nodes.is_some() || self.scan.is_some();
+        let inside = is_dense || self.task.samples.get(self.next).is_some_and(|t| t < x);
         if inside && !self.interpolate(h, y) {
             self.retry = Some(h);
             return true;
@@ -401,12 +401,12 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         self.step = h;
         self.state.copy_from_slice(y);
         self.slope.copy_from_slice(slope);
-        self.stopped || projected.is_some_and(|(drift, moved)| self.leaves(x, h, drift, moved))
+        self.stopped || projected.is_some_and(|(drift, moved)| self.restarts(x, h, drift, moved))
     }
 
     /// Continues from the projection of a state that has drifted by more than the tolerance; `true` stops the solver, which does not know
     /// about it.
-    fn leaves(&mut self, x: S, h: S, drift: S, moved: Vec<S>) -> bool {
+    fn restarts(&mut self, x: S, h: S, drift: S, moved: Vec<S>) -> bool {
         if drift <= <S as Real>::one() || self.next >= self.task.samples.len() {
             return false;
         }

@@ -117,7 +117,7 @@ impl<S: Scalar> Domain<S> {
 /// | `dt` | given | distance of samples; its sign is ignored | finite, not 0, at most 10^8 samples |
 /// | `method` | `Dopri5` | integrator | |
 /// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0, not finer than the rounding of the state |
-/// | `step` | `dt` | longest step of the structure-preserving methods, cut to the distance of samples; `rtol` and `atol` mean nothing to them | finite, > 0 |
+/// | `step` | `dt` | longest step of the structure-preserving methods, at most the distance of samples; they ignore `rtol` and `atol` | finite, > 0 |
 /// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
 /// | `domain` | none | where the trajectory must stay | `2n` components |
 /// | `energy` | true | store `E` at every sample | |
@@ -243,13 +243,13 @@ impl<S: Scalar> RolloutOptions<S> {
         Self { events, ..self }
     }
 
-    /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
+    /// Finest relative tolerance that the scalar supports, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
     /// it steps shrink until they no longer advance the time, and never arrive.
     pub fn least_tolerance() -> S {
         S::of_f64(if S::epsilon().to_f64() > 1e-12 { LEAST_TOLERANCES.0 } else { LEAST_TOLERANCES.1 })
     }
 
-    /// Refuses options that make no sense for `n` coordinates.
+    /// Checks the options for `n` coordinates.
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] naming the option.
@@ -268,14 +268,14 @@ impl<S: Scalar> RolloutOptions<S> {
             return invalid(
                 "dt",
                 format!(
-                    "asks for {:.3e} samples, at most {MOST_SAMPLES:.0e} are allowed",
+                    "requires {:.3e} samples, at most {MOST_SAMPLES:.0e} are allowed",
                     samples.to_f64().min(f64::MAX)
                 ),
             );
         }
         if blur(self).to_f64() >= 0.5 {
             let (dt, t) = (self.dt, S::max(self.t0.abs(), self.t_end.abs()));
-            return invalid("dt", format!("{dt} is too short to tell times near {t} apart in {}", S::NAME));
+            return invalid("dt", format!("{dt} is too short to distinguish times near {t} in {}", S::NAME));
         }
         for (what, value) in [("rtol", self.rtol), ("atol", self.atol)] {
             if !(value.is_finite() && value >= <S as Real>::zero()) {
@@ -307,7 +307,7 @@ impl<S: Scalar> RolloutOptions<S> {
             if steps > self.max_steps as f64 {
                 let what = if self.step.is_some_and(|step| step < self.dt.abs()) { "step" } else { "dt" };
                 let problem =
-                    format!("asks for {steps:.3e} steps of {shortest}, at most {} are allowed", self.max_steps);
+                    format!("requires {steps:.3e} steps of {shortest}, at most {} are allowed", self.max_steps);
                 return invalid(what, problem);
             }
         }

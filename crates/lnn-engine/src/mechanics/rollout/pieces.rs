@@ -1,5 +1,5 @@
-//! Roll-outs of any length in little memory: samples are handed over in pieces, with the balance of
-//! the energy: where it went, and where it came from.
+//! Roll-outs of any length in little memory: samples are handed over in pieces, with the balance of the
+//! energy.
 
 use super::event::lost;
 use super::force::pieces;
@@ -144,7 +144,7 @@ pub struct EnergyBalance<S> {
 }
 
 impl<S: Scalar> EnergyBalance<S> {
-    /// Energy that came from nowhere, `change + dissipated + impacts - work`.
+    /// Change of the energy that friction, impacts and work do not explain, `change + dissipated + impacts - work`.
     pub fn defect(&self) -> S {
         self.change + self.dissipated + self.impacts - self.work
     }

@@ -12,7 +12,7 @@ use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 
-/// Knowledge about the rows so far.
+/// What is known about the rows up to the last step.
 pub(super) struct Regularity<'a, S> {
     manifold: &'a dyn Manifold<S>,
     /// 1, or -1 for a motion backwards in time.
@@ -39,7 +39,7 @@ struct Sparse<S> {
 }
 
 impl<'a, S: Scalar> Regularity<'a, S> {
-    /// From a start.
+    /// At the start of a motion.
     pub fn new(manifold: &'a dyn Manifold<S>, (q, v): (&[S], &[S]), backwards: bool) -> Self {
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
         let m = manifold.names().len();
@@ -134,7 +134,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         }
     }
 
-    /// The smallest singular value of the rows over their sizes, and the row that has most part in its direction.
+    /// The smallest singular value of the rows over their sizes, and the row with the largest component of its direction.
     fn least_direction(&mut self, q: &[S]) -> (S, usize) {
         self.manifold.rows(q, &self.v, &mut self.rows);
         let (n, m, zero) = (self.q.len(), self.sizes.len(), <S as Real>::zero());
@@ -149,10 +149,10 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         (Real::sqrt(S::max(squares.first().copied().unwrap_or(zero), zero)), most)
     }
 
-    /// Takes the state at the end of a step of length `h`.
+    /// Examines a step of length `h` by the state at its end.
     ///
     /// # Errors
-    /// [`StepFailure::Branch`] if the rows were not regular on the way.
+    /// [`StepFailure::Branch`] if the rows were not regular within the step.
     pub fn step(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
         let matrix = self.matrix_at(q);
         let starts = self.starts.clone();
@@ -180,7 +180,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
             (are_finite(&matrix) && !self.is_above(floor, q), self.largest)
         };
         if turned || is_low {
-            self.look_into(h, q, v)?;
+            self.search_step(h, q, v)?;
         }
         self.matrix = matrix;
         self.grow();
@@ -196,8 +196,8 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         (0..q.len()).map(at).collect()
     }
 
-    /// Looks for the least singular value within a step.
-    fn look_into(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
+    /// Searches a step for the smallest singular value.
+    fn search_step(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
         let signed = h * self.direction;
         let mut at = |x: f64| {
             let place = self.place(x, h, q, v);

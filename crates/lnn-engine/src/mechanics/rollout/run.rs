@@ -242,7 +242,7 @@ fn reachable<S: Scalar>(q: &[S], v: &[S], options: &RolloutOptions<S>) -> Result
     Err(RolloutError::Invalid { what: "atol", problem })
 }
 
-/// Why the derivative of a state, or a step, cannot be had.
+/// Why a derivative or a step could not be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum StepFailure {
     Domain {
@@ -305,7 +305,7 @@ pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f6
             RolloutError::DependentConstraint { t, state, constraint }
         }
         StepFailure::Branch { constraint, ahead } => RolloutError::SecondBranch { t, state, constraint, at: t + ahead },
-        StepFailure::OffConstraints => RolloutError::NotFinite { t, state, what: "way back to the constraints" },
+        StepFailure::OffConstraints => RolloutError::NotFinite { t, state, what: "projection onto the constraints" },
         StepFailure::Model(MechanicsError::Interrupted) => RolloutError::Stopped { t },
         StepFailure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
         StepFailure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },

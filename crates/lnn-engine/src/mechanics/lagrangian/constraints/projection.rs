@@ -1,4 +1,4 @@
-//! The way of a state to its constraints.
+//! Projection of states onto constraints.
 
 use super::rows::{dot, largest, length};
 use super::{Manifold, ManifoldRows};

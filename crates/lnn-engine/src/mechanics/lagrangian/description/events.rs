@@ -34,7 +34,7 @@ pub struct EventDescription {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize), serde(untagged))]
 pub enum Consequence {
-    /// Something that a word says.
+    /// A setting given by a word.
     Named(Word),
     /// An impact on the surface where the formula vanishes.
     Impact {

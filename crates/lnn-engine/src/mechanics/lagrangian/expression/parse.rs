@@ -37,14 +37,14 @@ struct Parser<'a> {
 type Outcome = Result<u32, ExpressionError>;
 
 impl<'a> Parser<'a> {
-    /// The token that comes next; the end comes again and again.
+    /// The next token; behind the last one, always the end.
     fn next(&self) -> Token<'a> {
         self.tokens[self.at.min(self.tokens.len() - 1)]
     }
     fn advance(&mut self) {
         self.at += 1;
     }
-    /// `true` if a sign comes next, which is taken then.
+    /// Consumes the next token if it is this sign; `true` if it was.
     fn takes(&mut self, sign: char) -> bool {
         let found = self.next().kind == Lexeme::Sign(sign);
         self.at += usize::from(found);

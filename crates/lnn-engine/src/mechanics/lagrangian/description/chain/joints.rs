@@ -66,7 +66,7 @@ fn parts(turn: &Matrix<f64>) -> ([f64; 2], [f64; 2], f64) {
 }
 
 impl Description {
-    /// The joints of its links, which are found well described on the way.
+    /// The joints of its links; checks their descriptions.
     pub(super) fn joints(&self) -> Outcome<Vec<Joint>> {
         let mut own: Vec<Option<usize>> = Vec::with_capacity(self.links.len());
         for link in &self.links {
