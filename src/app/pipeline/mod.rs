@@ -98,7 +98,7 @@ pub use fit_config::{FitColumns, FitConfig, FitConstraints, FitOptions};
 pub use force_errors::ForceError;
 pub use hold_out::{CoordinatePredictions, HoldOut, UsefulTime};
 pub use judging::Unjudged;
-pub use model::{model_file, trained_on};
+pub use model::model_file;
 pub use output::{Directory, InMemory, Output};
 pub use robot::{parse_robot, rewrite_robot};
 pub use sweep::{Sweep, Swept, sweep};
@@ -117,7 +117,7 @@ pub use {
     fit::{fit, usual_force},
     fit_config::unit,
     memory::require as require_memory,
-    model::{CONSTRAINTS_UNSUPPORTED, all_parameters},
+    model::{CONSTRAINTS_UNSUPPORTED, all_parameters, trained_on},
     prepared_fit::{PreparedFit, shorten},
     robot::is_robot,
     run_file::Command,

@@ -13,8 +13,9 @@ mod measured;
 mod preset;
 mod trainer;
 
-#[doc(hidden)]
-pub use measured::restructure;
-pub use measured::suggested;
 pub use preset::Preset;
 pub use trainer::{Learned, Trainer, TrainerError};
+
+// For the packages of this repository.
+#[doc(hidden)]
+pub use measured::{restructure, suggested};

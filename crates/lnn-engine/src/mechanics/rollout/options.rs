@@ -133,6 +133,7 @@ impl<S: Scalar> Domain<S> {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
+#[must_use]
 pub struct RolloutOptions<S> {
     /// Time of the start.
     pub t0: S,
@@ -184,61 +185,51 @@ impl<S: Scalar> RolloutOptions<S> {
     }
 
     /// Sets the time of the start.
-    #[must_use]
     pub fn t0(self, t0: S) -> Self {
         Self { t0, ..self }
     }
 
     /// Sets the time of the last sample.
-    #[must_use]
     pub fn t_end(self, t_end: S) -> Self {
         Self { t_end, ..self }
     }
 
     /// Sets the distance of samples.
-    #[must_use]
     pub fn dt(self, dt: S) -> Self {
         Self { dt, ..self }
     }
 
     /// Sets the integrator.
-    #[must_use]
     pub fn method(self, method: Integrator) -> Self {
         Self { method, ..self }
     }
 
     /// Sets the relative and the absolute tolerance of the adaptive methods.
-    #[must_use]
     pub fn tolerances(self, rtol: S, atol: S) -> Self {
         Self { rtol, atol, ..self }
     }
 
     /// Sets the longest step of the structure-preserving methods; `None` is one step per sample.
-    #[must_use]
     pub fn step(self, step: impl Into<Option<S>>) -> Self {
         Self { step: step.into(), ..self }
     }
 
     /// Sets how many steps may be attempted.
-    #[must_use]
     pub fn max_steps(self, max_steps: usize) -> Self {
         Self { max_steps, ..self }
     }
 
     /// Sets where the trajectory must stay.
-    #[must_use]
     pub fn domain(self, domain: impl Into<Option<Domain<S>>>) -> Self {
         Self { domain: domain.into(), ..self }
     }
 
     /// Sets whether the energy of every sample is stored.
-    #[must_use]
     pub fn energy(self, energy: bool) -> Self {
         Self { energy, ..self }
     }
 
     /// Sets the zeros along the motion that are recorded, end it, or are impacts.
-    #[must_use]
     pub fn events(self, events: Vec<Event<S>>) -> Self {
         Self { events, ..self }
     }
