@@ -197,6 +197,25 @@ fn a_lagrangian_in_time_is_rolled_out_and_identified() {
     let still = lnn(&["identify", &data, "--system", &system, "--json", "--constants", "a,om"]);
     let found: serde_json::Value = serde_json::from_str(&still.stdout).unwrap();
     assert_eq!(found["explained"], false, "{}", still.stdout);
+    // The forces that make the accelerations of the equation written by hand are none, at every time; other accelerations need `rod^2` of them.
+    let mut states = String::from("theta,theta_dot,theta_ddot,t\n");
+    for (t, more) in [(0.0, 0.0), (1.3, 0.0), (2.7, 0.5)] {
+        let (theta, v, rod): (f64, f64, f64) = (0.4, 1.5, 1.0 + 0.03 * t);
+        let a = -((9.81 - 0.06 * 6.6 * 6.6 * f64::cos(6.6 * t)) * theta.sin() + 2.0 * 0.03 * v) / rod;
+        writeln!(states, "{theta},{v},{},{t}", a + more).unwrap();
+    }
+    let file = folder.file("states.csv", states);
+    let mut inverse = vec!["inspect", "--system", &system, "--states", &file, "--inverse", "--format", "csv"];
+    inverse.extend(values.split(' '));
+    let run = lnn(&inverse);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let forces = run.stdout.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse::<f64>().unwrap());
+    for (force, wanted) in forces.zip([0.0, 0.0, 0.5 * 1.081_f64.powi(2)]) {
+        assert!((force - wanted).abs() < 1e-12, "{}", run.stdout);
+    }
+    assert!(run.stdout.starts_with("t,") && run.stdout.lines().count() == 4, "{}", run.stdout);
+    let missing = folder.file("missing.csv", "theta,theta_dot,theta_ddot\n0.4,1.5,0\n");
+    lnn(&["inspect", "--system", &system, "--states", &missing, "--inverse"]).refused(1, &["missing column t"]);
     // Where no time is known it is refused, and nothing panics.
     for command in ["symmetries", "certify"] {
         lnn(&[command, "--system", &system]).refused(2, &["time t"]);
