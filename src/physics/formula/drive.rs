@@ -353,11 +353,11 @@ mod tests {
 
     #[test]
     fn a_line_that_another_term_hides_is_found() {
-        // A term holds the drive and an oscillation; without it an equal part of each is left.
+        // A term contains the drive and two oscillations; without it, the residuals contain a part of each.
         let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
         let wave = |om: f64, size: f64| times.iter().map(|t| size * (om * t).cos()).collect::<Vec<f64>>();
-        let (drive, other) = (wave(1.3, 1.0), wave(1.9, 1.2));
-        let term: Vec<f64> = drive.iter().zip(&other).map(|(a, b)| a + b).collect();
+        let (drive, others) = (wave(1.3, 1.0), [wave(1.9, 1.2), wave(2.7, 0.8)]);
+        let term: Vec<f64> = (0..times.len()).map(|k| drive[k] + others[0][k] + others[1][k]).collect();
         let mut errors = drive.clone();
         let others = remove(&mut errors, [term].into_iter());
         let driven = vec![Driven::new(&vec![1.0; times.len()], &errors, &others, 1)];

@@ -122,7 +122,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
     refused(
         &folder.resume("stopped", &["--epochs", "7"]),
         2,
-        &["phase[0].epochs", &format!("{EPOCHS} in the checkpoint, 7 asked")],
+        &["phase[0].epochs", &format!("{EPOCHS} in the checkpoint, 7 requested")],
     );
     refused(&folder.resume("stopped", &["--param", "m1=2"]), 2, &["parameters.m1"]);
     refused(&lnn(&["train", "spring-pendulum", "--resume", &out]), 2, &["system"]);
