@@ -28,47 +28,47 @@ pub struct Dataset<S> {
     force_scale: Vec<S>,
 }
 
-/// Why numbers do not form a dataset.
+/// Why numbers do not form a valid dataset.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DatasetError {
     /// Lengths disagree.
     #[error("{what}: expected {expected} numbers, found {found}")]
     Shape {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Numbers expected.
+        /// Expected number of values.
         expected: usize,
-        /// Numbers found.
+        /// Actual number of values.
         found: usize,
     },
     /// A number is infinite or `NaN`.
     #[error("{what} {column} of state {row} is not finite")]
     NotFinite {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// State, from 0.
+        /// Index of the state, from 0.
         row: usize,
-        /// Coordinate, from 0.
+        /// Index of the coordinate, from 0.
         column: usize,
     },
-    /// A scale that is not above 0.
+    /// A scale is not positive.
     #[error("{what} {column} is not above 0")]
     NotPositive {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Coordinate, from 0.
+        /// Index of the coordinate, from 0.
         column: usize,
     },
-    /// No states.
+    /// The dataset has no states.
     #[error("a dataset needs at least one state")]
     Empty,
-    /// A state from which a constraint cannot be reached.
+    /// A state could not be projected onto a constraint.
     #[error("state {row} cannot be projected onto the constraint `{constraint}`")]
     Unreachable {
         /// State, from 0.
         row: usize,
-        /// Name of the constraint that is missed most.
+        /// Name of the constraint with the largest violation.
         constraint: String,
     },
 }
@@ -102,8 +102,8 @@ impl<S: Scalar> Dataset<S> {
         Ok(Self { coordinates, q, v, a, force, weight, rows, drift, force_scale })
     }
 
-    /// These states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to the coordinates:
-    /// `Q.dq` is work in J.
+    /// Adds known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to the coordinates: `Q.dq` is work
+    /// in J.
     ///
     /// Accelerations alone leave the unit of `L` free. Forces fix it: with `M_ij` in scaled coordinates `s_i s_j` times
     /// that in physical ones, `M a = g - c - dD/dv + Q` takes the force `s_i Q_i` in J, so that `L` comes out in J and the
@@ -116,8 +116,8 @@ impl<S: Scalar> Dataset<S> {
         Ok(Self { force, ..self })
     }
 
-    /// These states with residuals of force `M a + c - g + dD/dv - Q`, each over its `scale`, `(n)` in physical units, instead of residuals
-    /// of the accelerations: nothing is solved for, and the mass matrix may be singular.
+    /// Replaces the residuals of the accelerations by residuals of the force, `M a + c - g + dD/dv - Q`, each divided by its `scale`, `(n)`
+    /// in physical units. The loss then solves no linear system, so the mass matrix may be singular.
     ///
     /// # Errors
     /// [`DatasetError`] for a scale that is not a positive number, and for states without forces or under constraints, whose forces are
@@ -132,8 +132,8 @@ impl<S: Scalar> Dataset<S> {
         }
     }
 
-    /// These states under constraints `A a = -gamma`, rows `A` `(states, m, n)` and `gamma` `(states, m)` in physical units: a network
-    /// learns the motion `M a = g - c + Q + A^T lambda`.
+    /// Adds constraints `A a = -gamma`, with rows `A` `(states, m, n)` and `gamma` `(states, m)` in physical units: a network then learns
+    /// the motion `M a = g - c + Q + A^T lambda`.
     ///
     /// # Errors
     /// [`DatasetError`] naming the first offending row.
@@ -144,7 +144,7 @@ impl<S: Scalar> Dataset<S> {
         Ok(Self { rows, drift, ..self })
     }
 
-    /// These states under the constraints of a manifold.
+    /// Adds the constraints of a manifold.
     ///
     /// # Errors
     /// As [`Dataset::with_constraints`], where a constraint is not finite.
@@ -158,8 +158,8 @@ impl<S: Scalar> Dataset<S> {
         self.with_constraints(matrix, drift)
     }
 
-    /// These states projected onto a manifold, first positions, then velocities and accelerations, and put under its constraints; also the
-    /// root mean square distance of the positions.
+    /// Projects positions, then velocities and accelerations, onto a manifold and adds its constraints; also returns the root mean square
+    /// distance by which the positions moved.
     ///
     /// # Errors
     /// [`DatasetError::Unreachable`] where the projection fails; those of [`Dataset::on`].
@@ -179,7 +179,7 @@ impl<S: Scalar> Dataset<S> {
         Ok((self.on(manifold)?, (square / states).sqrt()))
     }
 
-    /// These states with weights, `(states)`, that multiply their residuals in the loss.
+    /// Sets the weights, `(states)`, by which the residuals of the states are multiplied in the loss.
     ///
     /// # Errors
     /// [`DatasetError`] for a wrong number of weights or one that is not finite.
@@ -196,7 +196,7 @@ impl<S: Scalar> Dataset<S> {
     pub fn len(&self) -> usize {
         self.q.len() / self.coordinates
     }
-    /// `true` if there is no state; never, once built.
+    /// Always `false`, because a dataset has at least one state.
     pub fn is_empty(&self) -> bool {
         self.q.is_empty()
     }
@@ -240,7 +240,7 @@ impl<S: Scalar> Dataset<S> {
         self.weight.get(state).copied().unwrap_or(<S as Real>::one())
     }
 
-    /// The states of these rows, in this order.
+    /// Selects states by index, in this order.
     pub(crate) fn rows(&self, rows: &[usize]) -> Self {
         let pick = |values: &[S], width: usize| {
             let row = |&row: &usize| values.get(row * width..(row + 1) * width).unwrap_or_default();
@@ -260,7 +260,7 @@ impl<S: Scalar> Dataset<S> {
         }
     }
 
-    /// Lets a state pass `u` times as fast, backwards if `u` is negative: `v -> u v`, `a -> u^2 a`.
+    /// Replays a state `u` times as fast, backwards if `u` is negative: `v -> u v`, `a -> u^2 a`.
     pub(crate) fn rescale_time(&mut self, state: usize, u: S) {
         let range = state * self.coordinates..(state + 1) * self.coordinates;
         self.v[range.clone()].iter_mut().for_each(|v| *v = u * *v);
@@ -281,8 +281,8 @@ impl<S: Scalar> Dataset<S> {
             .collect()
     }
 
-    /// Smallest and largest value of every coordinate, and of every velocity; a little more under constraints, which leave some of them
-    /// no width but rounding.
+    /// Smallest and largest value of every coordinate and of every velocity, slightly widened under constraints, where a range may be as
+    /// narrow as rounding.
     pub(crate) fn ranges(&self) -> [Vec<[f64; 2]>; 2] {
         let (n, more) = (self.coordinates, if self.constraints() > 0 { WIDENED_RANGE } else { 0.0 });
         [&self.q, &self.v].map(|values| {
@@ -303,7 +303,7 @@ impl<S: Scalar> Dataset<S> {
         checksum(all.chain(&self.rows).chain(&self.drift).chain(&self.force_scale), StoredPrecision::F64)
     }
 
-    /// These states in another precision.
+    /// Converts the states to another precision.
     pub fn cast<T: Scalar>(&self) -> Dataset<T> {
         let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
         Dataset {
@@ -343,7 +343,7 @@ impl StateEstimate<'_> {
 /// Standard deviations of the measurement noise, in physical units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    /// Noise of each position, `(n)`, positive.
+    /// Noise of each position, `(n)`; positive.
     pub q: Vec<f64>,
     /// Noise of each velocity, `(n)`, positive; empty if velocities were not measured or are not used.
     pub v: Vec<f64>,
@@ -370,10 +370,10 @@ impl<S: Scalar> Datasets<S> {
     }
 }
 
-/// Sizes with which accelerations are compared.
+/// Parameters that weight states by the size of their accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Weighting<'a> {
-    /// Part of the typical size below which accelerations count equally,
+    /// Fraction of the typical size below which accelerations count equally,
     /// [`Data::acceleration_weighting`](crate::configuration::Data::acceleration_weighting).
     pub floor: f64,
     /// Scales of the coordinates.
@@ -383,13 +383,13 @@ pub(crate) struct Weighting<'a> {
 }
 
 impl Weighting<'_> {
-    /// Mean size of every state's numbers, scaled.
+    /// Mean magnitude of the scaled components for every state.
     fn sizes<'a, S: Scalar>(&'a self, values: &'a [S]) -> impl Iterator<Item = f64> + 'a {
         let size = |a: &[S]| a.iter().zip(self.scale).map(|(a, s)| (a.to_f64() / s).abs()).sum::<f64>();
         values.chunks_exact(self.scale.len()).map(move |a| size(a) / self.scale.len() as f64)
     }
 
-    /// Mean size of every state's acceleration, without and with its error.
+    /// Mean magnitude of the acceleration for every state, without and with its standard error.
     fn of<S: Scalar>(&self, set: &Dataset<S>) -> (Vec<f64>, Vec<f64>) {
         let sizes: Vec<f64> = self.sizes(set.a()).collect();
         let mut uncertain = sizes.clone();
@@ -397,20 +397,20 @@ impl Weighting<'_> {
         (sizes, uncertain)
     }
 
-    /// The states with the weights `f m/(f m + |a| + e)`, `m` the mean of `|a|` and `e` the error; unchanged for `f = 0`.
+    /// Weights the states by `f m/(f m + |a| + e)`, where `m` is the mean of `|a|` and `e` the standard error; no change for `f = 0`.
     pub fn relative<S: Scalar>(&self, set: Dataset<S>) -> Result<Dataset<S>, DatasetError> {
         if self.floor == 0.0 {
             return Ok(set);
         }
         let (sizes, uncertain) = self.of(&set);
         let floor = self.floor * sizes.iter().sum::<f64>() / sizes.len() as f64;
-        // Without any acceleration every state counts the same.
+        // If all accelerations vanish, every state has the same weight.
         let weight = |size: f64| S::of_f64(if floor > 0.0 { floor / (floor + size) } else { 1.0 });
         set.with_weights(uncertain.into_iter().map(weight).collect())
     }
 
-    /// The states with the weights `1/(|a| + f m + e)`, `m` the median of `|a|` among [`STATES_PER_DISTANCE`] states at about the same distance from the
-    /// centre of these coordinates; unchanged for `f = 0`.
+    /// Weights the states by `1/(|a| + f m + e)`, where `m` is the median of `|a|` among [`STATES_PER_DISTANCE`] states at a similar
+    /// distance from the centre of the coordinates `around`; no change for `f = 0`.
     pub fn by_distance<S: Scalar>(&self, set: Dataset<S>, around: &[usize]) -> Result<Dataset<S>, DatasetError> {
         if self.floor == 0.0 {
             return Ok(set);
@@ -425,7 +425,7 @@ impl Weighting<'_> {
             let mut alike: Vec<f64> = group.iter().map(|&k| sizes[k]).collect();
             alike.sort_by(f64::total_cmp);
             let floor = self.floor * alike[alike.len() / 2];
-            // Without any acceleration every state counts the same.
+            // If all accelerations vanish, every state has the same weight.
             let weight = |size: f64| S::of_f64(if floor > 0.0 { (size + floor).recip() } else { 1.0 });
             group.iter().for_each(|&k| weights[k] = weight(uncertain[k]));
         }
@@ -472,7 +472,7 @@ mod tests {
         let size = |k: usize| 0.5 * set.a()[2 * k];
         let plain = Weighting { floor: 1.0, scale: &[1.0; 2], errors: &[] };
         let even = plain.by_distance(set.clone(), &[0]).unwrap();
-        // Beside the median of each half, by distance.
+        // Close to the median of each half, by distance.
         let usual = |k: usize| size(if k < 200 { 99 } else { 299 });
         assert!((0..400).all(|k| (even.weight(k) * (size(k) + usual(k)) - 1.0).abs() < 1e-14));
         for half in [0..200, 200..400] {
@@ -482,7 +482,7 @@ mod tests {
         let relative = plain.relative(set.clone()).unwrap();
         let mean = (0..400).map(size).sum::<f64>() / 400.0;
         assert!((relative.weight(7) - mean / (mean + size(7))).abs() < 1e-15);
-        // An error as large as acceleration and floor together halves the weight.
+        // A standard error equal to acceleration plus floor halves the weight.
         let mut errors = vec![0.0; 800];
         errors[2 * 7 + 1] = 2.0 / even.weight(7);
         let uncertain = Weighting { errors: &errors, ..plain }.by_distance(set.clone(), &[0]).unwrap();

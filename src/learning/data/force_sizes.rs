@@ -21,7 +21,7 @@ pub(crate) fn force_spreads<S: Scalar>(data: &Dataset<S>) -> Vec<f64> {
     (0..n).map(|i| moments(data.force(), n, i)[1]).collect()
 }
 
-/// Sizes of the inertia along every coordinate, `(n)` in physical units: that at which a part of the force makes the acceleration.
+/// Inertia along every coordinate, `(n)` in physical units, estimated by assuming that a fixed share of the force causes the acceleration.
 fn inertias<S: Scalar>(data: &Dataset<S>) -> Vec<f64> {
     let n = data.coordinates();
     let one = |(i, spread): (usize, f64)| {
@@ -31,7 +31,7 @@ fn inertias<S: Scalar>(data: &Dataset<S>) -> Vec<f64> {
     force_spreads(data).into_iter().enumerate().map(one).collect()
 }
 
-/// Sizes of the parts of a model of states with known forces, for coordinates of these scales.
+/// Expected sizes of the terms of a model, from states with known forces and the scales of the coordinates.
 pub(crate) fn sizes<S: Scalar>(data: &Dataset<S>, scale: &[f64]) -> Sizes {
     let n = data.coordinates();
     let positive = |size: f64| if size.is_finite() && size > 0.0 { size } else { 1.0 };
@@ -41,8 +41,8 @@ pub(crate) fn sizes<S: Scalar>(data: &Dataset<S>, scale: &[f64]) -> Sizes {
     Sizes { velocity, potential: positive(potential), friction }
 }
 
-/// The states with residuals of force over the expected errors: the noise of the forces, the noise of the accelerations times the inertia,
-/// both `(n)` in physical units, and a part of the spread of the force.
+/// Sets residuals of force, scaled by the expected errors: the noise of the forces, the noise of the accelerations times the inertia, both
+/// `(n)` in physical units, and a share of the spread of the force.
 ///
 /// # Errors
 /// As [`Dataset::with_force_residuals`].
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_forces_and_of_what_they_move() {
         let found = sizes(&driven(), &[1.0, 2.0]);
-        // Squares of the factors are inertias in scaled coordinates, half of those that would need all of the force.
+        // The squared factors are inertias in scaled coordinates: half of what they would be if the whole force caused acceleration.
         let inertia: Vec<f64> = found.velocity.iter().map(|v| v * v).collect();
         assert!((inertia[0] - 2.0).abs() < 1e-9 && (inertia[1] - 2.0).abs() < 1e-9, "{inertia:?}");
         assert!((found.potential / 60.0 - 1.0).abs() < 1e-3, "{}", found.potential);

@@ -15,7 +15,7 @@ pub use recording_split::RecordingSplitError;
 pub use sampling::{SamplingError, sample, sample_all};
 pub(crate) use sampling::{boxes, sample_all_until};
 
-// For the packages of this repository.
+// Used by the other packages of this repository.
 #[doc(hidden)]
 pub use {
     dataset::{Noise, StateEstimate},

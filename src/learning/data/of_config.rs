@@ -18,7 +18,7 @@ impl Config {
         Ok(configure_values(self.system_entry()?, &self.parameters)?)
     }
 
-    /// The system: the catalogue entry, or the system of its description.
+    /// The system: the catalogue entry, or the one that the configuration describes.
     ///
     /// # Errors
     /// Unknown system, or a description that is wrong or of another name.
@@ -58,8 +58,8 @@ impl Config {
         self.architecture_with(names, coordinates.iter().map(|c| c.periodic).collect(), scale)
     }
 
-    /// Shape of the network for coordinates by these names that are angles or not, with physical scales `scale` (used if the
-    /// configuration scales), both of length `n`.
+    /// Shape of the network for coordinates with these names. `periodic` marks angles; `scale` are the physical scales, used if the
+    /// configuration scales. Both have length `n`.
     ///
     /// # Errors
     /// A name in the configuration that is not one of them.

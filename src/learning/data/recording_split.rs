@@ -1,8 +1,8 @@
 //! Learning from recorded motion: the training, validation and test parts.
 //!
-//! Whole trajectories are held out, never rows: neighbouring samples are nearly the same state. Derivatives come from
-//! local polynomials ([`Smoothing`]) unless they were measured; accelerations so obtained start a network that may then
-//! be fitted through its motion ([`shooting`](crate::shooting)).
+//! Whole trajectories are held out, never rows: neighbouring samples are nearly the same state. Derivatives come from local polynomials
+//! ([`Smoothing`]) unless they were measured; a network trained on such accelerations may then be fitted through its motion
+//! ([`shooting`](crate::shooting)).
 
 use super::thresholds::LEAST_NOISE;
 use crate::data::dataset::{Dataset, DatasetError, Datasets, Noise, StateEstimate, Weighting};
@@ -17,14 +17,14 @@ use thiserror::Error;
 /// Preparation of recorded motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrepareOptions {
-    /// Local polynomials.
+    /// Settings of the local polynomials.
     pub smoothing: SmoothOptions,
-    /// Share of the samples held out to judge; half as much of the rest chooses the best epoch. With 0 all samples are used for training
-    /// and to choose the best epoch, and none for judging.
+    /// Share of the samples in the test set; half as much of the rest becomes the validation set. With 0, all samples are used for training
+    /// and for choosing the best epoch, and there is no test set.
     pub held_out: f64,
-    /// Most states of a supervised training; of more, evenly spaced ones are taken.
+    /// Largest number of states for supervised training; longer recordings are thinned evenly.
     pub most_states: usize,
-    /// Seed of the choice of trajectories.
+    /// Seed for choosing the trajectories.
     pub seed: u64,
     /// Known forces between the samples.
     pub between: Between,
@@ -42,17 +42,17 @@ impl Default for PrepareOptions {
     }
 }
 
-/// Why nothing can be learned from recorded motion.
+/// Why a network cannot learn from the recorded motion.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingSplitError {
-    /// Too little data to hold anything out.
+    /// There is too little data to hold anything out.
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),
-    /// Derivatives cannot be estimated.
+    /// The derivatives cannot be estimated.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
-    /// A coordinate that does not move, or that follows from others.
+    /// A coordinate does not move or is a function of others.
     #[error("{coordinate} {how}; leave it out of the coordinates, or record motion in which it moves independently")]
     Motionless {
         /// Its name.
@@ -60,10 +60,10 @@ pub enum RecordingSplitError {
         /// The reason.
         how: Stillness,
     },
-    /// Numbers that do not form a dataset.
+    /// The samples do not form a valid dataset.
     #[error("{which}: {source}")]
     Dataset {
-        /// Training, validation or test.
+        /// The set: training, validation or test.
         which: &'static str,
         /// The problem.
         source: DatasetError,
@@ -103,7 +103,7 @@ impl Split {
         pairs.map(|(track, states)| StateEstimate { track, q: &states.q, v: &states.v, between }).collect()
     }
 
-    /// Training samples: those away from the ends of trajectories, or all of them if nothing had to be derived; at most about
+    /// Training samples: those away from the ends of trajectories, or all of them if no derivative had to be estimated; at most about
     /// `most`. Each has `true` if its acceleration was measured.
     fn rows(&self, targets: Targets, most: usize) -> impl Iterator<Item = Row<'_>> {
         let stride = self.recording.samples().div_ceil(most.max(1)).max(1);
@@ -116,7 +116,7 @@ impl Split {
         })
     }
 
-    /// Numbers of samples that are not used for learning: at the ends of trajectories and near gaps, without full windows.
+    /// Number of samples excluded from learning because their windows are incomplete: at the ends of trajectories, and near gaps.
     pub(crate) fn left_out(&self, targets: Targets) -> [usize; 2] {
         let derived = self.recording.tracks.iter().zip(&self.states).filter(|(track, _)| !is_complete(track, targets));
         derived.fold([0; 2], |[ends, gaps], (track, states)| {
@@ -124,7 +124,7 @@ impl Split {
         })
     }
 
-    /// Errors to expect of the accelerations of [`dataset`](Self::dataset), `(states, n)`; 0 of measured ones.
+    /// Expected errors of the accelerations of [`dataset`](Self::dataset), `(states, n)`; 0 for measured ones.
     fn errors(&self, targets: Targets, most: usize) -> Vec<f64> {
         let n = self.recording.n();
         let mut errors = Vec::new();
@@ -156,12 +156,12 @@ impl Split {
     }
 }
 
-/// `true` if nothing has to be derived: positions and velocities as measured belong to accelerations as measured.
+/// `true` if no derivative has to be estimated, because velocities and accelerations were measured.
 fn is_complete(track: &RecordedTrajectory, targets: Targets) -> bool {
     targets.takes_measured() && !track.a.is_empty() && !track.v.is_empty()
 }
 
-/// Recorded motion, ready for training.
+/// Recorded motion, split for training, validation and test.
 #[derive(Clone, Debug)]
 pub struct RecordingSplit {
     /// Noise and windows.
@@ -174,13 +174,13 @@ pub struct RecordingSplit {
     pub test: Split,
     /// Which part of the recording is the test part.
     pub(crate) held_out: HeldOut,
-    /// Most states of a supervised training.
+    /// Largest number of states for supervised training.
     most_states: usize,
 }
 
 impl RecordingSplit {
-    /// Chooses windows, takes derivatives and divides the trajectories. If no part is left for validation, the test part also chooses the
-    /// best epoch.
+    /// Chooses windows, estimates derivatives and splits the trajectories. Without a validation set, the test set also chooses the best
+    /// epoch.
     ///
     /// # Errors
     /// [`RecordingSplitError`].
@@ -222,13 +222,13 @@ impl RecordingSplit {
         Ok(Self { training, validation, test, held_out, most_states: *most_states, smoothing })
     }
 
-    /// The quantity that suits the data.
+    /// Chooses the quantity that a network should learn from, based on the quality of the data.
     pub(crate) fn advice(&self) -> Targets {
         Targets::advised(&self.training.recording, &self.smoothing)
     }
 
-    /// States and accelerations for a supervised training, validation and test; where nothing is held out, the test is the
-    /// validation.
+    /// Returns states and accelerations for supervised training, validation and test; if nothing is held out, the validation set also
+    /// serves as the test set.
     ///
     /// # Errors
     /// [`RecordingSplitError::Dataset`], if no sample has a full window around it for instance.
@@ -246,7 +246,7 @@ impl RecordingSplit {
         if targets == Targets::Forces { self.by_forces(all) } else { Ok(all) }
     }
 
-    /// The datasets with residuals of force.
+    /// Converts the datasets to residuals of force.
     fn by_forces<S: Scalar>(&self, data: Datasets<S>) -> Result<Datasets<S>, RecordingSplitError> {
         let (recording, like) = (&self.training.recording, data.training[0].clone());
         let n = recording.n();
@@ -264,8 +264,8 @@ impl RecordingSplit {
         Ok(Datasets { training, validation: of("validation states", validation)?, test: of("test states", test)? })
     }
 
-    /// The accelerations of the training states, smoothed by polynomials two degrees higher: less bias, more noise. `None` if the windows
-    /// are too short for them.
+    /// Estimates the accelerations of the training states with polynomials two degrees higher, which have less bias and more noise. `None`
+    /// if the windows are too short for them.
     pub(crate) fn finer_accelerations(&self) -> Option<Vec<f64>> {
         let mut finer = self.smoothing.clone();
         finer.degree += 2;
@@ -276,8 +276,8 @@ impl RecordingSplit {
         Some(part.dataset::<f64>(Targets::Smoothed, self.most_states).ok()?.a().to_vec())
     }
 
-    /// The datasets with weights of the training and validation states: `1/(|a| + f m + e)`, `e` the error to expect of an acceleration,
-    /// `f` above 0; `m` is the mean of `|a|`, or with coordinates `around` a centre the median about as far from it.
+    /// Weights the training and validation states by `1/(|a| + f m + e)`, where `e` is the expected error of the acceleration and `f` is
+    /// positive; `m` is the mean of `|a|` or, if the coordinates `around` define a centre, the median at a similar distance from it.
     ///
     /// # Errors
     /// As [`datasets`](Self::datasets).
@@ -300,7 +300,7 @@ impl RecordingSplit {
         Ok(Datasets { training, validation, test })
     }
 
-    /// Standard deviations of the noise; where data have none, a millionth of their spread.
+    /// Standard deviations of the noise; for noise-free data, a millionth of their spread.
     pub fn noise(&self) -> Noise {
         let n = self.training.recording.n();
         let spread = |values: fn(&Smoothed) -> &Vec<f64>, i: usize| {

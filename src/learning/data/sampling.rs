@@ -1,4 +1,4 @@
-//! Training data of hand-written systems: uniform states, or states along exact motions, with exact accelerations.
+//! Samples training data of analytical systems: uniform states, or states along exact motions, with exact accelerations.
 
 use super::thresholds::{SLOWEST, STATES_PER_MOTION};
 use crate::configuration::{Config, ConfigError};
@@ -60,8 +60,8 @@ fn fill(
     drawn.finish()
 }
 
-/// Slows a `fraction` of geodesic states down and reverses half of them: `v -> u v`, `a -> u^2 a`, `|u|` between
-/// [`SLOWEST`] and 1, uniform in its logarithm.
+/// Slows down a `fraction` of geodesic states and reverses half of those: `v -> u v`, `a -> u^2 a`, `|u|` between [`SLOWEST`] and 1,
+/// uniform in its logarithm.
 ///
 /// Their residuals have the weight `1 / u^2`, so that an error of the connection counts the same at every speed.
 fn rescale_geodesics(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
@@ -90,7 +90,7 @@ pub fn sample_all<S: Scalar>(
     sample_all_until(config, system, &AtomicBool::new(false))
 }
 
-/// As [`sample_all`], unless a flag ends it.
+/// Like [`sample_all`], but stops when the interrupt flag is raised.
 ///
 /// # Errors
 /// [`SamplingError`].
@@ -147,7 +147,7 @@ pub enum SamplingError {
     /// The system does not exist or has no such parameter.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// A wrong description of a system.
+    /// The description of a system is invalid.
     #[error("description.{0}")]
     Description(#[from] DescriptionError),
     /// The configuration is out of range.
@@ -156,28 +156,28 @@ pub enum SamplingError {
     /// Most of the box lies outside the domain of the system.
     #[error("{field}: most of these bounds lie where {demand} is violated or accelerations are not finite")]
     Domain {
-        /// Which bounds.
+        /// The setting that contains the bounds.
         field: String,
-        /// Demand of the system.
+        /// The condition that the system requires.
         demand: &'static str,
     },
-    /// Motions of the trajectory test hardly pass through the box.
+    /// The motions of the trajectory test hardly pass through the box.
     #[error(
         "{field}: hardly any motion of the trajectory test stays within these bounds, which data.trajectory_fraction needs"
     )]
     Motions {
-        /// Which bounds.
+        /// The setting that contains the bounds.
         field: String,
     },
-    /// A flag was raised.
+    /// The interrupt flag was raised.
     #[error("interrupted while states were drawn")]
     Interrupted,
-    /// The accelerations do not fit the precision.
+    /// An acceleration is not finite in the precision of training.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
 }
 
-/// States of a system with their exact accelerations, as they are drawn.
+/// Collects states of a system with their exact accelerations.
 pub(crate) struct Drawn<'a> {
     system: &'a SystemInstance<f64>,
     /// The model of a system under constraints or forces.
@@ -187,12 +187,12 @@ pub(crate) struct Drawn<'a> {
     a: Vec<f64>,
 }
 
-/// Condition that fails where a state is not finite or cannot be projected.
+/// Name of the condition that a state violates if it is not finite or cannot be projected.
 const FINITE: &str = "a finite acceleration";
 const CONSTRAINTS: &str = "some constraint";
 
 impl<'a> Drawn<'a> {
-    /// Starts without states.
+    /// Creates an empty collection.
     ///
     /// # Errors
     /// [`SamplingError::System`] for constraints that contradict each other or leave no motion, and for forces that depend on the time.
@@ -275,7 +275,7 @@ pub(crate) fn draw(
     (q, v)
 }
 
-/// Bounds in the form of a configuration.
+/// Converts bounds to the form that a configuration uses.
 pub(crate) fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
     bounds.iter().map(|&(low, high)| [low, high]).collect()
 }
@@ -328,7 +328,7 @@ fn along_motions<'a>(
             }
             let (mut q, mut v) = (q.to_vec(), v.to_vec());
             if turn_back(&mut q, &coordinates, position, rng) {
-                // Integration left the mass shell by up to its tolerance.
+                // The integrator may leave the mass shell by as much as its tolerance.
                 if drawn.impose(&mut q, &mut v)?.is_none() {
                     drawn.take(&q, &v)?;
                 }
@@ -338,7 +338,7 @@ fn along_motions<'a>(
     Ok(drawn)
 }
 
-/// Turns angles to any turn within their bounds; `false` if there is none.
+/// Shifts angles by full turns so that they lie within their bounds; `false` if that is impossible.
 fn turn_back(q: &mut [f64], coordinates: &[Coordinate], bounds: &[[f64; 2]], rng: &mut impl Rng) -> bool {
     let angles = q.iter_mut().zip(coordinates).zip(bounds).filter(|((_, coordinate), _)| coordinate.periodic);
     for ((q, _), &[low, high]) in angles {

@@ -12,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 /// Draws `states` states by [`Shell`]; coordinates outside the shell are uniform within `position`.
 ///
 /// # Errors
-/// [`SamplingError::Config`] for a system without a time or coordinates that it does not have; [`SamplingError::Domain`] if more than nine in
-/// ten draws lie outside the system's domain or where surfaces of equal time are not space-like.
+/// [`SamplingError::Config`] for a system without a time, or for unknown coordinates; [`SamplingError::Domain`] if more than nine in ten
+/// draws lie outside the system's domain or where surfaces of equal time are not space-like.
 pub(crate) fn in_shell(
     system: &SystemInstance<f64>,
     shell: &Shell<'_>,
@@ -62,15 +62,15 @@ fn places(system: &SystemInstance<f64>, shell: &Shell<'_>) -> Result<Vec<usize>,
     shell.coordinates.iter().map(place).collect()
 }
 
-/// A vector of length 1, its direction uniform.
+/// Returns a unit vector in a uniformly distributed direction.
 fn direction(n: usize, rng: &mut impl Rng) -> Vec<f64> {
     let normal: Vec<f64> = (0..n).map(|_| StandardNormal.sample(rng)).collect();
     let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     normal.into_iter().map(|x| x / length).collect()
 }
 
-/// `cosh(rapidity) n + sinh(rapidity) e`: `n` is the future unit normal of the surface of equal time, `e` the unit vector in it whose
-/// components in an orthonormal frame are `ahead`, `(n - 1)`. `None` where the surface is not space-like.
+/// Returns `cosh(rapidity) n + sinh(rapidity) e`, where `n` is the future unit normal of the surface of equal time and `e` is the unit
+/// vector in that surface whose components in an orthonormal frame are `ahead`, `(n - 1)`. `None` where the surface is not space-like.
 fn moving(metric: &dyn EulerLagrange<f64>, time: usize, q: &[f64], rapidity: f64, ahead: &[f64]) -> Option<Vec<f64>> {
     let n = q.len();
     let mut terms = Terms::default();
@@ -88,7 +88,7 @@ fn moving(metric: &dyn EulerLagrange<f64>, time: usize, q: &[f64], rapidity: f64
     v.iter().all(|v| v.is_finite()).then_some(v)
 }
 
-/// The vector of length 1 in a positive definite metric `h` whose components in an orthonormal frame are `ahead`: `L^T e = ahead`, `h = L
+/// Returns the unit vector of a positive definite metric `h` whose components in an orthonormal frame are `ahead`: `L^T e = ahead`, `h = L
 /// L^T`. `None` if the metric is not positive definite.
 fn within(h: &[Vec<f64>], ahead: &[f64]) -> Option<Vec<f64>> {
     let n = h.len();
@@ -110,7 +110,7 @@ fn within(h: &[Vec<f64>], ahead: &[f64]) -> Option<Vec<f64>> {
     Some(e)
 }
 
-/// The states with weights that make near and far states count equally, see [`Weighting::by_distance`].
+/// Weights the states so that near and far states count equally, see [`Weighting::by_distance`].
 pub(crate) fn weigh_by_distance(
     set: Dataset<f64>,
     system: &SystemInstance<f64>,
@@ -128,8 +128,8 @@ mod tests {
     use crate::lagrangian::configure;
     use crate::presets::Preset;
 
-    /// Future-directed unit velocities from inside the horizon outward, with distances uniform in their logarithm and rapidities within
-    /// bounds.
+    /// Checks that velocities are future-directed and normalised, from inside the horizon outward, with distances uniform in their
+    /// logarithm and rapidities within bounds.
     #[test]
     fn states_in_a_shell_are_time_like_and_of_all_distances() {
         for name in ["schwarzschild-cartesian", "kerr-cartesian", "reissner-nordstrom-cartesian"] {
@@ -150,7 +150,7 @@ mod tests {
             assert!((1850..2150).contains(&near), "{name}: {near}");
             for (k, q) in set.q().chunks(4).enumerate() {
                 assert!(radius(q) >= shell.radius[0] * (1.0 - 1e-12) && radius(q) <= shell.radius[1] * (1.0 + 1e-12));
-                // The observer at rest in the surface of equal time sees the rapidity: u.n = -cosh, u.n = -lapse t'.
+                // An observer at rest in the surface of equal time measures the rapidity: u.n = -cosh, u.n = -lapse t'.
                 let metric = {
                     let mut terms = Terms::default();
                     exact.terms(q, &[0.0; 4], Request::MASS_MATRIX, &mut terms).unwrap();

@@ -10,26 +10,26 @@ use crate::scalar::{Real, Scalar, vectorized};
 use serde::{Deserialize, Serialize};
 use soap::{Eigenbasis, Step};
 
-/// The differences between update rules; all keep running means of gradient and squared gradient.
+/// Traits that distinguish the update rules; all of them keep running means of the gradient and the squared gradient.
 #[derive(Clone, Copy)]
 struct Traits {
-    /// Decay of the two means.
+    /// Decay rates of the two means.
     decay: [f64; 2],
-    /// `true` without second moment until its variance is tractable, then rectified (Liu et al. 2020).
+    /// `true` if the rule omits the second moment until its variance is tractable, then rectifies it (Liu et al. 2020).
     rectified: bool,
     /// `true` if the moments of weight matrices are taken in the eigenbases of Shampoo's preconditioner.
     eigenbases: bool,
-    /// `true` if weights decay in addition to the step, by rate times decay, instead of through the gradient.
+    /// `true` if weights decay in addition to the step, by learning rate times decay, instead of through the gradient.
     decoupled: bool,
 }
 
-/// Adam's.
+/// Traits of Adam.
 const ADAM: Traits = Traits { decay: [0.9, 0.999], rectified: false, eigenbases: false, decoupled: false };
 
 /// Builds the choice of update rules from rows `Name "name in configurations" "name in the literature" traits;`.
 macro_rules! methods {
     ($($(#[$doc:meta])* $name:ident $text:literal $title:literal $traits:expr;)*) => {
-        /// Which update rule.
+        /// Update rule of the weights.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         #[non_exhaustive]
         pub enum Method {
@@ -37,7 +37,7 @@ macro_rules! methods {
         }
 
         impl Method {
-            /// Every update rule.
+            /// All update rules.
             pub const ALL: [Self; [$($text),*].len()] = [$(Self::$name),*];
             /// The names in configurations, separated by commas.
             pub const NAMES: &'static str = methods!(@names $($text)*);
@@ -63,7 +63,7 @@ methods! {
     /// RAdam in the eigenbases of Shampoo's preconditioner (Vyas et al. 2024): fewer steps to the same loss, but each step costs four more
     /// products of the size of each weight matrix and two squares of it.
     Soap "soap" "SOAP" Traits { decay: [0.95, 0.99], rectified: true, eigenbases: true, ..ADAM };
-    /// RAdam (Liu et al. 2020): no second moment until its variance is tractable, then rectified.
+    /// RAdam (Liu et al. 2020): omits the second moment until its variance is tractable, then rectifies it.
     Radam "radam" "RAdam" Traits { rectified: true, ..ADAM };
     /// Adam (Kingma, Ba 2015) with bias correction.
     Adam "adam" "Adam" ADAM;
@@ -81,13 +81,13 @@ pub struct Update {
     pub rate: f64,
     /// Weight decay: added to the gradient (L2), or applied separately if the method decouples it.
     pub weight_decay: f64,
-    /// Number of leading parameters that decay: constants of nature after the weights do not.
+    /// Number of leading parameters that decay; the physical constants after the weights do not.
     pub decaying: usize,
-    /// The gradient's norm is cut to this; infinity leaves it.
+    /// Largest norm of the gradient; a longer gradient is scaled down to it. Infinity disables clipping.
     pub clip: f64,
 }
 
-/// The matrices that have eigenbases, out of offset, rows and columns of each.
+/// Selects the matrices that get eigenbases; each is given by offset, rows and columns.
 fn blocks(method: Method, matrices: impl IntoIterator<Item = (usize, usize, usize)>) -> Vec<Block> {
     if !method.traits().eigenbases {
         return Vec::new();
@@ -95,8 +95,8 @@ fn blocks(method: Method, matrices: impl IntoIterator<Item = (usize, usize, usiz
     matrices.into_iter().map(|(start, rows, cols)| Block { start, rows, cols }).collect()
 }
 
-/// How many numbers [`Moments::for_method`] keeps in addition to two for each parameter: those in a checkpoint, and all; `None` if they
-/// cannot be counted.
+/// Counts the numbers that [`Moments::for_method`] stores besides two for each parameter: those in a checkpoint, and all of them; `None` if
+/// the count overflows.
 pub(crate) fn eigenbasis_numbers(
     method: Method,
     matrices: impl IntoIterator<Item = (usize, usize, usize)>,
@@ -120,13 +120,13 @@ pub struct Moments<S> {
 }
 
 impl<S: Scalar> Moments<S> {
-    /// Zero moments for this many parameters.
+    /// Creates zero moments for this many parameters.
     pub fn new(parameters: usize) -> Self {
         let zeros = vec![<S as Real>::zero(); parameters];
         Self { first: zeros.clone(), second: zeros, step: 0, bases: Vec::new() }
     }
 
-    /// Zero moments, taken in eigenbases of `matrices`, offset, rows and columns of each, if the method has such.
+    /// Creates zero moments. If the method uses eigenbases, `matrices` gets them; each is given by offset, rows and columns.
     ///
     /// # Panics
     /// If the matrices overlap or end past the parameters.
@@ -140,7 +140,7 @@ impl<S: Scalar> Moments<S> {
         Self { bases: blocks.into_iter().map(Eigenbasis::new).collect(), ..Self::new(parameters) }
     }
 
-    /// `true` if these moments belong to this many parameters and have all numbers of their eigenbases.
+    /// `true` if the moments match this many parameters and their eigenbases are complete.
     pub(crate) fn fit(&self, parameters: usize) -> bool {
         let blocks: Vec<Block> = self.bases.iter().map(Eigenbasis::block).collect();
         [&self.first, &self.second].iter().all(|moments| moments.len() == parameters)
@@ -156,7 +156,7 @@ impl<S: Scalar> Moments<S> {
         self.update_on(None, weights, gradient, update)
     }
 
-    /// [`Moments::update`] with the eigenbases shared out over the threads of a pool; the result does not depend on them.
+    /// Like [`Moments::update`], but updates the eigenbases on a thread pool; the result does not depend on the threads.
     pub(crate) fn update_on(
         &mut self,
         pool: soap::Threads<'_>,
@@ -200,8 +200,8 @@ impl<S: Scalar> Moments<S> {
 }
 
 impl Update {
-    /// Length of step `step`, counted from 1, and the factor of the second moment's root; no factor where RAdam does
-    /// without the second moment.
+    /// Length of step number `step`, counted from 1, and the factor of the root of the second moment; `None` where RAdam omits the second
+    /// moment.
     fn step_size(&self, step: u32) -> (f64, Option<f64>) {
         let t = f64::from(step);
         let Traits { decay: [b1, b2], rectified, .. } = self.method.traits();
@@ -222,7 +222,7 @@ impl Update {
     }
 }
 
-/// Euclidean norm in double precision, partial sums in a fixed order.
+/// Euclidean norm in double precision; partial sums are added in a fixed order.
 fn norm<S: Scalar>(gradient: &[S]) -> f64 {
     const LANES: usize = 16;
     let mut sums = [0.0; LANES];
@@ -240,23 +240,23 @@ fn norm<S: Scalar>(gradient: &[S]) -> f64 {
     sums.iter().sum::<f64>().sqrt()
 }
 
-/// Keeps a step finite where a second moment vanishes.
+/// Keeps a step finite if a second moment vanishes.
 const EPSILON: f64 = 1e-8;
 
-/// Adam's rule at one step.
+/// The rule of Adam at one step.
 #[derive(Clone, Copy)]
 struct Rule<S> {
-    /// Factors of both moments, and of the gradient and its square that are added to them.
+    /// Decay factors of both moments, and the factors by which the gradient and its square are added to them.
     keep: [S; 2],
     take: [S; 2],
-    /// Step length, and the factor of the second moment's root; no factor where RAdam does without the second moment.
+    /// Step length, and the factor of the root of the second moment; `None` where RAdam omits the second moment.
     length: S,
     scale: Option<S>,
     epsilon: S,
 }
 
 impl<S: Scalar> Rule<S> {
-    /// The rule at step `step`, counted from 1.
+    /// Computes the rule at step number `step`, counted from 1.
     pub fn new(update: &Update, step: u32) -> Self {
         let (length, scale) = update.step_size(step);
         let decay = update.method.traits().decay;
@@ -269,7 +269,7 @@ impl<S: Scalar> Rule<S> {
         }
     }
 
-    /// Moves both moments of a number on and returns its step.
+    /// Updates both moments of one parameter and returns its step.
     #[inline(always)]
     pub fn advance(&self, m: &mut S, v: &mut S, g: S) -> S {
         *m = self.keep[0] * *m + self.take[0] * g;
@@ -282,7 +282,7 @@ impl<S: Scalar> Rule<S> {
     }
 }
 
-/// Some of the parameters, from number `start` on, with their gradients and moments.
+/// A contiguous range of the parameters, from number `start` on, with gradients and moments.
 struct Part<'a, S> {
     pub start: usize,
     pub weights: &'a mut [S],
@@ -292,7 +292,7 @@ struct Part<'a, S> {
 }
 
 impl<S: Scalar> Part<'_, S> {
-    /// The moments of the parameters before number `at`, and of those from there on.
+    /// Splits the range before parameter number `at`.
     pub fn split(self, at: usize) -> (Self, Self) {
         let k = at - self.start;
         let (weights, gradient) = (self.weights.split_at_mut(k), self.gradient.split_at_mut(k));
@@ -303,7 +303,7 @@ impl<S: Scalar> Part<'_, S> {
         )
     }
 
-    /// Turns the gradient into the step, and moves both moments on.
+    /// Updates both moments and overwrites the gradient with the step.
     pub fn advance(&mut self, rule: &Rule<S>) {
         vectorized(
             #[inline(always)]
@@ -314,7 +314,7 @@ impl<S: Scalar> Part<'_, S> {
         );
     }
 
-    /// Takes the step that the gradient was turned into.
+    /// Applies the step that replaced the gradient.
     pub fn apply(self) {
         vectorized(
             #[inline(always)]
@@ -323,12 +323,12 @@ impl<S: Scalar> Part<'_, S> {
     }
 }
 
-/// Course of the learning rate within a phase.
+/// Schedule of the learning rate within a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Schedule {
-    /// The rate stays.
+    /// The rate is constant.
     Constant,
     /// Half a cosine from the rate to `eta_min` over the whole phase.
     Cosine,

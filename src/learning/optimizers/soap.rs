@@ -1,8 +1,8 @@
 //! SOAP: Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al. 2024, arXiv:2409.11321).
 //!
-//! For a weight matrix `W` with gradient `G` the running means of `G G^T` and `G^T G` have eigenvectors `U`, `V` (as
-//! rows); Adam works on `U G V^T`, where the curvature is closer to diagonal, and its step is turned back. The
-//! eigenvectors follow by a step of subspace iteration every [`STEPS_PER_UPDATE`] steps.
+//! For a weight matrix `W` with gradient `G` the running means of `G G^T` and `G^T G` have eigenvectors `U`, `V` (as rows); Adam works on
+//! `U G V^T`, where the curvature is closer to diagonal, and its step is rotated back. The eigenvectors are updated by a step of subspace
+//! iteration every [`STEPS_PER_UPDATE`] steps.
 
 use crate::learning::state::numbers;
 use crate::linalg::{MatMut, MatRef, Workspace, eigh, gemm};
@@ -10,9 +10,9 @@ use crate::optimizers::{Part, Rule, Update};
 use crate::scalar::{Real, Scalar, vectorized};
 use serde::{Deserialize, Serialize};
 
-/// Steps between two updates of the eigenvectors (the preconditioning frequency of Vyas et al. 2024).
+/// Steps between two updates of the eigenvectors (called the preconditioning frequency by Vyas et al. 2024).
 const STEPS_PER_UPDATE: u32 = 10;
-/// Longest side of a matrix that has eigenvectors; longer sides are not rotated.
+/// Longest side of a matrix that is rotated; longer sides have no eigenvectors.
 const LONGEST_SIDE: usize = 1024;
 
 /// A weight matrix within the flat parameters, row-major.
@@ -32,18 +32,18 @@ impl Block {
         self.start..self.start + self.rows * self.cols
     }
 
-    /// Lengths of the sides that are turned.
+    /// Lengths of the sides that are rotated.
     fn sides(&self) -> [usize; 2] {
         [self.rows, self.cols].map(|size| if (2..=LONGEST_SIDE).contains(&size) { size } else { 0 })
     }
 
-    /// Numbers that the eigenbases of these matrices keep; `None` if they cannot be counted.
+    /// Counts the numbers that the eigenbases of these matrices store; `None` if the count overflows.
     pub(crate) fn numbers(blocks: &[Self]) -> Option<usize> {
         let of = |block: &Self| block.sides().iter().map(|size| 2 * size * size).sum();
         blocks.iter().map(of).try_fold(0_usize, |sum, numbers: usize| sum.checked_add(numbers))
     }
 
-    /// `true` if the matrices, in order, lie side by side within this many parameters.
+    /// `true` if the matrices are in order, do not overlap and end within this many parameters.
     pub(crate) fn fit(blocks: &[Self], parameters: usize) -> bool {
         let end = blocks.iter().try_fold(0, |end, block| {
             let next = block.rows.checked_mul(block.cols).and_then(|size| block.start.checked_add(size));
@@ -58,14 +58,14 @@ impl Block {
 #[serde(bound = "S: Scalar")]
 pub(crate) struct Eigenbasis<S> {
     block: Block,
-    /// Sides for the rows and for the columns.
+    /// The side of the rows and the side of the columns.
     sides: [Side<S>; 2],
-    /// Half of the way of a turn; empty after it was read, until the first.
+    /// Buffer for the intermediate product of a rotation; empty after deserialization, until its first use.
     #[serde(skip)]
     half: Vec<S>,
 }
 
-/// Compares only the state that a step leaves behind.
+/// Ignores the buffers, which carry nothing from step to step.
 impl<S: PartialEq> PartialEq for Eigenbasis<S> {
     fn eq(&self, other: &Self) -> bool {
         (self.block, &self.sides) == (other.block, &other.sides)
@@ -82,12 +82,12 @@ impl<S: Scalar> Eigenbasis<S> {
         self.block
     }
 
-    /// `true` if the sides are those of the matrix, with all their numbers.
+    /// `true` if the sides match the matrix and are complete.
     pub fn is_whole(&self) -> bool {
         self.sides.iter().zip(self.block.sides()).all(|(side, size)| side.is_of(size))
     }
 
-    /// Advances the matrix, its moments and its eigenbases.
+    /// Updates the matrix, its moments and its eigenbases.
     fn advance(&mut self, mut part: Part<'_, S>, step: &Step<S>, parallel: bool) {
         let Self { block, sides, half } = self;
         half.resize(block.rows * block.cols, <S as Real>::zero());
@@ -106,7 +106,7 @@ impl<S: Scalar> Eigenbasis<S> {
     }
 }
 
-/// Which matrices to rotate by.
+/// The matrices that rotate a side.
 #[derive(Clone, Copy)]
 enum Choice {
     Vectors,
@@ -124,7 +124,7 @@ impl Choice {
     }
 }
 
-/// `X = L X R^T` with a square matrix for each side that is turned; `half` has room for as many numbers as `X`.
+/// Computes `X = L X R^T`, with a square matrix for each side that is rotated; the buffer `half` is as long as `X`.
 fn rotate<S: Scalar>(block: Block, [left, right]: &[Side<S>; 2], choice: Choice, x: &mut [S], half: &mut [S]) {
     let Block { rows, cols, .. } = block;
     let one = <S as Real>::one();
@@ -140,10 +140,10 @@ fn rotate<S: Scalar>(block: Block, [left, right]: &[Side<S>; 2], choice: Choice,
     }
 }
 
-/// The threads to work on: a pool, or the caller's own. Never rayon's global pool, which belongs to the application.
+/// The thread pool to work on, or `None` for the caller's thread. Never rayon's global pool, which belongs to the application.
 pub(crate) type Threads<'a> = Option<&'a rayon::ThreadPool>;
 
-/// Runs both, in parallel if the caller is a thread of a pool.
+/// Runs both closures, in parallel if the caller runs in a pool.
 fn both(parallel: bool, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
     if parallel {
         rayon::join(a, b);
@@ -155,7 +155,7 @@ fn both(parallel: bool, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
 
 /// One step of all parameters.
 pub(super) struct Step<S> {
-    /// Counted from 1.
+    /// Number of the step, counted from 1.
     number: u32,
     rule: Rule<S>,
 }
@@ -165,7 +165,7 @@ impl<S: Scalar> Step<S> {
         Self { number, rule: Rule::new(update, number) }
     }
 
-    /// Advances all parameters: matrices in their `bases`, all others one by one.
+    /// Updates all parameters: matrices in their `bases`, all others element by element.
     ///
     /// The result does not depend on the threads.
     pub fn take(&self, mut part: Part<'_, S>, bases: &mut [Eigenbasis<S>], parallel: bool) {
@@ -191,29 +191,30 @@ impl<S: Scalar> Step<S> {
     }
 }
 
-/// Decay of the running means of `G G^T` and `G^T G` (beta of Shampoo in Vyas et al. 2024).
+/// Decay rate of the running means of `G G^T` and `G^T G` (beta of Shampoo in Vyas et al. 2024).
 const COVARIANCE_DECAY: f64 = 0.95;
-/// Rows of a square that are multiplied at once, up to the last column that lies on the diagonal.
+/// Number of rows in a block when only the lower triangle of a product is computed.
 const ROWS_AT_ONCE: usize = 32;
 
-/// Running mean of `G G^T` or `G^T G` and its eigenvectors as rows, `(size, size)`; empty if this side is not turned.
+/// Running mean of `G G^T` or `G^T G` and its eigenvectors as rows, `(size, size)`; empty if this side is not rotated.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 pub(super) struct Side<S> {
     pub size: usize,
-    /// Up to its diagonal; beyond it are numbers of the last update of the eigenvectors.
+    /// Lower triangle of the running mean; the upper triangle is only valid while the eigenvectors are updated.
     #[serde(with = "numbers")]
     pub covariance: Vec<S>,
     #[serde(with = "numbers")]
     pub vectors: Vec<S>,
-    /// The next eigenvectors, then their rotation relative to the last ones; empty after they were read, until they are updated.
+    /// Buffer for the next eigenvectors, then for their rotation relative to the last ones; empty after deserialization until the next
+    /// update.
     #[serde(skip)]
     next: Vec<S>,
     #[serde(skip)]
     pub turn: Vec<S>,
 }
 
-/// Compares only the state that a step leaves behind.
+/// Ignores the buffers, which carry nothing from step to step.
 impl<S: PartialEq> PartialEq for Side<S> {
     fn eq(&self, other: &Self) -> bool {
         (&self.covariance, &self.vectors) == (&other.covariance, &other.vectors)
@@ -226,7 +227,7 @@ impl<S: Scalar> Side<S> {
         Self { size, covariance: zeros(), vectors: zeros(), next: zeros(), turn: zeros() }
     }
 
-    /// `true` if this is a side of `size`, with all its numbers.
+    /// `true` if the side has length `size` and is complete.
     pub fn is_of(&self, size: usize) -> bool {
         self.size == size && [&self.covariance, &self.vectors].iter().all(|numbers| numbers.len() == size * size)
     }
@@ -235,7 +236,7 @@ impl<S: Scalar> Side<S> {
         MatRef::new(data, self.size, self.size)
     }
 
-    /// Adds `g g^T` to the running mean; the first one also gives the first eigenvectors.
+    /// Adds `g g^T` to the running mean; the first call also computes the first eigenvectors.
     pub fn observe(&mut self, g: MatRef<'_, S>, first: bool) {
         if self.size == 0 {
             return;
@@ -254,7 +255,7 @@ impl<S: Scalar> Side<S> {
         }
     }
 
-    /// Completes the running mean beyond its diagonal.
+    /// Copies the lower triangle of the running mean to the upper one.
     fn complete(&mut self) {
         let size = self.size;
         for i in 0..size {
@@ -264,7 +265,7 @@ impl<S: Scalar> Side<S> {
         }
     }
 
-    /// Eigenvectors of the first running mean, those of large eigenvalues first.
+    /// Computes the eigenvectors of the first running mean, sorted by descending eigenvalue.
     fn begin(&mut self) {
         let size = self.size;
         self.complete();
@@ -279,8 +280,8 @@ impl<S: Scalar> Side<S> {
         }
     }
 
-    /// One step of subspace iteration; `turn` becomes new vectors times old ones transposed. Nothing changes where the
-    /// mean is not finite.
+    /// Performs one step of subspace iteration; `turn` becomes the product of the new vectors and the transposed old ones. Does nothing if
+    /// the mean is not finite.
     pub fn update_basis(&mut self) {
         let size = self.size;
         if size == 0 {
@@ -290,7 +291,7 @@ impl<S: Scalar> Side<S> {
         self.turn.resize(size * size, <S as Real>::zero());
         self.complete();
         let trace = self.covariance.iter().step_by(size + 1).fold(<S as Real>::zero(), |sum, &c| sum + c);
-        // Vectors of eigenvalues that are lost in rounding stay where they are.
+        // The shift keeps eigenvectors fixed whose eigenvalues are lost in rounding.
         let shift = S::epsilon() * trace + S::min_positive();
         product(size, &mut self.next, &self.vectors, MatRef::new(&self.covariance, size, size));
         for (next, &vector) in self.next.iter_mut().zip(&self.vectors) {
@@ -304,19 +305,19 @@ impl<S: Scalar> Side<S> {
     }
 }
 
-/// `out = a b` of square matrices.
+/// Computes `out = a b` for square matrices.
 fn product<S: Scalar>(size: usize, out: &mut [S], a: &[S], b: MatRef<'_, S>) {
     gemm(MatMut::new(out, size, size), false, <S as Real>::one(), MatRef::new(a, size, size), b);
 }
 
-/// Rows that are made orthonormal at once.
+/// Number of rows in a block of the orthonormalization.
 const ORTHONORMAL_ROWS: usize = 16;
 
-/// Makes the rows orthonormal, one after the other: a block of rows against those before it by matrix products, then within
-/// itself, all of it twice (Giraud, Langou, Rozložník 2005: twice is enough; for blocks Barlow, Smoktunowicz 2013); `false` if
-/// a row vanishes or is not finite.
+/// Orthonormalizes the rows by blocks: each block is orthogonalized against all rows before it by matrix products, then within itself, and
+/// all of this is done twice (Giraud, Langou, Rozložník 2005: twice is enough; for blocks Barlow, Smoktunowicz 2013); `false` if a row
+/// vanishes or is not finite.
 ///
-/// `scratch` has room for as many numbers as `rows`.
+/// The buffer `scratch` is as long as `rows`.
 fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S], scratch: &mut [S]) -> bool {
     let one = <S as Real>::one();
     for start in (0..size).step_by(ORTHONORMAL_ROWS) {
@@ -342,7 +343,7 @@ fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S], scratch: &mut [S]) -> 
     true
 }
 
-/// Gives every row the length 1; `false` if one vanishes or is not finite.
+/// Normalizes every row to length 1; `false` if a row vanishes or is not finite.
 fn normalize<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
     rows.chunks_exact_mut(size).all(|row| {
         let scale = norm(row).recip();
@@ -351,7 +352,7 @@ fn normalize<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
     })
 }
 
-/// Makes a few rows orthonormal, one after the other.
+/// Orthonormalizes a few rows, one after the other.
 fn orthonormalize_within<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
     vectorized(
         #[inline(always)]
@@ -405,7 +406,7 @@ mod tests {
     const PLAIN: Update =
         Update { method: Method::Soap, rate: 0.1, weight_decay: 0.0, decaying: usize::MAX, clip: f64::INFINITY };
 
-    /// The only matrix of parameters that have one, where it has the basis `choice`.
+    /// Rotates `x` by the basis `choice` of the first matrix.
     fn rotated(moments: &Moments<f64>, choice: Choice, x: &[f64]) -> Vec<f64> {
         let basis = &moments.bases[0];
         let (mut x, mut half) = (x.to_vec(), vec![0.0; x.len()]);
@@ -432,7 +433,7 @@ mod tests {
         }
     }
 
-    /// The first moment, turned back, is the running mean of the gradients.
+    /// The first moment, rotated back, equals the running mean of the gradients.
     #[test]
     fn moments_follow_their_eigenbasis() {
         let mut moments = Moments::for_method(Method::Soap, 30, [(3, 6, 4)]);
@@ -564,7 +565,7 @@ mod tests {
         (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
     }
 
-    /// Largest element of `A A^T - 1`.
+    /// Largest element of `A A^T - 1`, which measures how far the rows are from orthonormal.
     fn defect(size: usize, rows: &[f64]) -> f64 {
         let pairs = (0..size).flat_map(|i| (0..size).map(move |j| (i, j)));
         let of = |(i, j): (usize, usize)| {
@@ -576,7 +577,7 @@ mod tests {
 
     #[test]
     fn rows_become_orthonormal_however_nearly_dependent_they_are() {
-        // Less than a block of rows, and several.
+        // Sizes below one block of rows and above several.
         for size in [7, 20, 50] {
             let mut rows = random(size * size, 1);
             for k in 1..size {

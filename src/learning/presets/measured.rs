@@ -7,16 +7,16 @@ use crate::optimizers::Method;
 use crate::presets::preset::{recorded, take_structure};
 use crate::scalar::Scalar;
 
-/// Steps of a supervised training.
+/// Number of steps of supervised training.
 const STEPS: usize = 30_000;
 
-/// Steps of a training from known forces.
+/// Number of steps when training on known forces.
 const STEPS_BY_FORCES: usize = 10_000;
 /// Widths of the layers for a training from known forces, and its decoupled weight decay: such recordings have few states of many
 /// coordinates, so the learned functions have to be smooth.
 const BY_FORCES: ([usize; 3], f64) = ([64; 3], 0.3);
 
-/// Changes the structure of a configuration that suits recorded motion: a black box in place of another one has its usual penalty.
+/// Changes the structure of a configuration for recorded motion; a change to a black box adds the default penalty.
 pub fn restructure(config: &mut Config, structure: Structure) {
     if structure == Structure::BlackBox && config.network.structure != Structure::BlackBox {
         config.penalty = Config::default().penalty;
@@ -26,8 +26,8 @@ pub fn restructure(config: &mut Config, structure: Structure) {
 
 /// Configuration of a training from these states: the network and the rates of the quick preset, 30,000 steps in whole epochs.
 ///
-/// From known forces another one is learned: kinetic energy and potential with the friction of every coordinate, smaller and with
-/// more weight decay, in 10,000 steps.
+/// If forces are known, the network instead learns a kinetic energy, a potential and the friction of every coordinate; it is smaller, has
+/// more weight decay and takes 10,000 steps.
 pub fn suggested<S: Scalar>(name: &str, data: &Datasets<S>) -> Config {
     let [training, validation, test] = [&data.training[0], &data.validation, &data.test];
     let sizes = [training.len(), validation.len(), test.len()];

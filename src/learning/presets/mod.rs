@@ -16,6 +16,6 @@ mod trainer;
 pub use preset::Preset;
 pub use trainer::{Learned, Trainer, TrainerError};
 
-// For the packages of this repository.
+// Used by the other packages of this repository.
 #[doc(hidden)]
 pub use measured::{restructure, suggested};

@@ -13,11 +13,11 @@ use std::f64::consts::PI;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {
-    /// A useful model within a minute on two cores.
+    /// Trains a useful model within a minute on two cores.
     Quick,
     /// Wider layers and more epochs than [`Preset::Quick`].
     Best,
-    /// The paper's own budget and choices.
+    /// Uses the budget and the settings of the paper.
     Paper,
 }
 
@@ -31,9 +31,9 @@ impl Preset {
         }
     }
 
-    /// The configuration of a system for a Lagrangian of this structure; the presets of our own have other rates where a
-    /// signature cannot be lost and, except around a centre, no weight decay and a higher clip. A black box has states off the
-    /// mass shell, whatever the structure that the preset chooses itself.
+    /// The configuration of a system for a Lagrangian of this structure. If the structure fixes the signature, our own presets use another
+    /// rate and, except around a centre, no weight decay and a higher clip. A black box has states off the mass shell, even if the preset
+    /// itself would choose another structure.
     pub fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         if self == Self::Paper {
@@ -48,7 +48,7 @@ impl Preset {
     }
 }
 
-/// Gives one of our configurations a structure, with the rate, weight decay and clip that suit it; `rate` overrides the first.
+/// Sets the structure of one of our configurations with a suitable rate, weight decay and clip; `rate` overrides the learning rate.
 pub(crate) fn take_structure(config: &mut Config, structure: Structure, rate: Option<f64>) {
     config.take_structure(structure);
     if structure == Structure::BlackBox {
@@ -118,17 +118,17 @@ fn base(system: &SystemInstance<f64>, states: usize, network: Network) -> Config
     }
 }
 
-/// Learning rate of a triangle; a black box and a rectangle have the default.
+/// Learning rate for a triangular factor; a black box and a rectangular factor use the default.
 const TRIANGLE_RATE: f64 = 1e-2;
 
-/// Largest norm of a structure's gradient: above those of ordinary steps.
+/// Largest gradient norm for networks with a structure: larger than the norms of ordinary steps.
 const STRUCTURE_CLIP: f64 = 10.0;
 
-/// Weight decay where accelerations may have any size: it adds to the loss, and the weights of geodesics by a clock, whose scaled
-/// accelerations are a thousandth, followed the decay alone.
+/// Weight decay if accelerations may have any size: weight decay adds to the loss and would dominate it for geodesics parametrised by a
+/// clock, whose scaled accelerations are about a thousandth.
 const ANY_SIZE: f64 = 0.0;
 
-/// Choices in which our own presets differ.
+/// Settings that differ between our own presets.
 #[derive(Clone, Copy)]
 struct Size {
     width: usize,
@@ -138,20 +138,20 @@ struct Size {
 
 const BEST: Size = Size { width: 192, epochs: 100, weight_decay: 0.0 };
 
-/// Part of the states off a mass shell in the presets of our own.
+/// Share of states off the mass shell in our own presets.
 const OFF_SHELL: f64 = 0.75;
 
-/// The choices of the preset `quick`: the defaults of the configuration.
+/// Settings of the preset `quick`: the defaults of the configuration.
 fn quick() -> Size {
     Size { width: 128, epochs: Phase::default().epochs, weight_decay: Optimizer::default().weight_decay }
 }
 
-/// One fall of the rate to zero.
+/// A phase whose learning rate falls to zero once.
 fn phase(epochs: usize) -> Phase {
     Phase { epochs, t_max: epochs as f64, ..Phase::default() }
 }
 
-/// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
+/// The box of the paper with one turn for every angle, enlarged where the motions of the trajectory test soon leave it.
 fn training_states(system: &SystemInstance<f64>) -> (Bounds, StateAdvice) {
     let n = system.coordinates;
     let mut bounds: Bounds = system.system.training(n);
@@ -192,7 +192,7 @@ fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
     }
 }
 
-/// Part of the states of a system off its mass shell, if it has one.
+/// Share of states off the mass shell, if the system has one.
 fn off_shell(system: &SystemInstance<f64>) -> f64 {
     if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 }
 }

@@ -16,13 +16,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// Shares of the states that choose the best epoch and that test the result.
+/// Share of the states for validation, and share for the test.
 const HELD_OUT: f64 = 0.1;
 
 /// A training on states with accelerations.
 ///
-/// A tenth of the states, drawn by the seed, chooses the best epoch, and another tenth judges the result. The choices are those of
-/// the preset `quick`: if unsure, leave them.
+/// A tenth of the states, drawn by the seed, chooses the best epoch, and another tenth judges the result. The choices are those of the
+/// preset `quick`: keep them if unsure.
 ///
 /// | choice | default |
 /// |---|---|
@@ -70,11 +70,11 @@ pub struct Learned {
     pub history: Vec<Epoch>,
     /// Best validation loss: half the mean absolute error of the scaled accelerations.
     pub validation_loss: f64,
-    /// The same on the states that chose nothing.
+    /// The same loss on the test states.
     pub test_loss: f64,
     /// Why the training ended.
     pub stop: StopReason,
-    /// Contents of the model's file besides the weights.
+    /// Contents of the model file except the weights.
     pub header: Header,
 }
 
@@ -99,36 +99,36 @@ pub enum TrainerError {
         /// States given.
         found: usize,
     },
-    /// Names of the coordinates that are too many, too few or not distinct; an angle that is not a coordinate.
+    /// Coordinate names are too many, too few or not distinct, or an angle is not a coordinate.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A shape of the network that contradicts itself.
+    /// The shape of the network is inconsistent.
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// Training failed.
     #[error(transparent)]
     Training(#[from] TrainingError),
-    /// Constraints with a mistake, or that contradict each other or leave no motion.
+    /// The constraints have a mistake, contradict each other or leave no motion.
     #[error(transparent)]
     Constraints(#[from] ConstraintFormulaError),
-    /// A constraint that is not finite at a state, or states that are under rows already.
+    /// A constraint is not finite at a state, or the states already have constraint rows.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
 }
 
 impl<'a> Trainer<'a> {
-    /// A training on these states, whose coordinates are called `q1`, `q2`, ...
+    /// Creates a trainer for these states, whose coordinates are called `q1`, `q2`, ...
     pub fn new(data: &'a Dataset<f64>) -> Self {
         let names = (1..=data.coordinates()).map(|i| format!("q{i}")).collect();
         Self { data, names, angles: Vec::new(), constraints: BTreeMap::new(), config: of_states(), threads: 1 }
     }
 
-    /// Names the coordinates, as messages and the model file shall call them.
+    /// Names the coordinates for messages and for the model file.
     pub fn coordinates(self, names: &[&str]) -> Self {
         Self { names: names.iter().map(|name| name.to_string()).collect(), ..self }
     }
 
-    /// Marks coordinates, by index from 0, as angles in rad: the Lagrangian has their period.
+    /// Marks coordinates, by index from 0, as angles in rad; the Lagrangian becomes periodic in them.
     pub fn angles(self, indices: &[usize]) -> Self {
         Self { angles: indices.to_vec(), ..self }
     }
@@ -140,7 +140,7 @@ impl<'a> Trainer<'a> {
         Self { constraints, ..self }
     }
 
-    /// Builds the signature of the mass matrix in, which replaces the penalty of a black box.
+    /// Sets the structure of the network; a structure fixes the signature of the mass matrix and replaces the penalty of a black box.
     pub fn structure(mut self, structure: Structure) -> Self {
         take_structure(&mut self.config, structure, None);
         self
@@ -152,7 +152,7 @@ impl<'a> Trainer<'a> {
         self
     }
 
-    /// Passes through the states; the learning rate falls to 0 over them.
+    /// Number of passes through the states; the learning rate falls to 0 over them.
     pub fn epochs(mut self, epochs: usize) -> Self {
         for phase in &mut self.config.phases {
             (phase.epochs, phase.t_max) = (epochs, epochs as f64);
@@ -172,18 +172,18 @@ impl<'a> Trainer<'a> {
         self
     }
 
-    /// Seed of weights, parts and order of the states.
+    /// Seed of the weights, of the split and of the order of the states.
     pub fn seed(mut self, seed: u64) -> Self {
         self.config.seed = seed;
         self
     }
 
-    /// Threads; results do not depend on them.
+    /// Number of threads; results do not depend on it.
     pub fn threads(self, threads: usize) -> Self {
         Self { threads, ..self }
     }
 
-    /// Changes any other choice of the [`Config`].
+    /// Changes any other setting of the [`Config`].
     pub fn configure(mut self, change: impl FnOnce(&mut Config)) -> Self {
         change(&mut self.config);
         self
@@ -197,7 +197,7 @@ impl<'a> Trainer<'a> {
         self.train_watched(&Hooks::default())
     }
 
-    /// Trains as [`Self::train`] does, with hooks: if their flag is raised, the training ends with the best weights so far.
+    /// Trains like [`Self::train`], with hooks: if the interrupt flag is raised, training ends with the best weights so far.
     ///
     /// # Errors
     /// [`TrainerError`].
@@ -275,7 +275,7 @@ impl Learned {
         self.header.constrain(Box::new(&self.model as &dyn EulerLagrange<f64>))
     }
 
-    /// Writes the model's file, whole or not at all.
+    /// Writes the model file atomically.
     ///
     /// # Errors
     /// [`ModelFileError`] of names that a file cannot hold, or of the file system.

@@ -9,9 +9,9 @@ use std::ops::Range;
 /// Steps of increasing times, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
-    /// Typical step: the median of equal steps; for uneven ones, the mean of those that are not gaps.
+    /// Typical step: the median if steps are equal; otherwise the mean of the steps that are not gaps.
     pub step: f64,
-    /// Standard deviation of the steps that are not gaps; of equal ones a robust one, which is rounding.
+    /// Standard deviation of the steps that are not gaps; if steps are equal, a robust estimate, which measures rounding.
     pub spread: f64,
     /// Longest step that is not a gap.
     pub longest: f64,
@@ -48,12 +48,12 @@ impl Clock {
         Self { step: middle + mean, spread, longest, even: false }
     }
 
-    /// Spread of the steps over the usual one; 0 if it is rounding.
+    /// Standard deviation of the steps divided by the typical step; 0 if it is rounding.
     pub fn jitter(&self) -> f64 {
         if self.even { 0.0 } else { self.spread / self.step }
     }
 
-    /// Rows that are missing in a step; 0 if it is not a gap.
+    /// Number of rows missing within a step; 0 if it is not a gap.
     pub fn missing(&self, seconds: f64) -> usize {
         if seconds > self.longest { ((seconds / self.step).round() as usize).saturating_sub(1) } else { 0 }
     }
@@ -63,7 +63,7 @@ impl Clock {
         seconds <= (BRIDGED_STEPS * self.step).max(self.longest)
     }
 
-    /// `true` if the steps of these times are all the usual one.
+    /// `true` if all steps of these times equal the typical one.
     pub fn is_even_over(&self, times: &[f64]) -> bool {
         let seconds = times.len().saturating_sub(1) as f64 * self.step;
         let usual =
@@ -71,7 +71,7 @@ impl Clock {
         self.even || (usual() && is_even(times))
     }
 
-    /// Sample nearest to `at` with half a window of `window` usual steps on either side; none if the trajectory is shorter.
+    /// Sample nearest to `at` that has half a window, of `window` typical steps, on either side; `None` if the trajectory is too short.
     pub fn centre(&self, times: &[f64], at: usize, window: usize) -> Option<usize> {
         if self.even {
             let half = window / 2;
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!((clock.surrounds(&times, 4, 9), clock.surrounds(&times, 3, 9)), ([true; 2], [false, true]));
         assert_eq!((clock.centre(&times, 0, 9), clock.centre(&times, 97, 9)), (Some(4), Some(93)));
         assert_eq!((clock.centre(&times, 60, 9), clock.centre(&times, 60, 201)), (Some(60), None));
-        // The same of equal steps, where windows are counted.
+        // The same for equal steps, where windows are counted in samples.
         let times = frames(100, |_| true);
         let clock = Clock::of(&times);
         assert_eq!((clock.window(&times, 50, 9, 7), clock.window(&times, 1, 9, 7)), (46..55, 0..9));

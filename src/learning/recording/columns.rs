@@ -34,15 +34,15 @@ pub struct Columns {
     pub units: Vec<(String, String)>,
     /// Names of all columns of files without a header, by position.
     pub names: Option<Vec<String>>,
-    /// Whether trajectories are side by side, those of coordinates `s` and `theta` in `s1`, `theta1`, `s2`, `theta2`. They share a column
-    /// of time unless there are `t1`, `t2`; of shorter ones the last fields are empty.
+    /// Whether trajectories are side by side, such as those of coordinates `s` and `theta` in `s1`, `theta1`, `s2`, `theta2`. They share a
+    /// time column unless there are `t1`, `t2`; after the end of a shorter trajectory its fields are empty.
     pub wide: bool,
     /// Whether trajectories stay whole, for programs that follow them by equations of motion: no gap cuts one, none is too short, and rows
     /// at the same time are repeated measurements of one state.
     pub whole: bool,
 }
 
-/// Mistakes in a description of columns that show without the data.
+/// Mistakes in a description of columns that can be found without the data.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{}", .0.join("; "))]
 pub struct ColumnsError(pub Vec<String>);
@@ -150,9 +150,9 @@ impl Columns {
         if wrong.is_empty() { Ok(()) } else { Err(ColumnsError(wrong)) }
     }
 
-    /// Notes what is wrong with the units.
+    /// Collects the mistakes in the units.
     fn check_units(&self, wrong: &mut Vec<String>) {
-        // The default column of time is known only with the data.
+        // The name of the default time column is only known once the data are read.
         let usual: &[&str] = if self.time.is_none() && self.rate.is_none() { &["t", "time"] } else { &[] };
         let known = || self.used().map(|(_, name)| name.as_str()).chain(usual.iter().copied());
         for (k, (name, unit)) in self.units.iter().enumerate() {

@@ -17,7 +17,7 @@ pub(crate) struct Filled {
 }
 
 impl Filled {
-    /// Marks missing readings, which `recording` has filled in, as held too.
+    /// Marks missing readings, which `recording` already interpolates, as held too.
     pub fn without(this: Option<Self>, recording: &Recording, missing: &[Vec<bool>]) -> Option<Self> {
         if !missing.iter().flatten().any(|missing| *missing) {
             return this;
@@ -77,7 +77,7 @@ impl SensorResolution {
         Self { smallest, holds: often && quantile(&mut changes, 0.5) > FINE_STEPS * smallest }
     }
 
-    /// `false` for held readings.
+    /// Marks readings as fresh (`true`) or held (`false`).
     fn fresh(&self, times: &[f64], values: &[f64]) -> Vec<bool> {
         let mut fresh = vec![true; values.len()];
         if times.windows(2).any(|pair| pair[1] <= pair[0]) {
@@ -104,7 +104,7 @@ impl SensorResolution {
     }
 }
 
-/// Distance of the marks of coordinate `i`, if its sensor has some: small changes are whole numbers of them.
+/// Spacing of the encoder marks of coordinate `i`, if its small changes are multiples of a spacing.
 pub(crate) fn marks(recording: &Recording, i: usize) -> Option<f64> {
     let SensorResolution { smallest, .. } = SensorResolution::of(recording, i);
     let n = recording.n();
@@ -117,7 +117,7 @@ pub(crate) fn marks(recording: &Recording, i: usize) -> Option<f64> {
     (small.len() >= LEAST_MARKED_CHANGES && whole as f64 > WHOLE_SHARE * small.len() as f64).then_some(smallest)
 }
 
-/// Value at a held reading of the polynomial through the fresh ones around it.
+/// Interpolates a held reading by the polynomial through the fresh readings around it.
 fn between(times: &[f64], values: &[f64], fresh: &[bool], sample: usize) -> f64 {
     let before = (0..sample).rev().filter(|&k| fresh[k]).take(FRESH_NEIGHBOURS);
     let after = (sample + 1..values.len()).filter(|&k| fresh[k]).take(FRESH_NEIGHBOURS);

@@ -1,7 +1,7 @@
 //! Motion between two samples whose positions and velocities are known.
 
-/// Factors of the cubic Hermite polynomial for the position, then the velocity, from `q`, `v` at the start and `q`, `v` at the end of an
-/// interval of length `h`, at the part `fraction` of it; exact for cubic motion, error of order `h^4` in the position.
+/// Coefficients of cubic Hermite interpolation of the position, then of the velocity. They multiply `q`, `v` at the start and `q`, `v` at
+/// the end of an interval of length `h`, at the relative time `fraction`; exact for cubic motion, error of order `h^4` in the position.
 pub fn hermite(fraction: f64, h: f64) -> [[f64; 4]; 2] {
     let s = fraction;
     let (square, cube) = (s * s, s * s * s);

@@ -30,10 +30,10 @@ pub enum HeldOut {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum HoldOutError {
-    /// Not a share.
+    /// The requested value is not a share.
     #[error("share of the data held out: expected 0, or a number between 0 and 1, found {0}")]
     Fraction(f64),
-    /// One trajectory that is too short to be divided.
+    /// The only trajectory is too short to be divided.
     #[error("{} too few to hold out {fraction} of them after a gap of {gap}: both parts need {least}", pluralize(*samples, "sample is", "samples are"))]
     Short {
         /// Samples of the trajectory.
@@ -108,7 +108,7 @@ impl HeldOut {
         Ok(Self::Tracks(held))
     }
 
-    /// `true` if a trajectory is held out as a whole.
+    /// `true` if a whole trajectory is held out.
     pub fn has_track(&self, track: usize) -> bool {
         matches!(self, Self::Tracks(held) if held.contains(&track))
     }
@@ -137,7 +137,7 @@ impl HeldOut {
         }
     }
 
-    /// In words, such as `run3.csv, run7.csv`.
+    /// Describes the held-out part in words, such as `run3.csv, run7.csv`.
     pub fn describe(&self, recording: &Recording) -> String {
         match self {
             Self::Nothing => "nothing".to_string(),
@@ -170,13 +170,13 @@ pub fn hold_out(
     Ok(HeldOut::choose(recording, &takes, fraction, (gap, 2), seed)?.divide(recording))
 }
 
-/// A recording with the same coordinates and no trajectories.
+/// Copies the coordinates of a recording without its trajectories.
 fn bare(recording: &Recording) -> Recording {
     let (coordinates, periodic) = (recording.coordinates.clone(), recording.periodic.clone());
     Recording { coordinates, periodic, tracks: Vec::new() }
 }
 
-/// Samples of a track of `n` coordinates.
+/// Cuts a range of samples out of a track of `n` coordinates.
 fn section(track: &RecordedTrajectory, n: usize, range: Range<usize>, which: &str) -> RecordedTrajectory {
     let part = |values: &[f64]| values.get(range.start * n..range.end * n).unwrap_or(&[]).to_vec();
     RecordedTrajectory {

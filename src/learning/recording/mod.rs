@@ -45,7 +45,7 @@ pub(crate) use thresholds::{INERTIAL_SHARE, LARGE_ACCELERATION_ERROR};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub use units::factor;
 
-// For the packages of this repository.
+// Used by the other packages of this repository.
 #[doc(hidden)]
 pub use {
     clock::Clock,

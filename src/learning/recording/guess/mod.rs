@@ -63,7 +63,7 @@ pub fn guess<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, Data
     let mut table = RawTable::read(file, given.names.as_deref())?;
     let mut given = given.clone();
     if table.is_unnamed() {
-        // Numbers cannot be names in formulas.
+        // Formulas cannot contain numbers as names.
         table.names.iter_mut().for_each(|name| name.insert(0, 'c'));
         given.names = Some(table.names.clone());
     }

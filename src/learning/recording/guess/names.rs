@@ -1,4 +1,4 @@
-//! What names of columns usually mean.
+//! Recognises the usual meaning of column names.
 
 /// A name without the digits, signs and brackets at its end, in lower case: `theta` of `Theta_1`.
 pub fn stem(name: &str) -> String {
@@ -6,12 +6,12 @@ pub fn stem(name: &str) -> String {
     name.trim_end_matches(|c: char| c.is_ascii_digit() || "_-. ".contains(c)).to_string()
 }
 
-/// `true` if the stem of a name is one of these words.
+/// `true` if the stem of a name is in the list.
 fn is(name: &str, words: &[&str]) -> bool {
     words.contains(&stem(name).as_str())
 }
 
-/// A name of time.
+/// `true` for a usual name of the time.
 pub fn is_time(name: &str) -> bool {
     let stem = stem(name);
     ["time", "zeit", "timestamp", "elapsed"].iter().any(|word| stem.starts_with(word) || stem.ends_with(word))
@@ -21,7 +21,7 @@ pub fn is_time(name: &str) -> bool {
         )
 }
 
-/// A name of a column that distinguishes trajectories.
+/// `true` for a usual name of a column that distinguishes trajectories.
 pub fn is_trajectory(name: &str) -> bool {
     let words = [
         "run",
@@ -49,13 +49,13 @@ pub fn is_trajectory(name: &str) -> bool {
     is(name, &words)
 }
 
-/// A name of a column that counts rows.
+/// `true` for a usual name of a row counter.
 pub fn is_index(name: &str) -> bool {
     is(name, &["frame", "sample", "index", "idx", "row", "step", "count", "bild", "nr", "no", ""])
         && name.parse::<f64>().is_err()
 }
 
-/// A name of a force or a torque.
+/// `true` for a usual name of a force or a torque.
 pub fn is_force(name: &str) -> bool {
     let words =
         ["tau", "torque", "force", "f", "u", "effort", "kraft", "drehmoment", "moment", "fx", "fy", "fz", "input"];
@@ -63,13 +63,13 @@ pub fn is_force(name: &str) -> bool {
     is(name, &words) || ["tau_", "torque_", "force_", "effort_", "f_", "u_"].iter().any(|start| stem.starts_with(start))
 }
 
-/// A name of a torque.
+/// `true` for a usual name of a torque.
 pub fn is_torque(name: &str) -> bool {
     let stem = stem(name);
     is(name, &["tau", "torque", "drehmoment"]) || ["tau_", "torque_"].iter().any(|start| stem.starts_with(start))
 }
 
-/// A name of an acceleration.
+/// `true` for a usual name of an acceleration.
 pub fn is_acceleration(name: &str) -> bool {
     let stem = stem(name);
     stem.contains("acc")
@@ -77,7 +77,7 @@ pub fn is_acceleration(name: &str) -> bool {
         || is(name, &["a", "ax", "ay", "az", "qdd", "ddq", "ddx", "ddy", "ddz"])
 }
 
-/// A name of a velocity.
+/// `true` for a usual name of a velocity.
 pub fn is_velocity(name: &str) -> bool {
     let words = [
         "v", "vx", "vy", "vz", "w", "wx", "wy", "wz", "qd", "dq", "dx", "dy", "dz", "dtheta", "dphi", "xd", "yd", "zd",
@@ -87,12 +87,12 @@ pub fn is_velocity(name: &str) -> bool {
     !is_acceleration(name) && (part || is(name, &words) || stem.starts_with("v_") || stem.ends_with("_v"))
 }
 
-/// A name of a position that no other quantity has.
+/// `true` for a name that only positions have.
 pub fn is_position(name: &str) -> bool {
     is_angle(name) || is(name, &["x", "y", "z", "q", "r", "s", "rho", "pos", "position", "x_pos", "y_pos", "z_pos"])
 }
 
-/// A name of an angle.
+/// `true` for a usual name of an angle.
 pub fn is_angle(name: &str) -> bool {
     let stem = stem(name);
     let part =
@@ -100,13 +100,13 @@ pub fn is_angle(name: &str) -> bool {
     part || is(name, &["psi", "alpha", "beta", "gamma", "ang", "deg", "rot"]) || in_degrees(name)
 }
 
-/// `true` if a name ends in degrees, or has them in it.
+/// `true` if a name contains degrees as its unit.
 pub fn in_degrees(name: &str) -> bool {
     let name = name.to_lowercase();
     name.ends_with("deg") || name.contains("_deg") || name.contains("degree")
 }
 
-/// The unit of time in a name.
+/// The unit of time that a name contains.
 pub fn unit_of_time(name: &str) -> Option<&'static str> {
     let name = name.to_lowercase();
     let ends = |unit: &str| name == unit || name.ends_with(&format!("_{unit}"));

@@ -21,10 +21,10 @@ enum Role {
     Time,
     Trajectory,
     Coordinate,
-    /// A derivative of a coordinate, of this order.
+    /// A derivative: number of the coordinate, and order.
     Derivative(usize, usize),
     Force,
-    /// Given by an option.
+    /// Specified by an option.
     Given(&'static str),
     Unused,
 }
@@ -113,7 +113,7 @@ impl Roles<'_> {
         }
     }
 
-    /// Sets aside columns that are no measurements: text, constants, counters, copies.
+    /// Excludes columns that are not measurements: text, constants, counters, copies.
     fn set_aside(&mut self) {
         for k in self.open() {
             let Ok(values) = &self.table.numbers[k] else { continue };
@@ -180,7 +180,7 @@ impl Roles<'_> {
     fn find_forces(&mut self) {
         if self.of(&Role::Force).is_empty() {
             let forces: Vec<usize> = self.open().into_iter().filter(|&k| is_force(&self.table.names[k])).collect();
-            // If no other columns are left, they are coordinates.
+            // If there are no other columns, the forces are taken as coordinates.
             if forces.len() < self.open().len() {
                 forces.into_iter().for_each(|k| self.set(k, Role::Force, "its name"));
             }
@@ -294,7 +294,7 @@ impl Roles<'_> {
                 self.set(k, Role::Unused, "no column is its derivative, but other coordinates have one");
             }
         }
-        // One force for each coordinate, and one derivative for each, or none.
+        // There must be one force for each coordinate, and one derivative for each or none.
         let coordinates = self.of(&Role::Coordinate);
         let forces = self.of(&Role::Force);
         if !forces.is_empty() && forces.len() != coordinates.len() && self.given.force.is_empty() {
@@ -352,7 +352,7 @@ impl Roles<'_> {
         };
         let units = &self.given.units;
         let known = |name: &String| units.iter().any(|(column, _)| column == name);
-        // Of joints under torques.
+        // Joints under torques are angles.
         let forces = self.of(&Role::Force);
         let turned = |place: usize| forces.get(place).is_some_and(|&k| is_torque(&self.table.names[k]));
         let found = |(place, &k): (usize, &usize)| {

@@ -6,8 +6,8 @@
 
 /// Fewest rows between two restarts of a time on average, and for each repeated time.
 pub(super) const ROWS_PER_RESTART: usize = 16;
-/// Largest relative deviation of a step from the median step, for all but one of [`STEPS_PER_UNEVEN_ONE`], of a time that is not recognised
-/// by its name.
+/// Largest relative deviation of a step from the median step in a time column that is not recognised by its name; one step in
+/// [`STEPS_PER_UNEVEN_ONE`] may deviate more.
 pub(super) const EVEN_STEP: f64 = 0.5;
 pub(super) const STEPS_PER_UNEVEN_ONE: usize = 10;
 /// Step of whole numbers, in s, from which they may be milliseconds: motion is hardly ever recorded more slowly.
@@ -35,7 +35,7 @@ pub(super) const FURTHER_DIFFERENCE: f64 = 0.2;
 pub(super) const MUTUAL_DIFFERENCE: f64 = 3.0;
 /// Difference of correlations up to which the shorter of two differences is preferred.
 pub(super) const EQUAL_CORRELATION: f64 = 1e-3;
-/// Rows between the samples of a difference; longer differences suffer less from noise.
+/// Distances, in rows, over which differences are taken; longer differences suffer less from noise.
 pub(super) const DIFFERENCE_REACHES: [usize; 5] = [1, 2, 4, 8, 16];
 /// Samples at which derivatives are compared.
 pub(super) const COMPARED_SAMPLES: usize = 4000;

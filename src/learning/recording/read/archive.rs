@@ -1,4 +1,4 @@
-//! ZIP archives, and the size that packed bytes may unpack to.
+//! ZIP archives, and a limit for the size of unpacked data.
 
 use super::Problem;
 use super::shared::Shared;
@@ -33,7 +33,7 @@ pub fn names(archive: &ZipArchive<Shared>) -> Result<Vec<String>, Problem> {
     archive.file_names().map(|name| name.map(|name| name.to_string()).map_err(broken)).collect()
 }
 
-/// Refuses entries that are far larger than their part of the file.
+/// Rejects entries that unpack to far more bytes than their packed size allows.
 pub fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = usize>) -> Result<(), Problem> {
     let (mut size, mut compressed) = (0u64, 0u64);
     for index in used {

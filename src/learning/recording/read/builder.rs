@@ -1,4 +1,4 @@
-//! Trajectories that grow row by row.
+//! Builds trajectories row by row.
 
 use super::Problem;
 use super::select::Selection;
@@ -8,7 +8,7 @@ use crate::recording::{Columns, RecordedTrajectory};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// A trajectory while its rows come in.
+/// A trajectory that is being read row by row.
 pub struct TrackBuilder {
     /// Value of the column that distinguishes trajectories.
     pub label: Option<String>,
@@ -34,7 +34,7 @@ pub struct Builder<'a> {
     periodic: Vec<bool>,
     current: usize,
     labels: HashMap<String, usize>,
-    /// Rows to come, if they are known and make one trajectory.
+    /// Number of rows to come, if it is known and they form a single trajectory.
     expected: usize,
     /// The trajectories so far.
     pub tracks: Vec<TrackBuilder>,
@@ -45,7 +45,7 @@ pub struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// No rows yet.
+    /// Creates a builder without rows.
     pub fn new(columns: &'a Columns, selection: Selection) -> Self {
         let periodic = columns.periodic();
         let (tracks, labels) = (Vec::new(), HashMap::new());
@@ -72,7 +72,7 @@ impl<'a> Builder<'a> {
         self.expected = if self.selection.trajectory.is_none() { rows } else { 0 };
     }
 
-    /// The columns as the file calls them.
+    /// The columns by the names that the file uses.
     pub fn columns_in_file(&self) -> Columns {
         self.selection.called(self.columns)
     }
@@ -123,7 +123,7 @@ impl<'a> Builder<'a> {
         Err(Problem::Order { row, column, before_row, before, found: values[0], hint })
     }
 
-    /// Notes a row that is left out because a reading is missing. A trajectory that stays whole keeps rows with some of the positions.
+    /// Counts and skips a row if a reading is missing. A trajectory that stays whole keeps rows that have at least one position.
     fn is_incomplete(&mut self, row: u64, values: &[f64]) -> bool {
         let lacking = |x: &&f64| x.is_nan();
         let Some(first) = values.iter().position(|x| x.is_nan()) else { return false };

@@ -18,14 +18,14 @@ pub struct TextReader<'a> {
     lanes: Vec<Lane<'a>>,
     /// `true` if trajectories are side by side.
     wide: bool,
-    /// Place of every column among the used ones of its trajectory.
+    /// For every column of the file, its index among the used columns of its trajectory.
     slots: Vec<Option<usize>>,
     /// Position of the column that distinguishes trajectories.
     label_at: Option<usize>,
     faults: Faults,
-    /// Mark of the decimals.
+    /// Recognises the decimal mark.
     pub numbers: Numbers,
-    /// Encoding of the text that is not a number.
+    /// Encoding of the text.
     pub encoding: Encoding,
     /// Separator of the fields.
     pub separator: Separator,
@@ -101,7 +101,7 @@ fn is_title(line: &[u8], rest: &[u8]) -> bool {
 }
 
 impl<'a> TextReader<'a> {
-    /// Finds the columns by the first line, or by the comment above it; says whether the line is a header.
+    /// Finds the columns by the first line, or by the comment above it; returns whether the line is a header.
     fn begin(
         line: &[u8],
         row: u64,
@@ -111,7 +111,7 @@ impl<'a> TextReader<'a> {
     ) -> Result<(Self, bool), Problem> {
         let (text, encoding) = decode(line).ok_or(Problem::NotText(row))?;
         let separator = known.unwrap_or_else(|| Separator::of(&text));
-        // A column that has no name is the first of a table.
+        // In a table with row names, the first column has no name.
         let text = if separator == Separator::Tab { text.trim_matches(' ').trim_end() } else { text.trim() };
         let first = split(text, separator);
         let width = first.len();
@@ -141,7 +141,7 @@ impl<'a> TextReader<'a> {
         Ok((Self { lanes, wide: columns.wide, slots, label_at, faults, numbers, encoding, separator }, header))
     }
 
-    /// Reads the numbers of one line, `text` being it without the blanks around.
+    /// Parses the numbers of one line; `text` is the line without surrounding blanks.
     fn take<'b>(&mut self, line: &'b [u8], mut text: &'b [u8], row: u64) -> Result<(), Problem> {
         if self.separator == Separator::Tab {
             // Tabs at the ends separate empty fields.
@@ -171,7 +171,7 @@ impl<'a> TextReader<'a> {
             self.note_mistakes(text, row);
             return Ok(());
         }
-        // After a mistake the rest is only searched for further mistakes, and nothing is kept.
+        // After a mistake, the remaining rows are only checked for further mistakes.
         if !self.faults.is_empty() {
             return Ok(());
         }
@@ -193,7 +193,7 @@ impl<'a> TextReader<'a> {
         self.lanes.iter_mut().try_for_each(|lane| lane.take(&fields, row, &mut self.numbers, &mut self.faults))
     }
 
-    /// Notes every mistake of a line.
+    /// Collects every mistake of a line.
     fn note_mistakes(&mut self, text: &[u8], row: u64) {
         let (expected, found) = (self.slots.len(), self.separator.fields(text).count());
         if found != expected {

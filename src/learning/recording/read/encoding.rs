@@ -1,4 +1,4 @@
-//! Text in other encodings than UTF-8.
+//! Text in encodings other than UTF-8.
 
 use serde::Serialize;
 use std::borrow::Cow;
@@ -53,11 +53,11 @@ pub fn is_utf16(start: &[u8]) -> bool {
 /// Reader of UTF-16 as UTF-8.
 pub struct Utf16<R> {
     input: R,
-    /// Order of the bytes, once the mark is read.
+    /// Byte order, once the byte order mark is read.
     big_endian: Option<bool>,
-    /// First half of a pair.
+    /// First half of a surrogate pair.
     high: Option<u16>,
-    /// Bytes that were decoded and not yet taken.
+    /// Decoded bytes that have not been read yet.
     ready: Vec<u8>,
 }
 
@@ -67,7 +67,7 @@ impl<R: Read> Utf16<R> {
         Self { input, big_endian: None, high: None, ready: Vec::new() }
     }
 
-    /// Decodes some more; leaves nothing ready at the end.
+    /// Decodes more bytes; the buffer remains empty at the end of the file.
     fn more(&mut self) -> io::Result<()> {
         let mut bytes = Vec::new();
         (&mut self.input).take(1 << 16).read_to_end(&mut bytes)?;
@@ -95,7 +95,7 @@ impl<R: Read> Utf16<R> {
         };
         let text: Result<String, _> = char::decode_utf16(whole.iter().copied()).collect();
         self.ready = text.map_err(|_| wrong())?.into_bytes();
-        // A single half of a pair is no end.
+        // The first half of a surrogate pair does not end the file.
         if self.ready.is_empty() && self.high.is_some() { self.more() } else { Ok(()) }
     }
 }

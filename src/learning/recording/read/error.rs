@@ -10,13 +10,13 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DataError {
-    /// The description of the columns contradicts itself.
+    /// The description of the columns is inconsistent.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
-    /// No files.
+    /// No files were given.
     #[error("expected at least one file of data")]
     NoFiles,
-    /// A problem of a file.
+    /// One file has a problem.
     #[error("{}", one_line(&format!("{file}: {problem}")))]
     File {
         /// Its path.
@@ -30,22 +30,22 @@ pub enum DataError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file itself.
+    /// The file could not be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// Given as two of the files.
+    /// The same file was given twice.
     #[error("the file is given twice")]
     Again,
     /// The file is empty.
     #[error("the file is empty")]
     Empty,
-    /// No coordinates are given; the columns of the file, by name or by number.
+    /// No coordinates were given; contains the columns of the file, by name or by number.
     #[error("no coordinates are given; the columns are {}", .0.join(", "))]
     Names(Vec<String>),
-    /// Bytes that are not text.
+    /// The file is not text; contains the position of the first such byte.
     #[error("row {0}: bytes that are not text")]
     NotText(u64),
-    /// A file in a foreign format, and how to convert it.
+    /// The file has a foreign format.
     #[error("{name}, a format that is not supported: {cure}")]
     Foreign {
         /// The format.
@@ -53,15 +53,15 @@ pub enum Problem {
         /// How to convert the file to a readable format.
         cure: &'static str,
     },
-    /// Several problems of one file.
+    /// One file has several problems.
     #[error("{}", joined(first, *more))]
     Several {
         /// The first few.
         first: Vec<Problem>,
-        /// Number of the others.
+        /// Number of further problems.
         more: usize,
     },
-    /// A line that is too long to be a row of numbers.
+    /// A line is too long to be a row of numbers.
     #[error("row {row}: a line of more than {limit} bytes")]
     LongLine {
         /// The row.
@@ -77,26 +77,26 @@ pub enum Problem {
         /// Its name.
         name: String,
     },
-    /// A missing column, with the nearest name.
+    /// A column is missing.
     #[error("row {row}: missing {what}: {problem}")]
     Missing {
         /// Row of the header.
         row: u64,
         /// Description of what was expected.
         what: &'static str,
-        /// Its name and what was found there.
+        /// Its name, and the most similar name in the file.
         problem: String,
     },
-    /// Neither times nor a rate.
+    /// There are neither times nor a rate.
     #[error(
         "no column is called t or time{}: name the column of time, or give the rate in samples per second",
         listed(names)
     )]
     NoTime {
-        /// Names of the columns there are; none in a file without names.
+        /// Names of the existing columns; empty if the file has no names.
         names: Vec<String>,
     },
-    /// Names for another number of columns.
+    /// The number of given names differs from the number of columns.
     #[error("row {row}: expected {}, as many as columns are named, found {found}", pluralize(*expected, "field", "fields"))]
     Width {
         /// The row.
@@ -106,7 +106,7 @@ pub enum Problem {
         /// Fields found.
         found: usize,
     },
-    /// Names given though the file has its own.
+    /// Names were given although the file has its own.
     #[error("row {row}: expected numbers below the given names of columns, found the header {found}")]
     Header {
         /// The row.
@@ -114,7 +114,7 @@ pub enum Problem {
         /// Text found there.
         found: String,
     },
-    /// A row with too few or too many fields.
+    /// A row has too few or too many fields.
     #[error("row {row}: expected {}{separated}, found {found}", pluralize(*expected, "field", "fields"))]
     Ragged {
         /// The row.
@@ -129,16 +129,16 @@ pub enum Problem {
     /// More rows are incomplete than complete.
     #[error("row {row}, column {column}: no reading; {incomplete} rows are incomplete and {whole} are complete")]
     Missings {
-        /// The first of them.
+        /// The first incomplete row.
         row: u64,
-        /// A column without a reading there.
+        /// A column whose reading is missing there.
         column: String,
-        /// How many they are.
+        /// Number of incomplete rows.
         incomplete: usize,
-        /// How many others.
+        /// Number of complete rows.
         whole: usize,
     },
-    /// A coordinate without any reading.
+    /// A coordinate has no readings at all.
     #[error("column {column}: no reading{}", label.as_ref().map_or(String::new(), |label| format!(" in trajectory {label}")))]
     Unread {
         /// The column.
@@ -146,7 +146,7 @@ pub enum Problem {
         /// The trajectory.
         label: Option<String>,
     },
-    /// A field that is not a finite number.
+    /// A field is not a finite number.
     #[error("row {row}, column {column}: expected a finite number, found {found:?}")]
     Field {
         /// The row.
@@ -156,7 +156,7 @@ pub enum Problem {
         /// Text found there.
         found: String,
     },
-    /// Decimal commas in one row and decimal points in another.
+    /// One row has decimal commas and another has decimal points.
     #[error("row {row}, column {column}: expected a decimal {} as in row {since}, found {found:?}", if *comma { "comma" } else { "point" })]
     Decimal {
         /// The row.
@@ -165,12 +165,12 @@ pub enum Problem {
         column: String,
         /// Text found there.
         found: String,
-        /// `true` if the decimals before have a comma.
+        /// `true` if earlier decimals have a comma.
         comma: bool,
-        /// Row of the first of them.
+        /// Row of the first such decimal.
         since: u64,
     },
-    /// An unknown unit in a header.
+    /// A header has an unknown unit.
     #[error("row {row}, column {column}: {problem}; state its unit otherwise, the factor 1 for SI")]
     Unit {
         /// Row of the header.
@@ -206,7 +206,7 @@ pub enum Problem {
         /// The text found there.
         found: f64,
     },
-    /// A header and nothing below.
+    /// There is a header but no rows.
     #[error("no rows of numbers")]
     NoRows,
     /// Too few rows for a fit.
@@ -214,20 +214,20 @@ pub enum Problem {
     TooFew {
         /// Fewest samples of a trajectory.
         least: usize,
-        /// Most samples between two gaps.
+        /// Largest number of samples between two gaps.
         found: usize,
     },
-    /// Many trajectories in one file.
+    /// One file has too many trajectories.
     #[error("row {row}, column {column}: more than {most} different values, expected one per trajectory")]
     Trajectories {
         /// The row.
         row: u64,
         /// The column.
         column: String,
-        /// Most trajectories of a file.
+        /// Largest number of trajectories in a file.
         most: usize,
     },
-    /// An array file that is not what it should be.
+    /// An array file is invalid.
     #[error("{0}")]
     Array(String),
     /// The file could not be read to its end.
@@ -235,7 +235,7 @@ pub enum Problem {
     Io(#[from] std::io::Error),
 }
 
-/// Problems of one file as they are found.
+/// Collects the problems of one file.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
     first: Vec<Problem>,
@@ -243,7 +243,7 @@ pub(super) struct Faults {
 }
 
 impl Faults {
-    /// Notes a problem.
+    /// Adds a problem.
     pub(super) fn add(&mut self, problem: Problem) {
         if self.first.len() < LISTED_PROBLEMS { self.first.push(problem) } else { self.more += 1 }
     }
@@ -253,7 +253,7 @@ impl Faults {
         self.first.is_empty()
     }
 
-    /// Keeps a result, or notes why there is none.
+    /// Returns the value, or adds the problem and returns `None`.
     pub(super) fn good<T>(&mut self, found: Result<T, Problem>) -> Option<T> {
         found.map_err(|problem| self.add(problem)).ok()
     }
@@ -261,7 +261,7 @@ impl Faults {
     /// The problems, combined into one.
     ///
     /// # Errors
-    /// If there are any.
+    /// The combined problem, if there are any.
     pub(super) fn end(mut self) -> Result<(), Problem> {
         match self.first.len() {
             0 => Ok(()),
@@ -277,7 +277,7 @@ fn joined(first: &[Problem], more: usize) -> String {
     if more == 0 { listed } else { format!("{listed}; and {more} more") }
 }
 
-/// The first few names of columns, such as ` (there are s, x, y)`; nothing if there are none.
+/// Lists the first few column names, such as ` (there are s, x, y)`; empty if there are none.
 fn listed(names: &[String]) -> String {
     let first = names.iter().take(LISTED_COLUMNS).cloned().collect::<Vec<_>>().join(", ");
     match names.len() {

@@ -20,7 +20,7 @@ pub enum FileKind {
     Xlsx,
 }
 
-/// How a file was read: everything that it did not state and that was recognised instead.
+/// How a file was read: the properties that it does not state and that were recognised.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FileFacts {
     /// The file.

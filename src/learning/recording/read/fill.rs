@@ -1,4 +1,4 @@
-//! Arrays read row by row, however many files or entries their columns come from.
+//! Reads arrays row by row, from one or several files or archive entries.
 
 use super::Problem;
 use super::builder::Builder;
@@ -7,25 +7,25 @@ use super::error::Faults;
 use super::thresholds::ROWS_AT_ONCE;
 use std::io::Read;
 
-/// Elements that come row by row.
+/// A stream of elements that is read row by row.
 pub struct Source<'a> {
     /// Where they come from.
     pub input: Box<dyn Read + 'a>,
     /// Their type.
     pub element: Element,
-    /// Elements of a row.
+    /// Number of elements in a row.
     pub width: usize,
-    /// Used elements of a row: place in the row, place among the used columns.
+    /// Used elements of a row: index in the row, and index among the used columns.
     pub wanted: Vec<(usize, usize)>,
-    /// `true` if nothing may follow them.
+    /// `true` if no bytes may follow the elements.
     pub whole: bool,
-    /// Name in a message, followed by a space, if it is one of several.
+    /// Name for messages, followed by a space, if there are several sources.
     pub name: String,
 }
 
 /// Adds `rows` rows to the trajectories: the used columns in the order of the selection, the trajectory's column last.
 ///
-/// Memory is that of the trajectories and of a thousand rows.
+/// Needs memory for the trajectories and a thousand rows.
 pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>]) -> Result<Builder<'b>, Problem> {
     let count = builder.selection().values.len();
     let all = count + usize::from(builder.selection().trajectory.is_some());
@@ -50,7 +50,7 @@ pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>
             for (used, found) in builder.selection().used().zip(&values).filter(|(_, x)| x.is_infinite()) {
                 faults.add(Problem::Field { row, column: used.name.clone(), found: found.to_string() });
             }
-            // After a mistake the rest is only searched for further mistakes, and nothing is kept.
+            // After a mistake, the remaining rows are only checked for further mistakes.
             if !faults.is_empty() {
                 continue;
             }

@@ -90,7 +90,7 @@ impl ForceFormulas {
 }
 
 impl ForceSource {
-    /// The columns and the time it is made of.
+    /// Names that a formula uses: columns and the time.
     fn names(&self) -> &[String] {
         match self {
             Self::Column(name) => std::slice::from_ref(name),

@@ -18,7 +18,7 @@ const HDF5: &str = "in MATLAB write writetable(table(t, q1, q2), 'motion.csv'); 
                     numpy.savez('motion.npz', t=t, q1=q1, q2=q2)";
 const UNPACK: &str = "unpack it first";
 
-/// Place and bytes of the mark of a format, its name, and the cure.
+/// Offset and bytes that identify a format, its name, and the advice.
 const FORMATS: [(usize, &[u8], &str, &str); 14] = [
     (0, b"MATLAB 5.0 MAT-file", "a MATLAB file", MATLAB),
     (0, b"MATLAB 7.3 MAT-file", "a MATLAB file of version 7.3", HDF5),
@@ -36,7 +36,7 @@ const FORMATS: [(usize, &[u8], &str, &str); 14] = [
     (0, b"\x80\x04\x95", "a pickle of Python", FRAME),
 ];
 
-/// Refuses a file that begins as one of another format does.
+/// Rejects a file that begins with the magic bytes of a foreign format.
 pub fn refuse(start: &[u8]) -> Result<(), Problem> {
     let found = FORMATS.iter().find(|(at, mark, ..)| start.get(*at..).is_some_and(|from| from.starts_with(mark)));
     found.map_or(Ok(()), |&(.., name, cure)| Err(Problem::Foreign { name, cure }))

@@ -7,15 +7,15 @@ use std::io::{self, Read};
 /// First bytes of such a file.
 pub const MAGIC: &[u8] = b"\x1f\x8b";
 
-/// Reader of packed data, up to a hundred times its bytes.
+/// Reader of packed data that limits the unpacked size to a hundred times the packed size.
 pub struct Gzip<R> {
     decoder: MultiGzDecoder<R>,
-    /// Bytes that may still come.
+    /// Number of bytes that may still be unpacked.
     left: u64,
 }
 
 impl<R: Read> Gzip<R> {
-    /// A reader of `size` packed bytes.
+    /// Creates a reader for `size` packed bytes.
     pub fn new(input: R, size: u64) -> Self {
         Self { decoder: MultiGzDecoder::new(input), left: most_unpacked(size) }
     }

@@ -76,7 +76,7 @@ pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<
         let added = if again { Err(Problem::Again) } else { add_file(path, columns, &mut reading) };
         added.map_err(|problem| DataError::File { file: path.display().to_string(), problem })?;
     }
-    // Names of headers are known only now.
+    // The names in headers are known only after reading.
     reading.columns.validate()?;
     reading.recording.coordinates.clone_from(&reading.columns.coords);
     Ok(reading)

@@ -11,7 +11,7 @@ use crate::names::pluralize;
 use crate::recording::Columns;
 use std::io::{BufReader, Read};
 
-/// First bytes of such a file.
+/// First bytes of an NPY file.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// An array before its numbers are read.
@@ -19,13 +19,13 @@ pub const MAGIC: &[u8] = b"\x93NUMPY";
 pub struct Header {
     /// Rows.
     pub rows: usize,
-    /// Columns; 1 of a vector.
+    /// Columns; 1 for a vector.
     pub columns: usize,
     /// Number of dimensions, 1 or 2.
     pub dimensions: usize,
     /// Type of the numbers.
     pub element: Element,
-    /// `true` if columns follow each other, not rows.
+    /// `true` for Fortran order, which stores column after column.
     pub fortran: bool,
     /// Bytes before the first number.
     pub start: u64,

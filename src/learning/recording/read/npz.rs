@@ -14,8 +14,8 @@ use zip::ZipArchive;
 
 /// Reads vectors of equal length, each a column by its name, or a single table.
 ///
-/// Shapes and sizes are compared with each other and with the file before a number is unpacked, and the columns are
-/// unpacked together, row by row: nothing is held but the trajectories.
+/// Shapes and sizes are compared with each other and with the file before a number is unpacked, and the columns are unpacked together, row
+/// by row: only the trajectories are kept in memory.
 pub fn read(mut archive: ZipArchive<Shared>, columns: &Columns) -> Result<Vec<Builder<'_>>, Problem> {
     if archive.is_empty() {
         return Err(Problem::Array("the archive holds no arrays".to_string()));

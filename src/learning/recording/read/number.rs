@@ -22,7 +22,8 @@ impl Numbers {
         self.comma.is_some()
     }
 
-    /// A finite number with the decimal mark of the file, fast if nothing surrounds it; the first mark decides.
+    /// Parses a finite number with the decimal mark of the file; the first mark that occurs decides. Fast if there are no blanks or quotes
+    /// around the number.
     #[inline]
     pub fn parse(&mut self, field: &[u8], row: u64) -> Option<f64> {
         let text = std::str::from_utf8(field).ok()?;
@@ -35,7 +36,7 @@ impl Numbers {
         }
     }
 
-    /// As `parse`, but `NaN` for a missing reading: a field that is empty or says so.
+    /// Like `parse`, but returns `NaN` for a missing reading: an empty field, or a word for it.
     #[inline]
     pub fn reading(&mut self, field: &[u8], row: u64) -> Option<f64> {
         self.parse(field, row).or_else(|| {
@@ -69,7 +70,7 @@ impl Numbers {
         number.or_else(|| text.parse().ok()).filter(|x| x.is_finite())
     }
 
-    /// Why a field is no number.
+    /// Explains why a field is not a number.
     pub fn refusal(&self, field: &[u8], row: u64, column: &str) -> Problem {
         let Some((text, _)) = decode(field) else { return Problem::NotText(row) };
         let (text, column) = (unquoted(&text), column.to_string());

@@ -1,4 +1,4 @@
-//! Trajectories between gaps in time.
+//! Cuts trajectories at gaps in time.
 
 use super::builder::{TrackBuilder, empty};
 use super::thresholds::{AMBIGUOUS_TURN, LEAST_SAMPLES};
@@ -64,8 +64,8 @@ pub fn add(file: &str, builder: TrackBuilder, whole: bool, reading: &mut LoadedR
     most
 }
 
-/// Notes the gaps of a trajectory; returns the bounds of the stretches that it is cut into, the first and the last bound included, and the
-/// samples from which on angles have to be moved by full turns.
+/// Records the gaps of a trajectory. Returns the bounds of the pieces, including the first and the last, and the samples from which angles
+/// have to be shifted by full turns.
 fn cross_gaps(
     file: &str,
     track: &RecordedTrajectory,
@@ -98,8 +98,8 @@ fn cross_gaps(
     (bounds, turned)
 }
 
-/// Full turns by which the coordinates must be moved from sample `k + 1` on so that they continue across the gap before it as they moved
-/// before and after; none if that is ambiguous.
+/// Number of full turns by which each coordinate must be shifted from sample `k + 1` on, so that it crosses the gap before that sample with
+/// its velocity before and after; `None` if that is ambiguous.
 fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize) -> Option<Vec<f64>> {
     let (n, gap) = (periodic.len(), track.times[k + 1] - track.times[k]);
     let speed = |i: usize, before: Option<usize>| {
@@ -122,7 +122,7 @@ fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize)
     (0..n).map(of).collect()
 }
 
-/// Moves the coordinates of all samples from each of these on by full turns.
+/// Shifts the coordinates by full turns from each of these samples on.
 fn turn(track: &mut RecordedTrajectory, turned: &[(usize, Vec<f64>)]) {
     let Some((_, first)) = turned.first() else { return };
     let n = first.len();
